@@ -44,7 +44,7 @@ from bladefem.contact.complementarity import solve_lcp  # noqa: E402
 from bladefem.contact.patch import make_patch  # noqa: E402
 from bladefem.contact.seating import contact_problem, solve_seating  # noqa: E402
 from bladefem.fem.body import assemble  # noqa: E402
-from bladefem.fem.constraint import constrain, restrict  # noqa: E402
+from bladefem.fem.constraint import constrain, restrict_load  # noqa: E402
 from bladefem.fem.flexibility import compliance, flexible  # noqa: E402
 from bladefem.scene.tables import Material, Scene  # noqa: E402
 from geometry.isolated_process import build  # noqa: E402
@@ -111,7 +111,7 @@ def right_hand_sides(divisions, size, count=1000):
     )
     spent = []
     for columns in (
-        restrict(con, ports),
+        restrict_load(con, ports),
         np.random.default_rng(0).standard_normal((con.own.stop, count)),
     ):
         start = time.process_time()

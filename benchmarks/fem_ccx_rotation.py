@@ -33,7 +33,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import linear_tangent, preload, swell, tangent
+from bladefem.fem.rotation import linear_tangent, preload, tangent, unit_speed_displacement
 from bladefem.scene.tables import Material
 
 COUNT = 6
@@ -83,7 +83,12 @@ def ours(speed: float, nonlinear: bool) -> np.ndarray:
     if nonlinear:
         K = tangent(body, preload(body, speed, quadrature="ccx"), quadrature="ccx")
     else:
-        K = linear_tangent(body, speed**2 * swell(flexible(in_step(body))), speed, quadrature="ccx")
+        K = linear_tangent(
+            body,
+            speed**2 * unit_speed_displacement(flexible(in_step(body))),
+            speed,
+            quadrature="ccx",
+        )
     return modes(constrain(replace(body, K=K)), COUNT).frequencies
 
 

@@ -43,14 +43,14 @@ def crystal(kind: str, folder: Path) -> list[float]:
     """Frequencies [Hz] of a clamped bar of a crystal, its axes turned."""
     import decks
 
-    from bladefem.fem.elasticity import rotation
+    from bladefem.fem.elasticity import crystal_rotation
 
     given = decks.CRYSTALS[kind]
     constants = given.get("orthotropic")
     if constants is None:
         constants = (*(given["E"],) * 3, *(given["nu"],) * 3, *(given["G"],) * 3)
     _, m = decks.bar()
-    axes = rotation(given["angles"])
+    axes = crystal_rotation(given["angles"])
     (folder / "job.inp").write_text(decks.crystal_job(m, constants, axes, given["rho"], COUNT))
     environment = {**os.environ, "OMP_NUM_THREADS": "1"}
     subprocess.run(

@@ -27,7 +27,7 @@ from geometry.mesh import Mesh
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
 from ..fem.flexibility import Flexibility
-from ..fem.loads import centrifugal, mass
+from ..fem.loads import body_mass, centrifugal
 from ..util.arrays import RealArray
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
@@ -137,7 +137,7 @@ def frictional_problem(
     rigid, load = rigid_and_load(mesh, patches, body, pull)
     gap = np.concatenate([initial_gap(p, mesh) for p in patches]) + clearance
     return FrictionalProblem(
-        tuple(patches), C + C_damper, gap, -blade_swell, damper_swell, rigid, load, mass(body)
+        tuple(patches), C + C_damper, gap, -blade_swell, damper_swell, rigid, load, body_mass(body)
     )
 
 

@@ -32,10 +32,10 @@ from geometry.mesh import Mesh
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
 from ..fem.body import Body, assemble
-from ..fem.constraint import constrain, restrict
+from ..fem.constraint import constrain, restrict_load
 from ..fem.flexibility import Flexibility, compliance, flexible
-from ..fem.linalg import dot
-from ..fem.loads import centrifugal, mass
+from ..fem.linalg import inner_products
+from ..fem.loads import body_mass, centrifugal
 from ..scene.tables import Materials
 from ..util.arrays import RealArray
 from ..util.communicator import Communicator
@@ -130,7 +130,7 @@ def contact_problem(
     gap = np.concatenate([initial_gap(p, mesh) for p in patches])
     gap = gap + as_float_array("clearance", clearance, gap.shape if np.ndim(clearance) else ())
     return ContactProblem(
-        tuple(patches), C, gap, -blade_swell, damper_swell, rigid[ports], load, mass(body)
+        tuple(patches), C, gap, -blade_swell, damper_swell, rigid[ports], load, body_mass(body)
     )
 
 
@@ -244,8 +244,8 @@ def condense_body(
     """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh
     numbering.
     """
-    columns = restrict(flex.con, sp.hstack([P, sp.csc_matrix(load[:, None])], format="csc"))
-    G = dot(flex.con.body.comm, columns[:, :-1], compliance(flex, columns)).real
+    columns = restrict_load(flex.con, sp.hstack([P, sp.csc_matrix(load[:, None])], format="csc"))
+    G = inner_products(flex.con.body.comm, columns[:, :-1], compliance(flex, columns)).real
     return (G[:, :-1] + G[:, :-1].T) / 2, G[:, -1]
 
 

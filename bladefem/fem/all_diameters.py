@@ -24,9 +24,25 @@ from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, high_part, transformation
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
-from .linalg import Folded, apply, combined, dot, inertia, minus, mix
+from .linalg import (
+    Folded,
+    apply_block,
+    combined,
+    inertia,
+    inner_products,
+    linear_combinations,
+    subtract_product,
+)
 from .memory import give_back
-from .modes import BLOCKS, DIRECTION_TOLERANCE, GAP_SHARE, SLEPC, mode_set, pairs, pairs_together
+from .modes import (
+    BLOCKS,
+    DIRECTION_TOLERANCE,
+    GAP_SHARE,
+    SLEPC,
+    lowest_pairs,
+    mode_set,
+    pairs_together,
+)
 
 # modes beyond those asked for, carried along
 GUARD_MODES = 2
@@ -212,7 +228,7 @@ def _solve_pairs(
     guard: int = GUARD_MODES,
 ) -> Eigenpairs:
     guard = min(guard, flex.con.T.shape[1] - count)
-    return Eigenpairs(flex, *pairs(flex, count, tolerance, start, guard, solver))
+    return Eigenpairs(flex, *lowest_pairs(flex, count, tolerance, start, guard, solver))
 
 
 def _extend_space(
@@ -261,9 +277,9 @@ def _initial_vectors(
     """(n_own, count) lowest vectors of the projected pencil."""
     Z = _projected_modes(space.K, space.M, angle, count)
     if con.dtype is not complex:
-        return mix(space.W, Z.real)
+        return linear_combinations(space.W, Z.real)
     out = np.empty((len(space.W), count), complex, order="F")
-    out.real, out.imag = mix(space.W, Z.real), mix(space.W, Z.imag)
+    out.real, out.imag = linear_combinations(space.W, Z.real), linear_combinations(space.W, Z.imag)
     return out
 
 
@@ -278,14 +294,14 @@ def _span_parts(
     parts = [part for X in blocks for part in ((X.real, X.imag) if np.iscomplexobj(X) else (X,))]
     W = np.empty((len(parts[0]), sum(part.shape[1] for part in parts)), order="F")
     np.concatenate(parts, axis=1, out=W)
-    gram = dot(t.body.comm, W, W)
+    gram = inner_products(t.body.comm, W, W)
     length = np.sqrt(gram.diagonal())
     if known is not None:
-        W = minus(W, [known.W], dot(t.body.comm, known.W, W))
-        gram = dot(t.body.comm, W, W)
+        W = subtract_product(W, [known.W], inner_products(t.body.comm, known.W, W))
+        gram = inner_products(t.body.comm, W, W)
     size, Z = np.linalg.eigh(gram / np.outer(length, length))
     good = size > 1e-13
-    return mix(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
+    return linear_combinations(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
 
 
 def _project_columns(
@@ -296,8 +312,8 @@ def _project_columns(
     """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
     comm = t.body.comm
     if t.opened is None:
-        stiff = [dot(comm, W, apply(A, W[:, new])) for A in t.K]
-        return stiff, [dot(comm, W, apply(A, W[:, new])) for A in t.M]
+        stiff = [inner_products(comm, W, apply_block(A, W[:, new])) for A in t.K]
+        return stiff, [inner_products(comm, W, apply_block(A, W[:, new])) for A in t.M]
     T1 = high_part(t)[t.opened.places]
     faces = np.flatnonzero(np.diff(T1.indptr))
     low = t.low[t.opened.places] @ W
@@ -428,7 +444,7 @@ def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
     """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
     if t.opened is None:
         return None
-    return core.eliminate(
+    return core.eliminate_interior(
         (t.opened.K - shift * t.opened.M).tocsr(),
         t.opened.core.rim,
         definite=False,
@@ -444,7 +460,7 @@ def _count_below(
 ) -> int:
     if shared is None or not isinstance(con.K, Folded):
         return inertia(combined(con.K, -shift, con.M))
-    return core.negative(shared, con.K.C)
+    return core.count_negative(shared, con.K.C)
 
 
 def _widest_gap(lists: list[np.ndarray]) -> float:

@@ -25,8 +25,8 @@ from .compat import (
     ufl,
     vector_space,
 )
-from .elasticity import Law, elastic_law, owners, piecewise
-from .memory import check
+from .elasticity import Law, cellwise_constant, elastic_law, material_numbers
+from .memory import check_memory
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def assemble(
     cells, used, local = _check_cells(mesh, names, materials)
     comm = comm or MPI.COMM_WORLD
     dim = mesh.dimension
-    check(dim * len(used), comm)
+    check_memory(dim * len(used), comm)
     domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
     space = vector_space(domain, CELLS[mesh.cell_type][1])
     law, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)
@@ -131,7 +131,7 @@ def properties(
     for forms.
     """
     density = np.array([material.rho for material in materials.values()])
-    rho = piecewise(domain, density[owners(mesh, materials, domain)])
+    rho = cellwise_constant(domain, density[material_numbers(mesh, materials, domain)])
     depth = dolfinx.fem.Constant(domain, float(mesh.depth if mesh.dimension == 2 else 1.0))
     return elastic_law(mesh, materials, domain, plane), rho, depth
 
@@ -225,8 +225,10 @@ def degrees(
 
 def _has_straight_cells(mesh: Mesh, cells: np.ndarray) -> bool:
     """True where every node lies where the corners put it."""
-    k = shape.corners(mesh.cell_type)
-    linear, _ = shape.tabulate(mesh.cell_type.rstrip("0123456789"), shape.nodes(mesh.cell_type))
+    k = shape.corner_count(mesh.cell_type)
+    linear, _ = shape.tabulate(
+        mesh.cell_type.rstrip("0123456789"), shape.reference_nodes(mesh.cell_type)
+    )
     x = mesh.points[cells]
     return bool(
         abs(x - np.einsum("qk,ckg->cqg", linear, x[:, :k])).max()

@@ -246,7 +246,7 @@ def clamped_nodes(body: Body, clamp: str | None) -> np.ndarray:
     return found
 
 
-def restrict(con: Constrained, load: np.ndarray | sp.spmatrix) -> np.ndarray:
+def restrict_load(con: Constrained, load: np.ndarray | sp.spmatrix) -> np.ndarray:
     """T^H load: this rank's rows (n_own, k) of loads or port vectors (n_points*dim, k) in mesh
     numbering.
     """
@@ -262,7 +262,7 @@ def unknowns(con: Constrained, x: np.ndarray) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def expand(con: Constrained, x: np.ndarray) -> np.ndarray:
+def expand_to_mesh(con: Constrained, x: np.ndarray) -> np.ndarray:
     """Displacements (n_points, dim, k) in mesh numbering on every rank from this rank's unknowns
     (n_own, k).
     """
@@ -509,7 +509,7 @@ def _open_sector(
         return None
     order = interior_first(K, rim, places // body.dim)
     nodal = _of_one_direction(M, places, body.dim)
-    return Opened(T, places, K, M, nodal, core.eliminate(K, rim, order=order))
+    return Opened(T, places, K, M, nodal, core.eliminate_interior(K, rim, order=order))
 
 
 def _of_one_direction(

@@ -19,7 +19,7 @@ from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
 from ..errors import NotSolvedError
 from .compat import MPI, PETSc
 from .mumps import Factorised, factorise_matrix, solve_matrix
-from .schur import Bridge, bridge, schur_complement, through
+from .schur import Bridge, replace_dense_solve, schur_complement, solve_through_boundary
 
 # complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
 COLUMNS_PER_SOLVE = 32
@@ -80,7 +80,7 @@ def masters(C: sp.csr_matrix) -> np.ndarray:
     return np.unique(C[rim_of(C)].indices)
 
 
-def eliminate(
+def eliminate_interior(
     A: sp.csr_matrix,
     rim: np.ndarray,
     definite: bool = True,
@@ -91,7 +91,7 @@ def eliminate(
 
     Args:
         order: see ``ordering.interior_first``.
-        keep: keep the factors, for solves; else for :func:`negative` alone.
+        keep: keep the factors, for solves; else for :func:`count_negative` alone.
 
     Raises:
         NotSolvedError: from MUMPS.
@@ -112,12 +112,12 @@ def eliminate(
         rim,
         S,
         A[rim][:, inner].tocsr(),
-        bridge(factor, len(rim)) if definite else None,
+        replace_dense_solve(factor, len(rim)) if definite else None,
         order,
     )
 
 
-def close(
+def join_cut_faces(
     core: Core,
     C: sp.csr_matrix,
     definite: bool = True,
@@ -151,7 +151,7 @@ def close(
     return Rim(core, inner, on_face, Cb, dense, -1)
 
 
-def negative(core: Core, C: sp.csr_matrix) -> int:
+def count_negative(core: Core, C: sp.csr_matrix) -> int:
     """Number of negative eigenvalues of C^H A C, by Sylvester's law of inertia.
 
     Raises:
@@ -161,7 +161,7 @@ def negative(core: Core, C: sp.csr_matrix) -> int:
     return core.factor.negative + _count_negative(Cb.conj().T @ (Cb.T @ core.S).T)
 
 
-def solve(rim: Rim, B: np.ndarray) -> np.ndarray:
+def solve_diameter(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_free, k)."""
     X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
     made = rim.core.bridge
@@ -188,7 +188,7 @@ def solve_together(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
     made = systems[0][0].core.bridge
     many = sum(B.shape[1] for _, B in systems) > COLUMNS_PER_SOLVE
     if made is None or many or len(systems) == 1:
-        return [solve(rim, B) for rim, B in systems]
+        return [solve_diameter(rim, B) for rim, B in systems]
     out = []
     for (rim, B), (inside, on_face) in zip(systems, _solve_one_sweep(made, systems), strict=True):
         X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
@@ -217,7 +217,9 @@ def _solve_one_sweep(
             moved.append(_split_parts(rim.C @ faces[-1], part.stop - part.start))
         return np.hstack(moved)
 
-    X = through(made, np.hstack(wide) if len(wide) > 1 else wide[0], answer)[core.inner]
+    X = solve_through_boundary(made, np.hstack(wide) if len(wide) > 1 else wide[0], answer)[
+        core.inner
+    ]
     insides = [_join_parts(X[:, part], B) for B, part in zip(loads, columns, strict=True)]
     return list(zip(insides, faces, strict=True))
 
@@ -226,8 +228,12 @@ def _solve_two_sweeps(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The same by two solves inside."""
     core = rim.core
     inside = inner_solve(core, B[rim.inner])
-    on_face = face_solve(rim, B[rim.masters] - rim.C.conj().T @ times(core.coupling, inside))
-    return inside - inner_solve(core, times(core.coupling.T.tocsr(), rim.C @ on_face)), on_face
+    on_face = face_solve(
+        rim, B[rim.masters] - rim.C.conj().T @ real_times_complex(core.coupling, inside)
+    )
+    return inside - inner_solve(
+        core, real_times_complex(core.coupling.T.tocsr(), rim.C @ on_face)
+    ), on_face
 
 
 def face_solve(rim: Rim, g: np.ndarray) -> np.ndarray:
@@ -261,7 +267,7 @@ def _join_parts(X: np.ndarray, like: np.ndarray) -> np.ndarray:
     return X if not np.iscomplexobj(like) else X[:, :k] + 1j * X[:, k:]
 
 
-def times(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
+def real_times_complex(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
     """Real sparse matrix times a complex block, without a complex copy of the matrix."""
     if not np.iscomplexobj(X):
         return A @ X

@@ -23,8 +23,8 @@ import numpy as np
 from ..errors import NotSolvedError
 from .compat import PETSc, SLEPc
 from .constraint import Constrained
-from .lanczos import lowest, orthonormal
-from .linalg import apply, dot, minus, mix
+from .lanczos import lowest_eigenpairs, orthonormal
+from .linalg import apply_block, inner_products, linear_combinations, subtract_product
 
 # iterations (restarts) until SLEPc gives up
 MAX_RESTARTS = 100
@@ -167,7 +167,7 @@ def _times_mass(pencil: _Pencil, column: np.ndarray) -> np.ndarray:
     # of vectors shared out no rank can tell alone
     factor = _multiple(pencil.last, column) if pencil.con.body.comm.size == 1 else None
     if factor is None or pencil.image is None:
-        pencil.image = apply(pencil.con.M, column)
+        pencil.image = apply_block(pencil.con.M, column)
     else:
         # SLEPc scales what it has multiplied just now
         pencil.image = factor * pencil.image
@@ -203,7 +203,7 @@ class _Stiffness:
         x: PETSc.Vec,
         y: PETSc.Vec,
     ) -> None:
-        _shielded(self.pencil, x, y, partial(apply, self.pencil.con.K))
+        _shielded(self.pencil, x, y, partial(apply_block, self.pencil.con.K))
 
 
 class _Inverse:
@@ -233,8 +233,8 @@ def _times_inverse(pencil: _Pencil, load: np.ndarray) -> np.ndarray:
         if len(pencil.known):
             # of the products with earlier directions only the imaginary part is rounding
             # always: however small, SLEPc takes off the rest and lets them grow
-            product = dot(pencil.con.body.comm, pencil.images.block, found)
-            found = found - mix(pencil.known.block, 1j * product.imag)
+            product = inner_products(pencil.con.body.comm, pencil.images.block, found)
+            found = found - linear_combinations(pencil.known.block, 1j * product.imag)
     return found
 
 
@@ -249,10 +249,10 @@ def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     # SLEPc multiplies by M before it asks for the inverse
     assert last is not None
     comm = pencil.con.body.comm
-    size = float(dot(comm, load, last).real[0, 0])
+    size = float(inner_products(comm, load, last).real[0, 0])
     product = np.zeros((0, 1), complex)
     if len(pencil.known):
-        product = dot(comm, pencil.images.block, last)
+        product = inner_products(comm, pencil.images.block, last)
     if not pencil.started or abs(product.imag).max(
         initial=0.0
     ) > IMAGINARY_PART_TOLERANCE * np.sqrt(size):
@@ -264,8 +264,8 @@ def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     image = load
     share = product.real
     if abs(share).max(initial=0.0) > ROUNDING_SHARE * np.sqrt(size):
-        direction = direction - mix(pencil.known.block, share.astype(complex))
-        image = image - mix(pencil.images.block, share.astype(complex))
+        direction = direction - linear_combinations(pencil.known.block, share.astype(complex))
+        image = image - linear_combinations(pencil.images.block, share.astype(complex))
     rest = size - (share**2).sum()
     if rest > NEW_DIRECTION_SHARE * size:
         pencil.known.append(direction / np.sqrt(rest))
@@ -304,7 +304,7 @@ def krylov_schur(
     lam, X = _purify_vectors(con, inverse, found, min(count + guard, found.shape[1]))
     if len(lam) < count and reason > 0:
         # some came twice after many restarts of a small basis: blocks find the others
-        return lowest(con, inverse, np.asfortranarray(X), count, tolerance, guard)
+        return lowest_eigenpairs(con, inverse, np.asfortranarray(X), count, tolerance, guard)
     if len(lam) < count:
         raise NotSolvedError(
             f"SLEPc found {len(lam)} of {count} modes: {REASON_WORDS.get(reason, 'no convergence')}"
@@ -324,13 +324,15 @@ def _rough_pairs(
     Ritz.
     """
     con = pencil.con
-    MX = apply(con.M, X)
+    MX = apply_block(con.M, X)
     # nobody needs them as they are any more
     basis = pencil.known.block
-    basis = minus(basis, [X], dot(con.body.comm, MX, basis))
+    basis = subtract_product(basis, [X], inner_products(con.body.comm, MX, basis))
     rest, _, _ = orthonormal(con, [X], [MX], basis, 1.0)
-    lam, Z = np.linalg.eigh(_hermitian_part(dot(con.body.comm, rest, apply(con.K, rest))))
-    return lam[:count], mix(rest, np.ascontiguousarray(Z[:, :count]))
+    lam, Z = np.linalg.eigh(
+        _hermitian_part(inner_products(con.body.comm, rest, apply_block(con.K, rest)))
+    )
+    return lam[:count], linear_combinations(rest, np.ascontiguousarray(Z[:, :count]))
 
 
 def basis_size(count: int) -> int:
@@ -408,16 +410,16 @@ def _purify_vectors(
         return np.zeros(0), X
     _Q, MQ, _ = orthonormal(con, [], [], X, NEW_DIRECTION_SHARE)
     Y = inverse(MQ)
-    theta, S = np.linalg.eigh(_hermitian_part(dot(con.body.comm, MQ, Y)))
+    theta, S = np.linalg.eigh(_hermitian_part(inner_products(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]
     good = theta > 0
-    V = mix(Y, np.ascontiguousarray((S[:, ::-1][:, :wanted] / theta)[:, good]))
-    MV = apply(con.M, V)
-    gram = _hermitian_part(dot(con.body.comm, V, MV))
+    V = linear_combinations(Y, np.ascontiguousarray((S[:, ::-1][:, :wanted] / theta)[:, good]))
+    MV = apply_block(con.M, V)
+    gram = _hermitian_part(inner_products(con.body.comm, V, MV))
     # nearly the identity: its inverse root keeps each vector where it is
     size, Z = np.linalg.eigh(gram)
     root = (Z / np.sqrt(size)) @ Z.conj().T
-    return 1 / theta[good], mix(V, np.ascontiguousarray(root))
+    return 1 / theta[good], linear_combinations(V, np.ascontiguousarray(root))
 
 
 def _hermitian_part(A: np.ndarray) -> np.ndarray:

@@ -30,7 +30,7 @@ def is_isotropic(material: Material) -> bool:
     return material.G is None and material.orthotropic is None
 
 
-def lame(
+def lame_parameters(
     material: Material,
     dim: int,
     plane: str,
@@ -58,10 +58,10 @@ def stiffness(material: Material) -> np.ndarray:
             "material: its elastic constants are not those of a stable material (a strain would "
             "give off energy), expected smaller Poisson's ratios"
         )
-    return _turn_stiffness(np.linalg.inv(flexibility), rotation(material.angles))
+    return _turn_stiffness(np.linalg.inv(flexibility), crystal_rotation(material.angles))
 
 
-def rotation(angles: tuple[float, float, float]) -> np.ndarray:
+def crystal_rotation(angles: tuple[float, float, float]) -> np.ndarray:
     """(3, 3) whose columns are the crystal's axes in the blade's axes."""
     total = np.eye(3)
     for axis, angle in enumerate(angles):
@@ -88,10 +88,12 @@ def elastic_law(
         InputError: a plane mesh of an anisotropic material.
     """
     dim = mesh.dimension
-    owner = owners(mesh, materials, domain)
+    owner = material_numbers(mesh, materials, domain)
     if all(is_isotropic(material) for material in materials.values()):
-        values = np.array([lame(material, dim, plane) for material in materials.values()])
-        lam, mu = (piecewise(domain, column[owner]) for column in values.T)
+        values = np.array(
+            [lame_parameters(material, dim, plane) for material in materials.values()]
+        )
+        lam, mu = (cellwise_constant(domain, column[owner]) for column in values.T)
         return lambda strain: lam * ufl.tr(strain) * ufl.Identity(dim) + 2 * mu * strain
     if dim == 2:
         raise InputError(
@@ -102,7 +104,7 @@ def elastic_law(
     C = np.empty((6, 6), dtype=object)
     for i in range(6):
         for j in range(i, 6):
-            C[i, j] = C[j, i] = piecewise(domain, matrices[owner, i, j])
+            C[i, j] = C[j, i] = cellwise_constant(domain, matrices[owner, i, j])
 
     def law(strain: Any) -> Any:
         e = [strain[a, b] * (1 if a == b else 2) for a, b in VOIGT_PAIRS]
@@ -120,7 +122,7 @@ def stress_of(
     """(..., dim, dim) stress [Pa] of strains (..., dim, dim)."""
     dim = strain.shape[-1]
     if is_isotropic(material):
-        lam, mu = lame(material, dim, plane)
+        lam, mu = lame_parameters(material, dim, plane)
         trace = np.trace(strain, axis1=-2, axis2=-1)
         return 2 * mu * strain + lam * trace[..., None, None] * np.eye(dim)
     e = np.stack([strain[..., a, b] * (1 if a == b else 2) for a, b in VOIGT_PAIRS], axis=-1)
@@ -131,7 +133,7 @@ def stress_of(
     return stress
 
 
-def owners(
+def material_numbers(
     mesh: Mesh,
     materials: dict[str, Material],
     domain: Any,
@@ -141,7 +143,7 @@ def owners(
     return owner[np.asarray(domain.topology.original_cell_index)]
 
 
-def piecewise(domain: Any, values: np.ndarray) -> Any:
+def cellwise_constant(domain: Any, values: np.ndarray) -> Any:
     """One value a cell of this rank; the compiled form stays the same for every material."""
     function = dolfinx.fem.Function(scalar_space(domain))
     function.x.array[cell_dofs(function.function_space)[:, 0]] = values

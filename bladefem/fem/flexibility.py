@@ -15,8 +15,16 @@ import numpy as np
 from scipy.linalg import qr
 
 from .body import rigid_modes
-from .constraint import Constrained, expand, unknowns
-from .linalg import Factor, apply, dense_rows, dot, factorise, scale, solve_together
+from .constraint import Constrained, expand_to_mesh, unknowns
+from .linalg import (
+    Factor,
+    apply_block,
+    dense_rows,
+    factorise,
+    inner_products,
+    mean_diagonal,
+    solve_together,
+)
 
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
 UNHELD_FREQUENCY_RATIO = 1e-12
@@ -49,7 +57,7 @@ def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
     if not R.shape[1]:
         return Flexibility(con, factorise(con.K), R, R)
     return Flexibility(
-        con, factorise(con.K, springs=_place_springs(con, R, prop)), R, apply(con.M, R)
+        con, factorise(con.K, springs=_place_springs(con, R, prop)), R, apply_block(con.M, R)
     )
 
 
@@ -71,14 +79,14 @@ def _balanced(flex: Flexibility, B: np.ndarray) -> np.ndarray:
     """Loads less their rigid part."""
     if not flex.R.shape[1]:
         return B
-    return B - flex.MR @ dot(flex.con.body.comm, flex.R, B)
+    return B - flex.MR @ inner_products(flex.con.body.comm, flex.R, B)
 
 
 def _without_rigid_motion(flex: Flexibility, X: np.ndarray) -> np.ndarray:
     """Displacements less their rigid part."""
     if not flex.R.shape[1]:
         return X
-    return X - flex.R @ dot(flex.con.body.comm, flex.MR, X)
+    return X - flex.R @ inner_products(flex.con.body.comm, flex.MR, X)
 
 
 def rigid_basis(con: Constrained) -> np.ndarray:
@@ -103,7 +111,7 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     basis = (q @ null)[con.own]
     if not basis.shape[1]:
         return basis
-    gram = dot(body.comm, basis, apply(con.M, basis))
+    gram = inner_products(body.comm, basis, apply_block(con.M, basis))
     basis = basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
     return basis if body.spring is None else _unsprung_motions(con, body.spring, basis)
 
@@ -111,14 +119,14 @@ def rigid_basis(con: Constrained) -> np.ndarray:
 def _unsprung_motions(con: Constrained, spring: Any, basis: np.ndarray) -> np.ndarray:
     """The rigid motions (n_own, r) that springs on faces leave without force."""
     body = con.body
-    moves = expand(con, basis).reshape(len(body.scalar_rows), -1)
+    moves = expand_to_mesh(con, basis).reshape(len(body.scalar_rows), -1)
     first, last = spring.owner_range
     outside = np.count_nonzero(body.scalar_rows < 0)
     mine = np.argsort(body.scalar_rows, kind="stable")[outside:][first:last]
     local = np.asfortranarray(moves[mine])
-    stiffness = dot(body.comm, local, apply(spring, local))
+    stiffness = inner_products(body.comm, local, apply_block(spring, local))
     lam, Z = np.linalg.eigh((stiffness + stiffness.conj().T) / 2)
-    return basis @ Z[:, lam < UNHELD_FREQUENCY_RATIO * scale(con.K) / scale(con.M)]
+    return basis @ Z[:, lam < UNHELD_FREQUENCY_RATIO * mean_diagonal(con.K) / mean_diagonal(con.M)]
 
 
 def unknown_places(con: Constrained) -> np.ndarray:
@@ -141,5 +149,5 @@ def _place_springs(
     allowed = dense_rows(con.K, len(everywhere))
     places = allowed[qr(everywhere[allowed].conj().T, mode="r", pivoting=True)[1][: R.shape[1]]]
     springs = np.zeros(len(everywhere))
-    springs[places] = prop * scale(con.K)
+    springs[places] = prop * mean_diagonal(con.K)
     return springs[con.own]

@@ -18,9 +18,9 @@ import numpy as np
 from ..data import ModeSet
 from ..errors import NotSolvedError
 from .compat import MPI
-from .constraint import expand, restrict
+from .constraint import expand_to_mesh, restrict_load
 from .flexibility import Flexibility, compliance, unknown_places
-from .linalg import apply, dot
+from .linalg import apply_block, inner_products
 
 # of the displacement: the last term of the series that is still added
 SERIES_TOLERANCE = 1e-9
@@ -64,14 +64,14 @@ def forced_motion(
     natural = 2 * np.pi * modes.frequencies
     shapes = modes.shapes[:, :, :dim].reshape(len(natural), -1)
     X = np.ascontiguousarray(shapes[:, unknown_places(con)].T[con.own])
-    MX = apply(con.M, X)
-    force = restrict(con, np.asarray(loads, dtype=complex))
+    MX = apply_block(con.M, X)
+    force = restrict_load(con, np.asarray(loads, dtype=complex))
 
     def without_modes(v: np.ndarray) -> np.ndarray:
-        return v - X @ dot(comm, MX, v)
+        return v - X @ inner_products(comm, MX, v)
 
     dynamic = natural[:, None] ** 2 - omega**2 + 1j * omega * damping[:, None]
-    u = X @ (dot(comm, X, force) / dynamic)
+    u = X @ (inner_products(comm, X, force) / dynamic)
     term = without_modes(compliance(flex, force))
     size = np.ones(len(omega))
     for count in range(SERIES_TERMS + 1):
@@ -80,12 +80,12 @@ def forced_motion(
         size = _column_norms(comm, term) / np.maximum(_column_norms(comm, u), np.finfo(float).tiny)
         open_ends = (size >= SERIES_TOLERANCE) & (omega != 0)
         if not open_ends.any():
-            return ForcedMotion(expand(con, u), count)
+            return ForcedMotion(expand_to_mesh(con, u), count)
         growing = open_ends & (size > before)
         if count > 2 and growing.any():
             open_ends = growing
             break
-        term = omega**2 * without_modes(compliance(flex, apply(con.M, term)))
+        term = omega**2 * without_modes(compliance(flex, apply_block(con.M, term)))
     worst = int(np.argmax(np.where(open_ends, size, 0.0)))
     raise NotSolvedError(
         f"the motion at {abs(omega[worst]) / (2 * np.pi):.5g} Hz is not covered by {len(natural)} "
@@ -97,5 +97,5 @@ def forced_motion(
 def _column_norms(comm: MPI.Comm, v: np.ndarray) -> np.ndarray:
     """(k,) of the columns over all ranks."""
     return np.sqrt(
-        abs(np.array([dot(comm, v[:, [i]], v[:, [i]])[0, 0] for i in range(v.shape[1])]))
+        abs(np.array([inner_products(comm, v[:, [i]], v[:, [i]])[0, 0] for i in range(v.shape[1])]))
     )

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from .compat import MPI
-from .memory import available, needed
+from .memory import available_memory, modal_solve_memory
 
 Result = TypeVar("Result")
 # tasks of a group up to which none of them helps another
@@ -32,13 +32,14 @@ def group_size(
         free: memory of a machine [bytes]; what is available when left out.
     """
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    free = comm.allreduce(available() if free is None else free, MPI.MIN)
+    free = comm.allreduce(available_memory() if free is None else free, MPI.MIN)
     together = comm.allreduce(here.size, MPI.MAX)
     here.Free()
     for size in range(1, comm.size):
         if (
             comm.size % size == 0
-            and needed(dofs, size) * max(together // size, 1) < USABLE_MEMORY_SHARE * free
+            and modal_solve_memory(dofs, size) * max(together // size, 1)
+            < USABLE_MEMORY_SHARE * free
         ):
             return size
     return comm.size

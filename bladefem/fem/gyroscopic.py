@@ -21,7 +21,7 @@ from ..data import ModeSet
 from ..errors import InputError
 from .body import Body, cells_of, degrees, properties
 from .compat import PETSc, assemble_matrix, dolfinx, ufl
-from .linalg import apply, dot
+from .linalg import apply_block, inner_products
 from .rotation import AXIS
 
 
@@ -79,7 +79,7 @@ def coupling(
         G: from :func:`coriolis`, to use again.
     """
     X = own_rows(body, modes.shapes)
-    g = dot(body.comm, X, apply(coriolis(body, axis) if G is None else G, X))
+    g = inner_products(body.comm, X, apply_block(coriolis(body, axis) if G is None else G, X))
     return (g - g.conj().T) / 2
 
 

@@ -17,7 +17,7 @@ from scipy.linalg import eigh
 from ..errors import NotSolvedError
 from .compat import MPI
 from .constraint import Constrained
-from .linalg import apply, dot, minus, mix
+from .linalg import apply_block, inner_products, linear_combinations, subtract_product
 
 MAX_STEPS = 200
 # share of old directions in a new one below which its image under M is corrected, not computed
@@ -48,7 +48,7 @@ class _Space:
     C: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
 
-def lowest(
+def lowest_eigenpairs(
     con: Constrained,
     inverse: Callable[[np.ndarray], np.ndarray],
     start: np.ndarray,
@@ -88,7 +88,9 @@ def lowest(
         if not len(rest) and k < count:
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
         if (k >= count and error < tolerance) or not len(rest):
-            return 1 / theta[:k], mix([*space.V, *space.P], np.concatenate([S[:, :k], rest]))
+            return 1 / theta[:k], linear_combinations(
+                [*space.V, *space.P], np.concatenate([S[:, :k], rest])
+            )
         block, Mblock = _next_block(
             space, rest[:, :count], DEFERRED_SHARE * tolerance if k >= count else 0.0
         )
@@ -114,12 +116,12 @@ def orthonormal(
     """
     comm = con.body.comm
     W, MW, R, spread = _orthogonal_factor(
-        comm, W, apply(con.M, W), DROPPED_DIRECTION_SHARE, DROPPED_DIRECTION_SHARE * size**2
+        comm, W, apply_block(con.M, W), DROPPED_DIRECTION_SHARE, DROPPED_DIRECTION_SHARE * size**2
     )
-    left = dot(comm, MV, W)
-    W = minus(W, V, left)
+    left = inner_products(comm, MV, W)
+    W = subtract_product(W, V, left)
     clean = abs(left).max(initial=0.0) < OLD_DIRECTION_SHARE
-    MW = minus(MW, MV, left) if clean else apply(con.M, W)
+    MW = subtract_product(MW, MV, left) if clean else apply_block(con.M, W)
     if clean and spread > SINGLE_NORMALISATION_SHARE:
         return W, MW, R
     # what is much longer than 1 now came from a direction that was rounding in the first product:
@@ -144,9 +146,9 @@ def _extend_basis(
     space.MV.append(Mblock)
     known = [*space.V, *space.P]
     Mknown = [*space.MV, *space.MP]
-    column = dot(comm, Mknown, W)
+    column = inner_products(comm, Mknown, W)
     Q, MQ, tail = orthonormal(
-        con, known, Mknown, minus(W, known, column), float(np.linalg.norm(column))
+        con, known, Mknown, subtract_product(W, known, column), float(np.linalg.norm(column))
     )
     total = old + block.shape[1]
     corner = (column[old:total] + column[old:total].conj().T) / 2
@@ -169,12 +171,14 @@ def _next_block(
     P = space.P
     MP = space.MP
     weak = U[:, strong:]
-    space.P, space.MP = ([mix(P, weak)], [mix(MP, weak)]) if weak.size else ([], [])
+    space.P, space.MP = (
+        ([linear_combinations(P, weak)], [linear_combinations(MP, weak)]) if weak.size else ([], [])
+    )
     space.C = weak.conj().T @ space.C
     return (
         (P[0], MP[0])
         if len(P) == 1 and not weak.size
-        else (mix(P, U[:, :strong]), mix(MP, U[:, :strong]))
+        else (linear_combinations(P, U[:, :strong]), linear_combinations(MP, U[:, :strong]))
     )
 
 
@@ -189,11 +193,11 @@ def _orthogonal_factor(
 
     Directions whose square is below ``least``, or below a share of the largest, are dropped.
     """
-    gram = dot(comm, W, MW)
+    gram = inner_products(comm, W, MW)
     size, Z = np.linalg.eigh((gram + gram.conj().T) / 2)
     tiny = float(np.finfo(float).tiny)
     good = size > max(share * size[-1], least, tiny) if len(size) else size > 0
     root = np.sqrt(size[good])
     Z = Z[:, good]
-    W, MW = (mix(A, Z / root) for A in (W, MW))
+    W, MW = (linear_combinations(A, Z / root) for A in (W, MW))
     return W, MW, (Z * root).conj().T, float((root[0] / root[-1]) ** 2) if len(root) else 1.0

@@ -22,7 +22,7 @@ from scipy.linalg import blas
 
 from . import cyclic_schur as interior
 from .compat import MPI, PETSc
-from .mumps import Factorised, dense, factorise_matrix, solve_matrix, values
+from .mumps import Factorised, dense_matrix, dense_values, factorise_matrix, solve_matrix
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ Block: TypeAlias = np.ndarray | list[np.ndarray]
 
 @dataclass(frozen=True)
 class Factor:
-    """A factorised matrix; ``solve`` uses it."""
+    """A factorised matrix; ``solve_block`` uses it."""
 
     parts: Factorised | interior.Rim
     doubled: bool
@@ -87,8 +87,8 @@ def factorise(
             MUMPS's INFOG.
     """
     if isinstance(A, Folded):
-        core = A.core or interior.eliminate(A.A, interior.rim_of(A.C), definite)
-        return Factor(interior.close(core, A.C, definite, springs), False)
+        core = A.core or interior.eliminate_interior(A.A, interior.rim_of(A.C), definite)
+        return Factor(interior.join_cut_faces(core, A.C, definite, springs), False)
     doubled = isinstance(A, Doubled)
     matrix = A.matrix if isinstance(A, Doubled) else A
     if springs is not None:
@@ -100,10 +100,10 @@ def factorise(
     return Factor(factorise_matrix(matrix, definite), doubled)
 
 
-def solve(factor: Factor, B: np.ndarray) -> np.ndarray:
+def solve_block(factor: Factor, B: np.ndarray) -> np.ndarray:
     """A^-1 B for a block of vectors (n_own, k)."""
     if isinstance(factor.parts, interior.Rim):
-        return interior.solve(factor.parts, B)
+        return interior.solve_diameter(factor.parts, B)
     if factor.doubled:
         return _complex(solve_matrix(factor.parts, _real(B)))
     if np.iscomplexobj(B):
@@ -116,18 +116,18 @@ def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]
     rims = [(f.parts, B) for f, B in systems if isinstance(f.parts, interior.Rim)]
     if len(rims) == len(systems) and all(rim.core is rims[0][0].core for rim, _ in rims):
         return interior.solve_together(rims)
-    return [solve(factor, B) for factor, B in systems]
+    return [solve_block(factor, B) for factor, B in systems]
 
 
-def apply(A: Matrix, X: np.ndarray) -> np.ndarray:
+def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
     """A X for a block of vectors (n_own, k)."""
     if isinstance(A, Folded):
         open_values = A.C @ X
         if A.nodal is None:
-            image = interior.times(A.A, open_values)
+            image = interior.real_times_complex(A.A, open_values)
         else:
             by_node = open_values.reshape(A.nodal.shape[0], -1)
-            image = interior.times(A.nodal, by_node).reshape(open_values.shape)
+            image = interior.real_times_complex(A.nodal, by_node).reshape(open_values.shape)
         return np.asfortranarray(A.C.conj().T @ image)
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
@@ -151,7 +151,7 @@ def combined(
     return out
 
 
-def scale(A: Matrix) -> float:
+def mean_diagonal(A: Matrix) -> float:
     """Mean of the diagonal, a measure of size."""
     if isinstance(A, Folded):
         return float(A.A.diagonal().mean())
@@ -164,7 +164,7 @@ def dense_rows(A: Matrix, n: int) -> np.ndarray:
     return interior.masters(A.C) if isinstance(A, Folded) else np.arange(n)
 
 
-def dot(
+def inner_products(
     comm: MPI.Comm,
     X: Block,
     Y: np.ndarray,
@@ -178,7 +178,7 @@ def dot(
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
-def minus(
+def subtract_product(
     W: np.ndarray,
     V: list[np.ndarray],
     C: np.ndarray,
@@ -192,7 +192,7 @@ def minus(
     return W
 
 
-def mix(V: Block, C: np.ndarray) -> np.ndarray:
+def linear_combinations(V: Block, C: np.ndarray) -> np.ndarray:
     """V C, columns contiguous; V may be a list of blocks side by side."""
     blocks = V if isinstance(V, list) else [V]
     gemm = blas.zgemm if np.iscomplexobj(blocks[0]) else blas.dgemm
@@ -211,8 +211,8 @@ def mix(V: Block, C: np.ndarray) -> np.ndarray:
 def inertia(A: Matrix) -> int:
     """Number of negative eigenvalues, by Sylvester's law; the factors are not kept."""
     if isinstance(A, Folded):
-        core = interior.eliminate(A.A, interior.rim_of(A.C), definite=False, keep=False)
-        return interior.negative(core, A.C)
+        core = interior.eliminate_interior(A.A, interior.rim_of(A.C), definite=False, keep=False)
+        return interior.count_negative(core, A.C)
     doubled = isinstance(A, Doubled)
     parts = factorise_matrix(A.matrix if doubled else A, definite=False, keep=False)
     return parts.negative // 2 if doubled else parts.negative
@@ -238,9 +238,9 @@ def _paired_blocks(
 
 
 def _times(A: PETSc.Mat, X: np.ndarray) -> np.ndarray:
-    right = dense(A, np.asfortranarray(X, dtype=float))
+    right = dense_matrix(A, np.asfortranarray(X, dtype=float))
     product = A.matMult(right)
-    out = values(product)
+    out = dense_values(product)
     # petsc4py keeps what is not destroyed for a later garbage collection
     for matrix in (right, product):
         matrix.destroy()

@@ -21,7 +21,7 @@ SIMPLEX_DEGREE = 7
 TENSOR_DEGREE = 8
 
 
-def volume(mesh: Mesh, name: str) -> float:
+def body_volume(mesh: Mesh, name: str) -> float:
     """Volume of a body [m^3], plane meshes with their depth.
 
     Raises:
@@ -33,9 +33,11 @@ def volume(mesh: Mesh, name: str) -> float:
     return float(weight.sum())
 
 
-def mass(body: Body) -> float:
+def body_mass(body: Body) -> float:
     """Mass of a body [kg]."""
-    return sum(material.rho * volume(body.mesh, name) for name, material in body.material.items())
+    return sum(
+        material.rho * body_volume(body.mesh, name) for name, material in body.material.items()
+    )
 
 
 def centrifugal(
@@ -151,7 +153,7 @@ def _outward_normals(
     mesh = body.mesh
     d = body.dim
     cells = np.concatenate([mesh.bodies[n] for n in body.material])
-    corner = facets[:, : shape.corners(shape.FACET_OF[mesh.cell_type])]
+    corner = facets[:, : shape.corner_count(shape.FACET_OF[mesh.cell_type])]
     shared = _cell_incidence(corner, len(mesh.points)) @ _cell_incidence(cells, len(mesh.points)).T
     behind = np.asarray(shared.argmax(axis=1)).ravel()
     inward = mesh.points[cells[behind]].mean(1) - mesh.points[corner].mean(1)

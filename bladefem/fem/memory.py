@@ -29,7 +29,7 @@ ONE_CORE = (3.29e3, 180.5)
 DOUBLED = (1.9e4, 160.0)
 
 
-def needed(dofs: int, ranks: int = 1) -> float:
+def modal_solve_memory(dofs: int, ranks: int = 1) -> float:
     """Peak memory of a modal solve [bytes], all ranks together.
 
     Args:
@@ -39,7 +39,7 @@ def needed(dofs: int, ranks: int = 1) -> float:
     return ranks * BYTES_PER_RANK + linear * dofs + factors * dofs ** (4 / 3)
 
 
-def available() -> float:
+def available_memory() -> float:
     """Memory that this machine (or its container) can still give [bytes]; infinite where the system
     does not tell.
     """
@@ -65,7 +65,7 @@ def give_back() -> None:
         trim(0)
 
 
-def check(
+def check_memory(
     dofs: int,
     comm: MPI.Comm,
     free: float | None = None,
@@ -78,11 +78,11 @@ def check(
     Raises:
         InputError: it does not fit; the message says what to change.
     """
-    total = needed(dofs, comm.size)
+    total = modal_solve_memory(dofs, comm.size)
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
     share = total * here.size / comm.size
     here.Free()
-    free = available() if free is None else free
+    free = available_memory() if free is None else free
     short = comm.allreduce(max(share - free, 0.0), MPI.MAX)
     if short > 0:
         fits = (free / share) ** (3 / 4) * dofs

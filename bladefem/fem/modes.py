@@ -16,12 +16,12 @@ from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from ..util.lockstep import run_together
 from .compat import MPI
-from .constraint import Constrained, expand, restrict
-from .cyclic_schur import eliminate, negative
+from .constraint import Constrained, expand_to_mesh, restrict_load
+from .cyclic_schur import count_negative, eliminate_interior
 from .eigensolver import Eigensolver, basis_size, krylov_schur
 from .flexibility import Flexibility, compliance, compliances, flexible
-from .lanczos import lowest
-from .linalg import Folded, apply, combined, dot, inertia, scale
+from .lanczos import lowest_eigenpairs
+from .linalg import Folded, apply_block, combined, inertia, inner_products, mean_diagonal
 
 # error of a vector's direction; that of a frequency is its square
 DIRECTION_TOLERANCE = 1e-8
@@ -58,7 +58,7 @@ def modes(
     if count < 1:
         raise InputError(f"count is {count}, expected at least 1 mode")
     flex = flex or flexible(con)
-    found = proven_pairs if prove else pairs
+    found = proven_pairs if prove else lowest_pairs
     return mode_set(con, *found(flex, count, tolerance, solver=solver))
 
 
@@ -68,12 +68,13 @@ def proven_pairs(
     tolerance: float = DIRECTION_TOLERANCE,
     solver: Eigensolver = SLEPC,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """``pairs`` whose number the inertia confirms; those that were missed are found by blocks.
+    """``lowest_pairs`` whose number the inertia confirms; those that were missed are found by
+    blocks.
 
     Raises:
         NotSolvedError: the numbers differ even so.
     """
-    lam, X = pairs(flex, count, tolerance, solver=solver)
+    lam, X = lowest_pairs(flex, count, tolerance, solver=solver)
     if not lam[-1] > 0:
         # rigid motions alone, which geometry counts
         return lam, X
@@ -81,7 +82,7 @@ def proven_pairs(
     exact = count_below(flex.con, upper)
     if exact == expected:
         return lam, X
-    lam, X = pairs(flex, max(count, exact), tolerance, solver=BLOCKS)
+    lam, X = lowest_pairs(flex, max(count, exact), tolerance, solver=BLOCKS)
     found = np.count_nonzero(lam < upper)
     if found != exact:
         raise NotSolvedError(
@@ -91,7 +92,7 @@ def proven_pairs(
     return lam[:count], X[:, :count]
 
 
-def pairs(
+def lowest_pairs(
     flex: Flexibility,
     count: int,
     tolerance: float = DIRECTION_TOLERANCE,
@@ -122,7 +123,8 @@ def pairs_together(
     guard: int = 0,
     solver: Eigensolver = SLEPC,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """``pairs`` of several nodal diameters from scratch, with iterations that advance together.
+    """``lowest_pairs`` of several nodal diameters from scratch, with iterations that advance
+    together.
 
     A solve with one vector takes as long as the factors take to come from memory; the iterations
     share them, and each stays what it is alone but for rounding.
@@ -130,7 +132,7 @@ def pairs_together(
 
     def iteration(flex: Flexibility) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
         few = min(guard, flex.con.T.shape[1] - count)
-        return lambda ask: pairs(flex, count, tolerance, None, few, solver, ask)
+        return lambda ask: lowest_pairs(flex, count, tolerance, None, few, solver, ask)
 
     def answer(asked: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
         return compliances([(bodies[i], B) for i, B in asked])
@@ -146,7 +148,7 @@ def mode_set(
     """Modes with a certificate, in mesh numbering, in a basis and phase that do not depend on the
     ranks.
     """
-    shapes = expand(con, X)
+    shapes = expand_to_mesh(con, X)
     images = shapes.reshape(-1, shapes.shape[2]).conj().T @ _rotation_probe(con, len(lam))
     turn = _basis_rotation(lam, images)
     residuals = certificate(con, lam, X @ turn)
@@ -166,17 +168,17 @@ def certificate(
     """
     if not X.shape[1]:
         return np.zeros(0)
-    KX = apply(con.K, X)
+    KX = apply_block(con.K, X)
     comm = con.body.comm
     size = _column_norms(comm, KX)
     scale = size.max() if (lam > 0).any() else _stiffness_scale(con, X)
-    KX -= apply(con.M, X) * lam
+    KX -= apply_block(con.M, X) * lam
     return _column_norms(comm, KX) / np.where(lam > 0, size, scale)
 
 
 def _stiffness_scale(con: Constrained, X: np.ndarray) -> float:
     """A force to measure |K x| of rigid motions by."""
-    return scale(con.K) * _column_norms(con.body.comm, X).max()
+    return mean_diagonal(con.K) * _column_norms(con.body.comm, X).max()
 
 
 def elastic_pairs(
@@ -202,14 +204,14 @@ def elastic_pairs(
     inverse = inverse or (lambda B: compliance(flex, B))
     few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(count)
     if start is None and solver.method == "slepc" and not few:
-        first = inverse(restrict(flex.con, _rotation_probe(flex.con, 1)))
+        first = inverse(restrict_load(flex.con, _rotation_probe(flex.con, 1)))
         return krylov_schur(flex.con, inverse, first, count, tolerance, guard, solver)
     if start is None:
         width = min(max(8 if flex.con.dtype is float else 6, count // 3), 16)
-        start = inverse(restrict(flex.con, _rotation_probe(flex.con, width)))
+        start = inverse(restrict_load(flex.con, _rotation_probe(flex.con, width)))
     elif flex.R.shape[1]:
-        start = start - flex.R @ dot(flex.con.body.comm, flex.MR, start)
-    return lowest(flex.con, inverse, start, count, tolerance, guard)
+        start = start - flex.R @ inner_products(flex.con.body.comm, flex.MR, start)
+    return lowest_eigenpairs(flex.con, inverse, start, count, tolerance, guard)
 
 
 def _rotation_probe(con: Constrained, width: int) -> np.ndarray:
@@ -225,7 +227,7 @@ def canonical(
     vectors.
     """
     return X @ _basis_rotation(
-        lam, dot(con.body.comm, X, restrict(con, _rotation_probe(con, len(lam))))
+        lam, inner_products(con.body.comm, X, restrict_load(con, _rotation_probe(con, len(lam))))
     )
 
 
@@ -247,8 +249,9 @@ def count_below(con: Constrained, lam: float) -> int:
         # the interior in the order that serves the stiffness too
         core = con.K.core
         shifted = (con.K.A - lam * con.M.A).tocsr()
-        return negative(
-            eliminate(shifted, core.rim, definite=False, order=core.order, keep=False), con.K.C
+        return count_negative(
+            eliminate_interior(shifted, core.rim, definite=False, order=core.order, keep=False),
+            con.K.C,
         )
     return inertia(combined(con.K, -lam, con.M))
 

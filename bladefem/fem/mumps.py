@@ -126,9 +126,9 @@ def solve_matrix(
         right = (
             _sparse_block(F, rows, B[rows, part])
             if sparse
-            else dense(F, np.asfortranarray(B[:, part], dtype=float))
+            else dense_matrix(F, np.asfortranarray(B[:, part], dtype=float))
         )
-        left = dense(F, out[:, part])
+        left = dense_matrix(F, out[:, part])
         F.matSolve(right, left)
         # petsc4py keeps what is not destroyed for a later garbage collection
         for matrix in (right, left):
@@ -136,7 +136,7 @@ def solve_matrix(
     return out
 
 
-def dense(A: PETSc.Mat, X: np.ndarray) -> PETSc.Mat:
+def dense_matrix(A: PETSc.Mat, X: np.ndarray) -> PETSc.Mat:
     """A dense PETSc matrix on the memory of X (n_own, k), columns contiguous."""
     if X.size and not X.flags.f_contiguous:
         raise ValueError("columns are not contiguous")
@@ -147,7 +147,7 @@ def dense(A: PETSc.Mat, X: np.ndarray) -> PETSc.Mat:
     return out
 
 
-def values(D: PETSc.Mat) -> np.ndarray:
+def dense_values(D: PETSc.Mat) -> np.ndarray:
     """(n_own, k) copy of a dense PETSc matrix."""
     rows = D.sizes[0][0]
     columns = D.size[1]

@@ -15,11 +15,11 @@ from scipy.linalg import eigh
 from ..data import PortModel
 from ..errors import InputError, suggestion
 from .all_diameters import Eigenpairs, KeptPairs, eigenpairs, found_again, lost_modes
-from .constraint import Constrained, Opened, Transformation, restrict
+from .constraint import Constrained, Opened, Transformation, restrict_load
 from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
-from .linalg import apply, dot
+from .linalg import apply_block, inner_products
 from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
 
 # ports in one sweep
@@ -58,10 +58,14 @@ def port_model(
     columns = (
         F
         if static_load is None
-        else np.concatenate([F, restrict(con, static_load.reshape(-1, 1))], axis=1)
+        else np.concatenate([F, restrict_load(con, static_load.reshape(-1, 1))], axis=1)
     )
     X = compliance(flex, columns)
-    offset = None if static_load is None else dot(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
+    offset = (
+        None
+        if static_load is None
+        else inner_products(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
+    )
     X = X[:, : F.shape[1]]
     reduce = _rubin_modes if kind == "rubin" else _craig_bampton
     omega, shapes, residual = reduce(flex, F, X, count, solver)
@@ -156,7 +160,7 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     )
 
 
-def flexibility(
+def port_flexibility(
     con: Constrained,
     P: sp.spmatrix,
     flex: Flexibility | None = None,
@@ -165,13 +169,13 @@ def flexibility(
     body floats.
     """
     F = _restrict_ports(con, P)
-    return _hermitian_part(dot(con.body.comm, F, compliance(flex or flexible(con), F)))
+    return _hermitian_part(inner_products(con.body.comm, F, compliance(flex or flexible(con), F)))
 
 
 def _restrict_ports(con: Constrained, P: sp.spmatrix) -> np.ndarray:
     """(n_own, p) this rank's rows of the port vectors, dense."""
     _check_ports(con, P)
-    return restrict(con, sp.csc_matrix(P)).astype(con.dtype)
+    return restrict_load(con, sp.csc_matrix(P)).astype(con.dtype)
 
 
 def _check_ports(con: Constrained, P: sp.spmatrix) -> None:
@@ -224,8 +228,8 @@ def _rubin_modes(
     """
     comm = flex.con.body.comm
     lam, V = proven_pairs(flex, count, solver=solver)
-    shapes = dot(comm, F, canonical(flex.con, lam, V))
-    return np.sqrt(lam), shapes, _residual_flexibility(dot(comm, F, X), lam, shapes)
+    shapes = inner_products(comm, F, canonical(flex.con, lam, V))
+    return np.sqrt(lam), shapes, _residual_flexibility(inner_products(comm, F, X), lam, shapes)
 
 
 def _residual_flexibility(
@@ -253,9 +257,9 @@ def _craig_bampton(
     fixed = _fixed_inverse(flex, F, X)
     _, inner = elastic_pairs(flex, count, inverse=fixed, solver=solver)
     V = np.concatenate([flex.R, X, inner], axis=1)
-    V = V / np.sqrt(np.abs(dot(comm, V, apply(flex.con.M, V)).diagonal()))
-    mass = _hermitian_part(dot(comm, V, apply(flex.con.M, V)))
-    stiff = _hermitian_part(dot(comm, V, apply(flex.con.K, V)))
+    V = V / np.sqrt(np.abs(inner_products(comm, V, apply_block(flex.con.M, V)).diagonal()))
+    mass = _hermitian_part(inner_products(comm, V, apply_block(flex.con.M, V)))
+    stiff = _hermitian_part(inner_products(comm, V, apply_block(flex.con.K, V)))
     size, Q = np.linalg.eigh(mass)
     # ports that repeat each other
     keep = size > 1e-12 * size[-1]
@@ -264,7 +268,7 @@ def _craig_bampton(
     lam[: flex.R.shape[1]] = 0.0
     return (
         np.sqrt(np.maximum(lam, 0)),
-        dot(comm, F, V) @ W @ Z,
+        inner_products(comm, F, V) @ W @ Z,
         np.zeros((F.shape[1],) * 2, F.dtype),
     )
 
@@ -281,15 +285,15 @@ def _fixed_inverse(
     """
     comm = flex.con.body.comm
     R = flex.R
-    G = _hermitian_part(dot(comm, F, X))
-    FR = dot(comm, F, R)
+    G = _hermitian_part(inner_products(comm, F, X))
+    FR = inner_products(comm, F, R)
     saddle = np.linalg.pinv(
         np.block([[G, -FR], [FR.conj().T, np.zeros((R.shape[1],) * 2)]]), rcond=1e-11
     )
 
     def inverse(B: np.ndarray) -> np.ndarray:
         U = compliance(flex, B)
-        both = saddle @ np.concatenate([dot(comm, F, U), dot(comm, R, B)])
+        both = saddle @ np.concatenate([inner_products(comm, F, U), inner_products(comm, R, B)])
         return U - X @ both[: F.shape[1]] + R @ both[F.shape[1] :]
 
     return inverse

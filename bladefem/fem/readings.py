@@ -6,7 +6,7 @@ import numpy as np
 
 from .body import Body
 from .gyroscopic import own_rows
-from .linalg import apply
+from .linalg import apply_block
 
 
 def modal_readings(
@@ -24,7 +24,7 @@ def modal_readings(
             at the root and below.
         omega: (m,) circular frequencies of the held part [rad/s].
     """
-    own = apply(body.K, own_rows(body, shapes)) / omega**2
+    own = apply_block(body.K, own_rows(body, shapes)) / omega**2
     rows = body.scalar_rows
     order = np.argsort(rows, kind="stable")[np.count_nonzero(rows < 0) :]
     found = np.zeros((len(rows), len(shapes)))

@@ -26,7 +26,7 @@ from ..errors import InputError, NotSolvedError
 from . import shape_functions as shape
 from .body import Body, cells_of, degrees, properties
 from .compat import PETSc, assemble_matrix, assemble_vector, compile_form, dolfinx, ufl
-from .constraint import Constrained, expand, in_step, restrict
+from .constraint import Constrained, expand_to_mesh, in_step, restrict_load
 from .flexibility import Flexibility, compliance, flexible
 from .loads import centrifugal
 
@@ -69,7 +69,9 @@ class _Forms:
     node_of: np.ndarray
 
 
-def swell(flex: Flexibility, axis: tuple[float, float, float] = AXIS) -> np.ndarray:
+def unit_speed_displacement(
+    flex: Flexibility, axis: tuple[float, float, float] = AXIS
+) -> np.ndarray:
     """(n_points, dim) linear displacement [m s^2] for unit rotation; times the speed squared it is
     the preload.
 
@@ -83,7 +85,7 @@ def swell(flex: Flexibility, axis: tuple[float, float, float] = AXIS) -> np.ndar
             "alike"
         )
     load = centrifugal(con.body, 1.0, axis).reshape(-1, 1)
-    return expand(con, compliance(flex, restrict(con, load)))[:, :, 0].real
+    return expand_to_mesh(con, compliance(flex, restrict_load(con, load)))[:, :, 0].real
 
 
 def linear_tangent(
@@ -96,7 +98,7 @@ def linear_tangent(
     """Stiffness of small vibrations about a linear preload, spin softening included [N/m].
 
     Args:
-        u0: (n_points, dim) linear displacement [m], see :func:`swell`.
+        u0: (n_points, dim) linear displacement [m], see :func:`unit_speed_displacement`.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
     """
     v = ufl.TestFunction(body.space)
@@ -154,7 +156,7 @@ def preload(
     forms = _potential_forms(body, axis, quadrature)
     con = in_step(body, clamp)
     load = centrifugal(body, speed, axis)
-    size = _vector_length(con, restrict(con, load.reshape(-1, 1)))
+    size = _vector_length(con, restrict_load(con, load.reshape(-1, 1)))
     u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size)
     return Preload(u, speed, iterations, steps, misfit / size)
 
@@ -205,7 +207,7 @@ def tangent(
     return _tangent_matrix(forms, state.displacement, state.speed**2)
 
 
-def spinning(
+def body_under_rotation(
     body: Body,
     speed: float,
     clamp: str | None = "clamp",
@@ -227,7 +229,7 @@ def spinning(
         return body
     if not linear:
         return replace(body, K=tangent(body, preload(body, speed, clamp, axis), axis))
-    u0 = speed**2 * swell(flexible(in_step(body, clamp)), axis)
+    u0 = speed**2 * unit_speed_displacement(flexible(in_step(body, clamp)), axis)
     return replace(body, K=linear_tangent(body, u0, speed, axis))
 
 
@@ -249,7 +251,7 @@ def _solve_newton(
     """
     error = np.inf
     for k in range(MAX_NEWTON_STEPS):
-        r = restrict(con, _unbalanced_force(con.body, forms, u, speed2))
+        r = restrict_load(con, _unbalanced_force(con.body, forms, u, speed2))
         before = error
         error = _vector_length(con, r)
         if error <= limit or (error < ROUNDING_OVER_TOLERANCE * limit and error > before / 2):
@@ -265,7 +267,7 @@ def _solve_newton(
                 k,
                 "the stiffness is no longer positive definite (buckling, or spin softening)",
             )
-        u = u + expand(held, step)[:, :, 0].real
+        u = u + expand_to_mesh(held, step)[:, :, 0].real
     return (
         u,
         MAX_NEWTON_STEPS,

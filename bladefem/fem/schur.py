@@ -5,7 +5,7 @@ PETSc sweeps down over the factors, solves with its own dense factors of the Sch
 sweeps up again. The nodal diameters of a wheel want another answer in between, C (C^H S C)^-1 C^H,
 so the dense solve of S is replaced by a call back into Python: two sweeps a solve instead of the
 four that A_ii^-1 before and after would take. Where PETSc does not call back (the place of the
-dense solve in its table of operations moved once), ``bridge`` says so.
+dense solve in its table of operations moved once), ``replace_dense_solve`` says so.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     return half + half.T + np.diag(S.diagonal())
 
 
-def bridge(factor: Factorised, n: int) -> Bridge | None:
+def replace_dense_solve(factor: Factorised, n: int) -> Bridge | None:
     """Put a call back in place of PETSc's dense solve; None where PETSc does not take it.
 
     The Schur complement inside PETSc is destroyed: copy it first.
@@ -97,11 +97,11 @@ def bridge(factor: Factorised, n: int) -> Bridge | None:
         heard.append(1)
         return r
 
-    through(made, np.zeros((factor.matrix.size[0], 1)), listen)
+    solve_through_boundary(made, np.zeros((factor.matrix.size[0], 1)), listen)
     return made if heard else None
 
 
-def through(
+def solve_through_boundary(
     made: Bridge,
     B: np.ndarray,
     answer: Answer,

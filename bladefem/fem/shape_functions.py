@@ -86,13 +86,13 @@ _QUADS = {
 }
 
 
-def corners(cell_type: str) -> int:
+def corner_count(cell_type: str) -> int:
     """Number of corner nodes of an element type; they come first."""
     return len(_CORNERS[SHAPES[cell_type][0]])
 
 
 @cache
-def nodes(cell_type: str) -> np.ndarray:
+def reference_nodes(cell_type: str) -> np.ndarray:
     """(k, d) reference coordinates of the nodes, unit cell from 0 to 1."""
     shape, degree = SHAPES[cell_type]
     corner = np.array(_CORNERS[shape], float)
@@ -110,7 +110,7 @@ def _polynomial_basis(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
     column.
     """
     shape, degree = SHAPES[cell_type]
-    at = nodes(cell_type)
+    at = reference_nodes(cell_type)
     exponents = np.array(
         [
             e

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from . import shape_functions as shape
 from .body import Body
-from .elasticity import lame, stress_of
+from .elasticity import lame_parameters, stress_of
 
 VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
@@ -177,7 +177,7 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(mean + swing, 0.0) / 2)
 
 
-def principal(stress: np.ndarray) -> np.ndarray:
+def principal_stresses(stress: np.ndarray) -> np.ndarray:
     """(..., 3) principal stresses, descending [Pa]; of complex amplitudes the largest of each in a
     period.
     """
@@ -247,7 +247,7 @@ def _of_cells(
     stress = stress_of(body.material[name], strain, body.plane)
     across = None
     if d == 2 and body.plane == "strain":
-        lam, _ = lame(body.material[name], d, body.plane)
+        lam, _ = lame_parameters(body.material[name], d, body.plane)
         across = lam * np.trace(strain, axis1=2, axis2=3)
     if large:
         F = np.eye(d) + slope
@@ -289,7 +289,7 @@ def element_stress(
     stress = stress_of(body.material[name], strain, body.plane)
     across = None
     if d == 2 and body.plane == "strain":
-        lam, _ = lame(body.material[name], d, body.plane)
+        lam, _ = lame_parameters(body.material[name], d, body.plane)
         across = lam * np.trace(strain, axis1=3, axis2=4)
     return volume, _stress_vector(stress, across)
 
@@ -312,7 +312,7 @@ def _best_points(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
     """
     kind, degree = shape.SHAPES[cell_type]
     if kind in ("tetra", "triangle") and degree == 2:
-        return _four_points(len(shape.nodes(kind)))
+        return _four_points(len(shape.reference_nodes(kind)))
     return shape.quadrature(
         kind, 2 * (degree - 1) if kind in ("tetra", "triangle") else 2 * degree - 1
     )
@@ -337,7 +337,7 @@ def extrapolation_matrix(cell_type: str) -> np.ndarray:
     """
     kind = shape.SHAPES[cell_type][0]
     at, _ = _best_points(cell_type)
-    target = shape.nodes(cell_type)
+    target = shape.reference_nodes(cell_type)
     if len(at) == 1:
         return np.ones((len(target), 1))
     lower, _ = shape.tabulate(kind, at)

@@ -77,7 +77,7 @@ def free_normals(
     single = (count[inverse.ravel()] == 1).reshape(corners.shape[:2])
     free = single & ~touched[corners].all(axis=2)
     found = []
-    reference = shape.nodes(mesh.cell_type)
+    reference = shape.reference_nodes(mesh.cell_type)
     for row, side in zip(*np.nonzero(free), strict=True):
         own = reference[np.flatnonzero(cells[row] == node)]
         flat = reference[facets[side]]

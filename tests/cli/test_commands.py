@@ -116,16 +116,16 @@ def pipeline(monkeypatch):
             run=found, campbell=None, convergence=None, answer=None, mac=np.eye(2)
         )
 
-    replace_module(monkeypatch, bladefem.report, "modes", modes)
-    replace_module(monkeypatch, bladefem.report, "pressure", contact)
-    replace_module(monkeypatch, bladefem.study.pipeline, "pipeline", run)
-    replace_module(monkeypatch, bladefem.report, "run", report)
+    replace_module(monkeypatch, bladefem.report, "modes", report_survey=modes)
+    replace_module(monkeypatch, bladefem.report, "pressure", report_pressure=contact)
+    replace_module(monkeypatch, bladefem.study.pipeline, "pipeline", run=run)
+    replace_module(monkeypatch, bladefem.report, "run", report_run=report)
     return SimpleNamespace(calls=calls, state=state)
 
 
-def replace_module(monkeypatch, package, name, run):
-    """Put a stand-in with one function in the place of a module, loaded or not."""
-    module = SimpleNamespace(run=run)
+def replace_module(monkeypatch, package, name, **functions):
+    """Put a stand-in with these functions in the place of a module, loaded or not."""
+    module = SimpleNamespace(**functions)
     monkeypatch.setitem(sys.modules, f"{package.__name__}.{name}", module)
     monkeypatch.setattr(package, name, module, raising=False)
 
@@ -545,7 +545,7 @@ def action(comm):
     if {all} or comm.rank == 1:
         raise InputError("field = 1: expected 2")
     comm.Barrier()
-sys.exit(ranks.guarded(action, SimpleNamespace()))
+sys.exit(ranks.exit_code_of(action, SimpleNamespace()))
 """
 
 

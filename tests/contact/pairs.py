@@ -12,7 +12,7 @@ from bladefem.contact.partial_slip import slip_step
 from bladefem.contact.patch import initial_gap, make_patch, normal_ports, port_matrix
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
-from bladefem.fem.ports import flexibility
+from bladefem.fem.ports import port_flexibility
 from geometry.contact_pairs import hertz_pair, punch
 from geometry.parameters import HertzPair, MeshSize, Punch
 
@@ -31,7 +31,7 @@ def pair_flexibility(mesh, patch, materials, tangential=False):
     ):
         if material is not None:
             body = constrain(assemble(mesh, side, material), clamp)
-            C += flexibility(body, port_matrix([patch], mesh, side)[:, columns])
+            C += port_flexibility(body, port_matrix([patch], mesh, side)[:, columns])
     return C
 
 

@@ -30,8 +30,8 @@ from bladefem.contact.seating import solve_seating
 from bladefem.contact.surface import outward_signs, surface_quadrature
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import constrain, expand, restrict
-from bladefem.fem.linalg import apply
+from bladefem.fem.constraint import constrain, expand_to_mesh, restrict_load
+from bladefem.fem.linalg import apply_block
 from bladefem.scene.tables import Material
 
 STEEL, TITANIUM = (2.1e11, 0.3), (1.1e11, 0.34)
@@ -224,7 +224,7 @@ def test_uniform_pressure_balances_curved_elements(dimension):
         con = constrain(assemble(mesh, side, Material(E=2e11, nu=0.3)), None)
         pressure = shrink * 2e11 / ((1 - 2 * 0.3) if dimension == 3 else (1 - 0.3))
         u = np.ascontiguousarray(-shrink * mesh.points[:, :dimension]).reshape(-1, 1)
-        inner = expand(con, apply(con.K, restrict(con, u)))[:, :, 0]
+        inner = expand_to_mesh(con, apply_block(con.K, restrict_load(con, u)))[:, :, 0]
         P = port_matrix([patch], mesh, side)[:, normal_ports([patch], mesh)]
         outer = (sign * pressure * (P @ patch.area)).reshape(-1, dimension)
         across = mesh.points[:, : dimension - 1]

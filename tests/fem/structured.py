@@ -20,10 +20,10 @@ def box(divisions, size, cell_type="tetra10", body="blade", origin=None, map=Non
     """
     d = len(divisions)
     cube = "hexahedron" if d == 3 else "quad"
-    corner = shape.nodes(cube).astype(int)
+    corner = shape.reference_nodes(cube).astype(int)
     simple = shape.SHAPES[cell_type][0]
     parts = {"tetra": SIX, "triangle": TWO}.get(simple, [tuple(range(len(corner)))])
-    lattice = shape.nodes(cell_type)
+    lattice = shape.reference_nodes(cell_type)
     linear, _ = shape.tabulate(simple, lattice)
     grid = []
     for cell in product(*[range(n) for n in divisions]):
@@ -48,11 +48,14 @@ def box(divisions, size, cell_type="tetra10", body="blade", origin=None, map=Non
 def _face(cells, key, cell_type, axis, value):
     """Facets whose corners lie on a grid plane."""
     facet_type = shape.FACET_OF[cell_type]
-    at = shape.nodes(cell_type)
+    at = shape.reference_nodes(cell_type)
     out = []
     for side in _facets(cell_type):
         corner = at[list(side)]
-        reference = shape.tabulate(shape.SHAPES[facet_type][0], shape.nodes(facet_type))[0] @ corner
+        reference = (
+            shape.tabulate(shape.SHAPES[facet_type][0], shape.reference_nodes(facet_type))[0]
+            @ corner
+        )
         local = [int(abs(at - x).sum(1).argmin()) for x in reference]
         hit = (key[cells[:, list(side)], axis] == value).all(1)
         out.append(cells[hit][:, local])
@@ -141,7 +144,9 @@ def sector(
 def straightened(mesh):
     """Middle nodes put half-way between their corners."""
     points = mesh.points.copy()
-    linear, _ = shape.tabulate(shape.SHAPES[mesh.cell_type][0], shape.nodes(mesh.cell_type))
+    linear, _ = shape.tabulate(
+        shape.SHAPES[mesh.cell_type][0], shape.reference_nodes(mesh.cell_type)
+    )
     for cells in mesh.bodies.values():
         points[cells] = np.einsum("qk,ckg->cqg", linear, points[cells[:, : linear.shape[1]]])
     return Mesh(

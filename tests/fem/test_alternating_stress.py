@@ -8,7 +8,7 @@ from structured import box
 
 from bladefem.fem.alternating_stress import alternating_stress
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import constrain, expand, restrict
+from bladefem.fem.constraint import constrain, expand_to_mesh, restrict_load
 from bladefem.fem.flexibility import compliance, flexible
 from bladefem.scene.tables import Material
 
@@ -23,7 +23,9 @@ def bent(cells):
     tip = np.unique(mesh.faces["x1"])
     load = np.zeros((len(mesh.points), 2))
     load[tip, 1] = 1.0 / len(tip)
-    u = expand(con, compliance(flexible(con), restrict(con, load.reshape(-1, 1))))[:, :, 0]
+    u = expand_to_mesh(con, compliance(flexible(con), restrict_load(con, load.reshape(-1, 1))))[
+        :, :, 0
+    ]
     touched = np.zeros(len(mesh.points), bool)
     touched[np.concatenate([np.unique(mesh.faces["x0"]), tip])] = True
     return alternating_stress(body, np.array([u + 0j]), touched)

@@ -13,7 +13,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.linalg import factorise
-from bladefem.fem.loads import mass
+from bladefem.fem.loads import body_mass
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material
 
@@ -60,7 +60,7 @@ def test_two_bodies_of_different_material():
     speed, ratio = 5000.0, 2.0  # same wave speed, impedances 4e7 and 2e7
     exact = np.arctan(np.sqrt(ratio)) * speed / 0.5 / (2 * np.pi)
     assert abs(f / exact - 1).min() < 1e-5
-    assert mass(body) == pytest.approx(0.05 * 0.5 * 12000)
+    assert body_mass(body) == pytest.approx(0.05 * 0.5 * 12000)
 
 
 def test_missing_body_material_and_quadrature_are_refused():

@@ -13,9 +13,9 @@ from structured import box
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
-from bladefem.fem.elasticity import rotation, stiffness
+from bladefem.fem.elasticity import crystal_rotation, stiffness
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import spinning
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.fem.stress import gauss_stress
 from bladefem.scene.tables import Material
 from bladefem.scene.toml import scene_of
@@ -52,7 +52,7 @@ def test_turned_bar_and_turned_crystal():
     S11 = 1 / material.E
     S12 = -material.nu / material.E
     S44 = 1 / material.G
-    l2, m2, n2 = rotation(material.angles)[0] ** 2
+    l2, m2, n2 = crystal_rotation(material.angles)[0] ** 2
     closed = S11 - 2 * (S11 - S12 - S44 / 2) * (l2 * m2 + m2 * n2 + n2 * l2)
     assert np.linalg.inv(stiffness(material))[0, 0] == pytest.approx(closed, rel=1e-12)
 
@@ -82,7 +82,11 @@ def test_rotation_of_a_crystal():
     body = assemble(mesh, "blade", Material(**decks.CRYSTALS["cubic"]))
     still, linear, large = (
         modes(constrain(some), 3).frequencies
-        for some in (body, spinning(body, 300.0, linear=True), spinning(body, 300.0))
+        for some in (
+            body,
+            body_under_rotation(body, 300.0, linear=True),
+            body_under_rotation(body, 300.0),
+        )
     )
     assert (large[:2] > still[:2]).all()
     np.testing.assert_allclose(linear, large, rtol=1e-5)

@@ -7,7 +7,7 @@ from structured import sector
 from bladefem.errors import InputError
 from bladefem.fem.compat import MPI
 from bladefem.fem.groups import group_size, shared_out
-from bladefem.fem.memory import needed
+from bladefem.fem.memory import modal_solve_memory
 from bladefem.scene.tables import Scene
 from bladefem.study.pipeline.stages import Bodies, wheel_modes
 
@@ -45,4 +45,4 @@ def test_an_error_in_one_group_reaches_all():
 def test_groups_grow_where_memory_is_short():
     comm = MPI.COMM_WORLD
     assert group_size(comm, 1000, free=1e12) == 1
-    assert group_size(comm, 1000, free=0.5 * needed(1000)) == comm.size
+    assert group_size(comm, 1000, free=0.5 * modal_solve_memory(1000)) == comm.size

@@ -10,7 +10,7 @@ from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain
 from bladefem.fem.gyroscopic import coupling, waves
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import spinning
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.scene.tables import Material
 from geometry.mesh import Mesh, Sector
 
@@ -56,7 +56,7 @@ def test_waves_of_a_rotating_ring(n, linear):
     body = assemble(plane_ring(12), "blade", RING, MPI.COMM_SELF)
     at_rest = 2 * np.pi * first_elastic(body, n).frequencies[0]
     speed = at_rest / 2
-    moving = spinning(body, speed, None, linear=linear)
+    moving = body_under_rotation(body, speed, None, linear=linear)
     found = first_elastic(moving, n)
     split = waves(found, coupling(moving, found), speed)
     mean = np.sqrt(at_rest**2 + (speed * n * (n**2 - 1) / (n**2 + 1)) ** 2)

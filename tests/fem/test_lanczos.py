@@ -11,15 +11,15 @@ from bladefem.errors import NotSolvedError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import compliance, flexible
-from bladefem.fem.lanczos import lowest
-from bladefem.fem.linalg import apply
+from bladefem.fem.lanczos import lowest_eigenpairs
+from bladefem.fem.linalg import apply_block
 from bladefem.scene.tables import Material
 
 
 def pencil(n):
     con = constrain(assemble(sector(7, (2, 2, 1), bump=0.2), "blade", Material()), "clamp", n)
     unit = np.eye(con.T.shape[1], dtype=con.dtype, order="F")
-    return con, *eigh(apply(con.K, unit), apply(con.M, unit))
+    return con, *eigh(apply_block(con.K, unit), apply_block(con.M, unit))
 
 
 @pytest.mark.parametrize("n", [0, 2])
@@ -33,12 +33,12 @@ def test_what_is_known_already_is_not_solved_for(n):
         X[:, :10] + X[:, 10:60] @ np.random.default_rng(1).standard_normal((50, 10)) * wrong
     )
     flex, widths = flexible(con), []
-    found, Y = lowest(
+    found, Y = lowest_eigenpairs(
         con, lambda B: widths.append(B.shape[1]) or compliance(flex, B), start, 10, 1e-6
     )
     np.testing.assert_allclose(found, lam[:10], rtol=1e-11)
     np.testing.assert_allclose(
-        abs(np.einsum("ij,ij->j", X[:, :10].conj(), apply(con.M, Y))), 1, atol=1e-10
+        abs(np.einsum("ij,ij->j", X[:, :10].conj(), apply_block(con.M, Y))), 1, atol=1e-10
     )
     assert widths[0] == 10 and max(widths[1:]) <= 4
 
@@ -50,9 +50,9 @@ def test_all_modes_of_a_small_body():
     con, lam, _ = pencil(0)
     flex = flexible(con)
     start = np.random.default_rng(2).standard_normal((len(lam), 8))
-    found, _ = lowest(con, lambda B: compliance(flex, B), start, len(lam), 1e-6)
+    found, _ = lowest_eigenpairs(con, lambda B: compliance(flex, B), start, len(lam), 1e-6)
     np.testing.assert_allclose(found, lam, rtol=1e-9)
     with pytest.raises(
         NotSolvedError, match=f"{len(lam) + 1} modes were asked of a body that has {len(lam)}"
     ):
-        lowest(con, lambda B: compliance(flex, B), start, len(lam) + 1, 1e-6)
+        lowest_eigenpairs(con, lambda B: compliance(flex, B), start, len(lam) + 1, 1e-6)

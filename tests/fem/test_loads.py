@@ -6,7 +6,7 @@ from structured import box, sector
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
-from bladefem.fem.loads import centrifugal, mass, surface_load, volume
+from bladefem.fem.loads import body_mass, body_volume, centrifugal, surface_load
 from bladefem.scene.tables import Material
 
 
@@ -15,8 +15,8 @@ def test_volume_and_centrifugal_resultant(cell_type):
     divisions = (3, 2, 2) if cell_type[0] in "th" and not cell_type.startswith("tri") else (3, 2)
     mesh = box(divisions, (2.0, 1.0, 0.5)[: len(divisions)], cell_type, depth=0.5)
     body = assemble(mesh, "blade", Material(rho=1000.0))
-    assert volume(mesh, "blade") == pytest.approx(1.0, rel=1e-13)
-    assert mass(body) == pytest.approx(1000.0, rel=1e-13)
+    assert body_volume(mesh, "blade") == pytest.approx(1.0, rel=1e-13)
+    assert body_mass(body) == pytest.approx(1000.0, rel=1e-13)
     force = centrifugal(body, 3.0).reshape(-1, body.dim).sum(0)  # m w^2 r of the centre of mass
     np.testing.assert_allclose(force[:2], 1000 * 9 * np.array([1.0, 0.5]), rtol=1e-12)
 

@@ -4,7 +4,7 @@ import pytest
 
 from bladefem.errors import InputError
 from bladefem.fem.compat import MPI
-from bladefem.fem.memory import available, check, needed
+from bladefem.fem.memory import available_memory, check_memory, modal_solve_memory
 
 
 @pytest.mark.parametrize(
@@ -20,15 +20,15 @@ from bladefem.fem.memory import available, check, needed
 )
 def test_model_follows_the_measured_peaks(dofs, ranks, measured):
     """Wedge sector; two ranks: the doubled pencil's peak on one rank, and a second interpreter."""
-    assert needed(dofs, ranks) == pytest.approx(measured, rel=0.07)
+    assert modal_solve_memory(dofs, ranks) == pytest.approx(measured, rel=0.07)
 
 
 def test_too_large_is_refused_with_advice():
     with pytest.raises(
         InputError, match=r"1000000 degrees of freedom .* 2.0 GB are free; expected"
     ):
-        check(1_000_000, MPI.COMM_WORLD, free=2e9)
+        check_memory(1_000_000, MPI.COMM_WORLD, free=2e9)
 
 
 def test_small_fits():
-    assert 0 < check(1000, MPI.COMM_SELF) < available()
+    assert 0 < check_memory(1000, MPI.COMM_SELF) < available_memory()

@@ -7,11 +7,11 @@ from structured import box, sector
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import at_diameter, constrain, restrict, transformation
+from bladefem.fem.constraint import at_diameter, constrain, restrict_load, transformation
 from bladefem.fem.flexibility import flexible
-from bladefem.fem.linalg import combined, dot, factorise, solve
+from bladefem.fem.linalg import combined, factorise, inner_products, solve_block
 from bladefem.fem.modes import modes
-from bladefem.fem.ports import flexibility, port_model, port_models
+from bladefem.fem.ports import port_flexibility, port_model, port_models
 from bladefem.scene.tables import Material
 
 CASES = [
@@ -39,9 +39,9 @@ def model(kind, n, clamp):
 
 def full_receptance(con, P, w):
     """P^T (K - w^2 M)^-1 P by a direct solve."""
-    F = restrict(con, P).astype(con.dtype)
-    return dot(
-        con.body.comm, F, solve(factorise(combined(con.K, -(w**2), con.M), definite=False), F)
+    F = restrict_load(con, P).astype(con.dtype)
+    return inner_products(
+        con.body.comm, F, solve_block(factorise(combined(con.K, -(w**2), con.M), definite=False), F)
     )
 
 
@@ -90,7 +90,9 @@ def test_static_flexibility_and_offset():
     load = np.random.default_rng(1).normal(size=con.T.shape[0])
     ports = port_model(con, P, names, 5, static_load=load)
     with_load = sp.hstack([P, sp.csr_matrix(load[:, None])])
-    np.testing.assert_allclose(ports.static_offset, flexibility(con, with_load)[:9, 9], rtol=1e-9)
+    np.testing.assert_allclose(
+        ports.static_offset, port_flexibility(con, with_load)[:9, 9], rtol=1e-9
+    )
 
 
 @pytest.mark.mpi

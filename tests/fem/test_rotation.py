@@ -15,7 +15,13 @@ from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import linear_tangent, preload, spinning, swell, tangent
+from bladefem.fem.rotation import (
+    body_under_rotation,
+    linear_tangent,
+    preload,
+    tangent,
+    unit_speed_displacement,
+)
 from bladefem.scene.tables import Material
 
 # First flap of a cantilever on the axis, mu = omega sqrt(rho A L^4 / E I) over eta = Omega sqrt(rho
@@ -63,7 +69,7 @@ def first(body, **keys):
 @pytest.mark.parametrize("eta", [0, 1, 3, 6, 12])
 def test_flap_of_a_rotating_cantilever(cantilever, eta, linear):
     """Measured: within 1.2e-5 for all of the table, of which 1.4e-5 is its rounding."""
-    frequency = first(spinning(cantilever, eta * UNIT, axis=(0, 1, 0), linear=linear))
+    frequency = first(body_under_rotation(cantilever, eta * UNIT, axis=(0, 1, 0), linear=linear))
     assert frequency == pytest.approx(WRIGHT[eta], rel=3e-5)
 
 
@@ -72,7 +78,8 @@ def test_lead_lag_is_softer_by_the_speed(cantilever):
     (measured 4e-6).
     """
     flap, lag = (
-        first(spinning(cantilever, 4 * UNIT, axis=axis)) for axis in ((0, 1, 0), (0, 0, 1))
+        first(body_under_rotation(cantilever, 4 * UNIT, axis=axis))
+        for axis in ((0, 1, 0), (0, 0, 1))
     )
     assert lag**2 == pytest.approx(flap**2 - 16, rel=2e-5)
 
@@ -83,8 +90,10 @@ def test_sector_equals_full_wheel_under_rotation(linear):
     frequencies by 3 %.
     """
     mesh = sector(5, (3, 2, 1), bump=0.2)
-    part = spinning(assemble(mesh, "blade", Material()), 3000.0, linear=linear)
-    whole = spinning(assemble(wheel(mesh)[0], "blade", Material()), 3000.0, linear=linear)
+    part = body_under_rotation(assemble(mesh, "blade", Material()), 3000.0, linear=linear)
+    whole = body_under_rotation(
+        assemble(wheel(mesh)[0], "blade", Material()), 3000.0, linear=linear
+    )
     every = modes(constrain(whole), 20).frequencies
     found = np.sort(
         np.concatenate(
@@ -100,7 +109,7 @@ def test_sector_equals_full_wheel_under_rotation(linear):
 def test_twisted_blade_agrees_with_calculix():
     """Measured 3.6e-7 and 2.4e-6; the two kinds of preload differ by up to 2.2e-3."""
     body = assemble(twisted(), "blade", Material(), MPI.COMM_SELF, quadrature="ccx")
-    u0 = 300.0**2 * swell(flexible(in_step(body)))
+    u0 = 300.0**2 * unit_speed_displacement(flexible(in_step(body)))
     linear = replace(body, K=linear_tangent(body, u0, 300.0, quadrature="ccx"))
     np.testing.assert_allclose(modes(constrain(linear), 6).frequencies, CCX["linear"], rtol=1e-6)
     exact = replace(body, K=tangent(body, preload(body, 300.0, quadrature="ccx"), quadrature="ccx"))
@@ -112,7 +121,11 @@ def test_linear_preload_is_close_to_the_nonlinear_one():
     body = assemble(sector(6, (3, 2, 1), bump=0.2), "blade", Material())
     still, exact, linear = (
         modes(constrain(b, "clamp", 2), 1).frequencies[0]
-        for b in (body, spinning(body, 3000.0), spinning(body, 3000.0, linear=True))
+        for b in (
+            body,
+            body_under_rotation(body, 3000.0),
+            body_under_rotation(body, 3000.0, linear=True),
+        )
     )
     assert linear - still == pytest.approx(exact - still, rel=0.03)
 
@@ -127,7 +140,7 @@ def test_swell_of_a_thin_ring():
     ring = Material(E=2e11, nu=0.3, rho=8000.0)
     mesh = sector(8, (1, 4, 1), "hexahedron27", inner=0.995, outer=1.005, width=0.01)
     body = assemble(mesh, "blade", ring)
-    u1 = swell(flexible(in_step(body, None)))
+    u1 = unit_speed_displacement(flexible(in_step(body, None)))
     radial = np.einsum("ni,ni->n", u1[:, :2], mesh.points[:, :2]) / np.hypot(*mesh.points[:, :2].T)
     assert radial.mean() == pytest.approx(ring.rho / ring.E, rel=1e-4)
     large = preload(body, 1000.0, None).displacement
@@ -146,11 +159,11 @@ def test_wrong_speeds_and_states_without_equilibrium():
     with pytest.raises(InputError, match="speed is -1"):
         preload(body, -1.0)
     with pytest.raises(InputError, match="speed is nan"):
-        spinning(body, np.nan)
+        body_under_rotation(body, np.nan)
     for speed in (20.0, 100.0):  # pushed towards its clamp until it collapses, or turns inside out
         with pytest.raises(NotSolvedError, match="of the speed"):
             preload(body, speed, "x1")
-    assert spinning(body, 0.0) is body
+    assert body_under_rotation(body, 0.0) is body
 
 
 @pytest.mark.mpi
@@ -160,7 +173,11 @@ def test_rotation_does_not_depend_on_ranks(linear):
     f, u = [], []
     for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
         body = assemble(mesh, "blade", Material(), comm)
-        f.append(modes(constrain(spinning(body, 3000.0, linear=linear), "clamp", 1), 6).frequencies)
+        f.append(
+            modes(
+                constrain(body_under_rotation(body, 3000.0, linear=linear), "clamp", 1), 6
+            ).frequencies
+        )
         u.append(preload(body, 3000.0).displacement)
     np.testing.assert_allclose(f[0], f[1], rtol=1e-10)
     np.testing.assert_allclose(u[0], u[1], atol=1e-10 * abs(u[1]).max())

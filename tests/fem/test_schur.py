@@ -12,7 +12,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import at_diameter, transformation
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
-from bladefem.fem.schur import through
+from bladefem.fem.schur import solve_through_boundary
 from bladefem.scene.tables import Material
 
 
@@ -31,7 +31,7 @@ def test_one_sweep_each_way_equals_two_solves(n, columns):
     assert rim.core.bridge is not None
     X = np.zeros_like(B)
     X[rim.inner], X[rim.masters] = core._solve_two_sweeps(rim, B)
-    np.testing.assert_allclose(core.solve(rim, B), X, atol=1e-11 * abs(X).max())
+    np.testing.assert_allclose(core.solve_diameter(rim, B), X, atol=1e-11 * abs(X).max())
 
 
 @pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
@@ -44,8 +44,8 @@ def test_what_the_answer_raises_comes_through(error):
 
     B = np.ones((made.factor.matrix.size[0], 1))
     with pytest.raises(error, match="on purpose"):
-        through(made, B, fails)
-    assert through(made, B, lambda r: r).shape == B.shape
+        solve_through_boundary(made, B, fails)
+    assert solve_through_boundary(made, B, lambda r: r).shape == B.shape
 
 
 def test_a_signal_waits_for_the_end_of_the_sweep():
@@ -61,11 +61,13 @@ def test_a_signal_waits_for_the_end_of_the_sweep():
     before = signal.signal(signal.SIGTERM, stop)
     try:
         with pytest.raises(KeyboardInterrupt):
-            through(made, B, lambda r: (signal.raise_signal(signal.SIGTERM), done.append(1), r)[-1])
+            solve_through_boundary(
+                made, B, lambda r: (signal.raise_signal(signal.SIGTERM), done.append(1), r)[-1]
+            )
         assert done and signal.getsignal(signal.SIGTERM) is stop
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert through(made, B, lambda r: r).shape == B.shape
+    assert solve_through_boundary(made, B, lambda r: r).shape == B.shape
 
 
 def test_given_order_gives_the_same_modes(monkeypatch):

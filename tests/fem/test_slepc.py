@@ -11,8 +11,8 @@ from bladefem.fem.compat import SLEPc
 from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.eigensolver import Eigensolver
 from bladefem.fem.flexibility import flexible
-from bladefem.fem.linalg import Doubled, apply, solve
-from bladefem.fem.modes import BLOCKS, SLEPC, _widest_gap, modes, pairs, pairs_together
+from bladefem.fem.linalg import Doubled, apply_block, solve_block
+from bladefem.fem.modes import BLOCKS, SLEPC, _widest_gap, lowest_pairs, modes, pairs_together
 from bladefem.scene.tables import Material
 
 
@@ -90,10 +90,10 @@ def test_restarts_of_a_complex_pencil_keep_every_pair_single():
     )
     flex = flexible(at_diameter(t, 4))
     small = Eigensolver(vectors=12)
-    lam, X = pairs(flex, 10, 1e-10, solver=small)
-    exact, _ = pairs(flex, 10, 1e-10, solver=BLOCKS)
+    lam, X = lowest_pairs(flex, 10, 1e-10, solver=small)
+    exact, _ = lowest_pairs(flex, 10, 1e-10, solver=BLOCKS)
     np.testing.assert_allclose(lam, exact, rtol=1e-10)
-    gram = X.conj().T @ apply(flex.con.M, X)
+    gram = X.conj().T @ apply_block(flex.con.M, X)
     np.testing.assert_allclose(gram, np.eye(10), atol=1e-10)
 
 
@@ -119,9 +119,9 @@ def test_diameters_solved_together_are_those_solved_alone(solver):
     bodies = [flexible(at_diameter(t, n)) for n in (0, 3, 6)]
     together = pairs_together(bodies, 8, 1e-9, 2, solver)
     for flex, (lam, X) in zip(bodies, together, strict=True):
-        alone, Y = pairs(flex, 8, 1e-9, guard=2, solver=solver)
+        alone, Y = lowest_pairs(flex, 8, 1e-9, guard=2, solver=solver)
         np.testing.assert_allclose(lam[:8], alone[:8], rtol=1e-11)
-        overlap = abs(X[:, :8].conj().T @ apply(flex.con.M, Y[:, :8]))
+        overlap = abs(X[:, :8].conj().T @ apply_block(flex.con.M, Y[:, :8]))
         np.testing.assert_allclose(overlap, np.eye(8), atol=1e-6)
 
 
@@ -135,11 +135,11 @@ def test_what_a_solve_raises_comes_out_of_slepc(error):
         left[0] -= 1
         if left[0] < 0:
             raise error("no")
-        return solve(flex.factor, B)
+        return solve_block(flex.factor, B)
 
     with pytest.raises(error, match="no"):
-        pairs(flex, 4, inverse=inverse)
-    assert len(pairs(flex, 4)[0]) == 4
+        lowest_pairs(flex, 4, inverse=inverse)
+    assert len(lowest_pairs(flex, 4)[0]) == 4
 
 
 def test_modes_that_are_missing_in_the_widest_gap_are_counted():

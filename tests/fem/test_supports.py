@@ -11,7 +11,7 @@ from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, transformation
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import preload, spinning
+from bladefem.fem.rotation import body_under_rotation, preload
 from bladefem.fem.supports import AreaSpring, supported
 from bladefem.scene.support import area_springs, held_letters
 from bladefem.scene.tables import Material, Support
@@ -73,9 +73,10 @@ def test_an_elastic_root_under_rotation(bar):
     springs = [AreaSpring("clamp", 1e13, 1e13)]
     body = supported(bar, "", springs)
     still, turning = (
-        modes(constrain(some), 2).frequencies for some in (body, spinning(body, 500.0, linear=True))
+        modes(constrain(some), 2).frequencies
+        for some in (body, body_under_rotation(body, 500.0, linear=True))
     )
-    clamped = modes(constrain(spinning(bar, 500.0, linear=True)), 2).frequencies
+    clamped = modes(constrain(body_under_rotation(bar, 500.0, linear=True)), 2).frequencies
     assert (turning < clamped).all() and abs(turning / still - 1).max() < 0.05
     with pytest.raises(InputError, match="nonlinear"):
         preload(body, 500.0)

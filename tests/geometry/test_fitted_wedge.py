@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.fem.loads import volume
+from bladefem.fem.loads import body_volume
 from bladefem.scene.toml import scene_of
 from geometry.example_step import write_blade_step
 from geometry.fitted_wedge import flanks_between
@@ -55,7 +55,7 @@ def test_seats_and_damper_are_those_of_the_parametric_sector(mesh):
     wedge = profile(BLADE[1], BLADE[2], BLADE[3], Wedge()).damper
     x, y = wedge.T
     area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-    assert volume(mesh, "damper") == pytest.approx(area * Wedge().length, rel=1e-9)
+    assert body_volume(mesh, "damper") == pytest.approx(area * Wedge().length, rel=1e-9)
 
 
 def test_all_pairs_match_and_other_names_stay(mesh):

@@ -13,7 +13,7 @@ from writers import write_cdb, write_inp, write_step
 from bladefem.contact.resultants import resultant
 from bladefem.contact.seating import solve_mesh_seating
 from bladefem.errors import InputError
-from bladefem.fem.loads import volume
+from bladefem.fem.loads import body_volume
 from bladefem.scene.tables import Materials
 from geometry.export import write_msh
 from geometry.imported import read_mesh
@@ -261,7 +261,7 @@ def test_every_kind_of_cell_gives_the_same_mesh_back(kind, suffix, tmp_path):
     assert found.faces["clamp"].shape == whole.faces["clamp"].shape
     order, other = (np.lexsort(np.round(x, 9).T) for x in (found.points, turned_home(whole)))
     np.testing.assert_allclose(found.points[order], turned_home(whole)[other], atol=1e-12)
-    assert volume(found, "blade") == pytest.approx(volume(whole, "blade"), rel=1e-12)
+    assert body_volume(found, "blade") == pytest.approx(body_volume(whole, "blade"), rel=1e-12)
 
 
 def without_centres(mesh):
@@ -304,4 +304,4 @@ def test_nastran_with_faces_as_shells(tmp_path):
     assert (
         set(found.parts) == {"pid_1"} and found.faces["pid_7"].shape == block.faces["clamp"].shape
     )
-    assert volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)
+    assert body_volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)

@@ -13,7 +13,7 @@ from wheels import bodies
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
-from bladefem.fem.loads import mass
+from bladefem.fem.loads import body_mass
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material
 from bladefem.scene.toml import load_scene
@@ -163,7 +163,9 @@ def test_effective_masses_add_up():
     for _, rows in few.groupby("direction"):
         assert 0.75 < rows["sum"].iloc[-1] < 1.0
     lateral = few[few["direction"] == "x, y"].iloc[0]
-    assert lateral["effective_mass"] / lateral["share"] == pytest.approx(5 * mass(body), rel=1e-6)
+    assert lateral["effective_mass"] / lateral["share"] == pytest.approx(
+        5 * body_mass(body), rel=1e-6
+    )
     assert few["factor"].to_numpy() ** 2 == pytest.approx(few["effective_mass"].to_numpy())
     single = effective_masses([modes(constrain(body, "clamp"), 5)], body)
     assert len(single) == 30 and "nodal_diameter" not in single

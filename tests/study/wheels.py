@@ -16,7 +16,7 @@ def ring(count=6, divisions=(3, 2, 1), inner=0.1, outer=0.25, width=0.03, bump=0
     n = 2 * np.array(divisions)
     grid = np.stack(np.meshgrid(*[np.arange(k + 1) for k in n], indexing="ij"), -1).reshape(-1, 3)
     number = np.arange(len(grid)).reshape(n + 1)
-    local = np.rint(2 * shape.nodes("hexahedron27")).astype(int)
+    local = np.rint(2 * shape.reference_nodes("hexahedron27")).astype(int)
     first = 2 * np.stack(
         np.meshgrid(*[np.arange(k) for k in divisions], indexing="ij"), -1
     ).reshape(-1, 3)
@@ -47,7 +47,7 @@ def ring(count=6, divisions=(3, 2, 1), inner=0.1, outer=0.25, width=0.03, bump=0
 
 def _quads(number):
     """9-node facets of a grid of nodes."""
-    local = np.rint(2 * shape.nodes("quad9")).astype(int)
+    local = np.rint(2 * shape.reference_nodes("quad9")).astype(int)
     a, b = (np.arange(0, k - 1, 2) for k in number.shape)
     first = np.stack(np.meshgrid(a, b, indexing="ij"), -1).reshape(-1, 2)
     return number[tuple(np.moveaxis(first[:, None] + local, -1, 0))]

@@ -169,13 +169,13 @@ def flexibility(
     """(n, n) displacements at the ports for unit forces there [m/N]; the body is held at a face.
     Collective.
     """
-    from ...fem.constraint import constrain, restrict
+    from ...fem.constraint import constrain, restrict_load
     from ...fem.flexibility import compliance, flexible
-    from ...fem.linalg import dot
+    from ...fem.linalg import inner_products
 
     flex = flexible(constrain(body, held))
-    columns = restrict(flex.con, ports)
-    C = dot(body.comm, columns, compliance(flex, columns))
+    columns = restrict_load(flex.con, ports)
+    C = inner_products(body.comm, columns, compliance(flex, columns))
     return (C + C.T) / 2
 
 

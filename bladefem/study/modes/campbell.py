@@ -229,13 +229,17 @@ def _project_speeds(
 ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     """Stiffness of each speed, mass and Coriolis matrix on the modes of all three."""
     from ...fem.gyroscopic import own_rows
-    from ...fem.linalg import apply, dot
+    from ...fem.linalg import apply_block, inner_products
 
     comm = at[0].comm
     X = own_rows(at[0], np.concatenate([s.shapes for s in sets]))
-    K = [_hermitian_part(dot(comm, X, apply(body.K, X))) for body in at]
-    g = dot(comm, X, apply(G, X))
-    return K, _hermitian_part(dot(comm, X, apply(at[0].M, X))), (g - g.conj().T) / 2
+    K = [_hermitian_part(inner_products(comm, X, apply_block(body.K, X))) for body in at]
+    g = inner_products(comm, X, apply_block(G, X))
+    return (
+        K,
+        _hermitian_part(inner_products(comm, X, apply_block(at[0].M, X))),
+        (g - g.conj().T) / 2,
+    )
 
 
 def _lowest_frequencies(

@@ -68,7 +68,7 @@ def _mass_rows(
     factor: float,
 ) -> pd.DataFrame:
     from ...fem.gyroscopic import own_rows
-    from ...fem.linalg import apply, dot
+    from ...fem.linalg import apply_block, inner_products
 
     points = body.mesh.points
     if direction == "x, y":
@@ -77,9 +77,9 @@ def _mass_rows(
         rigid = rigid_motion(points, direction)
     inside = (body.rows >= 0)[:, None]
     r = own_rows(body, np.where(inside, rigid, 0.0)[None])
-    moved = apply(body.M, r)
-    total = dot(body.comm, r, moved)[0, 0].real
-    coupling = dot(body.comm, own_rows(body, modes.shapes), moved)[:, 0]
+    moved = apply_block(body.M, r)
+    total = inner_products(body.comm, r, moved)[0, 0].real
+    coupling = inner_products(body.comm, own_rows(body, modes.shapes), moved)[:, 0]
     share = np.abs(coupling) ** 2 / total
     table = pd.DataFrame(
         {

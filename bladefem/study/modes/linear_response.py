@@ -225,14 +225,14 @@ def _modal_forces(
 
 def _static_motion(flex: Flexibility, load: np.ndarray) -> np.ndarray:
     """(n_points, 3) K^-1 f."""
-    from ...fem.constraint import expand, restrict
+    from ...fem.constraint import expand_to_mesh, restrict_load
     from ...fem.flexibility import compliance
 
-    u = expand(
+    u = expand_to_mesh(
         flex.con,
         compliance(
             flex,
-            restrict(flex.con, load.reshape(-1, 1)).astype(
+            restrict_load(flex.con, load.reshape(-1, 1)).astype(
                 complex if np.iscomplexobj(load) else flex.con.dtype
             ),
         ),

@@ -177,7 +177,7 @@ def stress_table(
         von_mises_gauss [Pa] at the Gauss points, principal [Pa] the largest, pressing [Pa] the
         smallest principal stress; of harmonic motion the extremes in a period.
     """
-    from ...fem.stress import gauss_stress, nodal_stress, principal, von_mises
+    from ...fem.stress import gauss_stress, nodal_stress, principal_stresses, von_mises
 
     rows = []
     fields = {}
@@ -185,7 +185,7 @@ def stress_table(
     for name, u in states.items():
         stress = nodal_stress(bodies.still_blade, u)
         size = von_mises(stress)
-        sides = principal(stress)
+        sides = principal_stresses(stress)
         inside = von_mises(gauss_stress(bodies.still_blade, u).stress).max(1)
         worst, fields[name] = size.argmax(), {"von Mises": size, "largest principal": sides[:, 0]}
         cells[name] = {"von Mises at Gauss points": _of_all_bodies(bodies, inside)}

@@ -175,10 +175,10 @@ def default_sizes(scene: Scene) -> list[float]:
 
 def element_size(mesh: Mesh, body: str) -> float:
     """Side of a cube (square) as large as the mean cell [m]."""
-    from ...fem.loads import volume
+    from ...fem.loads import body_volume
 
     d = mesh.dimension
-    size = volume(mesh, body) / (mesh.depth if d == 2 else 1.0)
+    size = body_volume(mesh, body) / (mesh.depth if d == 2 else 1.0)
     return float((size / len(mesh.bodies[body])) ** (1 / d))
 
 

@@ -106,12 +106,12 @@ class Bodies:
 
     def blade_at(self, speed: float) -> Body:
         """The blade with its stiffness at a speed [rad/s]."""
-        from ...fem.rotation import linear_tangent, spinning
+        from ...fem.rotation import body_under_rotation, linear_tangent
 
         if speed == 0:
             return self.still_blade
         if self.scene.operation.preload == "nonlinear":
-            return spinning(self.still_blade, speed, "clamp", spin_axis(self.mesh))
+            return body_under_rotation(self.still_blade, speed, "clamp", spin_axis(self.mesh))
         u0 = speed**2 * self.swell
         return replace(
             self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh))
@@ -120,9 +120,9 @@ class Bodies:
     @cached_property
     def swell(self) -> np.ndarray:
         """(n_points, dim) linear displacement of the blade for unit rotation [m s^2]."""
-        from ...fem.rotation import swell
+        from ...fem.rotation import unit_speed_displacement
 
-        return swell(self.still, spin_axis(self.mesh))
+        return unit_speed_displacement(self.still, spin_axis(self.mesh))
 
     @cached_property
     def damper(self) -> Flexibility:
@@ -417,7 +417,7 @@ def reduce_sector(
         modes: modes kept in each nodal diameter.
         readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
     """
-    from ...fem.loads import mass
+    from ...fem.loads import body_mass
     from ...fem.ports import port_model
 
     scene = bodies.scene
@@ -443,7 +443,7 @@ def reduce_sector(
         model = port_model(
             flex.con, other.matrix, other.names, DAMPER_MODES, flex=flex, solver=solver
         )
-        return model, mass(flex.con.body)
+        return model, body_mass(flex.con.body)
 
     floating, damper_mass = on_one_rank(bodies, damper_model)
     first = len(patches[0].area) * mesh.dimension
@@ -531,9 +531,9 @@ def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
 
 def _damper_material(scene: Scene, mesh: Mesh) -> Material:
     """The damper's material, its density set by the given mass where there is one."""
-    from ...fem.loads import volume
+    from ...fem.loads import body_volume
 
     given = value_at(scene, kind_named(scene.kind).damper_mass)
     if given is None:
         return scene.material.damper
-    return replace(scene.material.damper, rho=given / volume(mesh, "damper"))
+    return replace(scene.material.damper, rho=given / body_volume(mesh, "damper"))
