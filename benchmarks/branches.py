@@ -51,7 +51,6 @@ class Lasting:
     state: np.ndarray
 
 
-
 def library_peak(case: Case, notes: list[str]) -> tuple[float, float]:
     """(omega, height) of the highest motion: of the solutions that are not unstable, or where the
     highest unstable one ends in time.

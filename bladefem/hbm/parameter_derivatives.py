@@ -20,9 +20,9 @@ from .linear.bodies import (
     damping_rate,
     impedance_rate,
     modal_amplitudes,
-    modal_flexibility,
     port_motion,
 )
+from .linear.condensation import Linear
 from .model import ReducedModel
 from .parameters import check_parameter, layer_share, vary
 from .policy import uses_coulomb_kernels
@@ -58,14 +58,21 @@ def residual_rate(
         return -as_coefficients(linear.stuck, state.w.shape)
     if name in LINEAR_PARAMETERS:
         moved, _ = body_rate(
-            balance.model, linear.omega, as_amplitudes(contact_load(balance.model, state)), name
+            balance.model, linear, as_amplitudes(contact_load(balance.model, state)), name
         )
-        moved[1:] -= (linear.A[1:] @ (linear.springs * moved[1:])[:, :, None])[:, :, 0]
-        moved[0] -= linear.A[0] @ (linear.springs * moved[0])
-        return -as_coefficients(moved, state.w.shape)
+        return residual_rate_of_bodies(balance, state, moved)
     force = as_amplitudes(contact_rate(balance, state, name))
     moved = (linear.A @ force[:, :, None])[:, :, 0]
     return as_coefficients(moved, state.w.shape)
+
+
+def residual_rate_of_bodies(balance: Balance, state: State, moved: np.ndarray) -> np.ndarray:
+    """(n, d, K) derivative of the residual from that of the contact displacements (H+1, m) under
+    constant forces, the first of `body_rate` [m].
+    """
+    linear = balance.linear
+    sprung = (linear.A @ (linear.springs * moved)[:, :, None])[:, :, 0]
+    return -as_coefficients(moved - sprung, state.w.shape)
 
 
 def contact_load(model: ReducedModel, state: State) -> np.ndarray:
@@ -140,33 +147,40 @@ def _rate_by_differences(
 
 def body_rate(
     model: ReducedModel,
-    omega: float,
+    linear: Linear,
     force: np.ndarray,
     name: str,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Derivatives of the bodies' motion under constant contact forces (H+1, m), with a parameter of
     LINEAR_PARAMETERS.
 
+    Args:
+        linear: the bodies at the frequency of the point.
+
     Returns:
         (H+1, m) of the relative contact displacements and (H+1, probes) of the probes.
     """
-    blades, ports, modal = blade_motion(model, omega, force)
+    omega = linear.omega
+    count = model.blades(len(force) - 1).omega.shape[1]
+    flexible = linear.modal_part(0, count)
+    if name == "force":
+        force = np.zeros_like(force)
+    blades, ports, modal = blade_motion(model, omega, force, flexible)
     if name in ("omega", "damping"):
-        modal = _modal_rate(blades, omega, modal, name)
+        modal = _modal_rate(blades, flexible, omega, modal, name)
         ports = np.zeros_like(ports)
-    elif name == "force":
-        blades, ports, modal = blade_motion(model, omega, np.zeros_like(force))
-    else:
+    elif name == "mass":
         modal = np.zeros_like(modal)
         ports = np.zeros_like(ports)
     contact = port_motion(blades, modal, ports, blades.contact) - _damper_rate(
-        model, omega, force, name
+        model, linear, force, name
     )
     return contact, port_motion(blades, modal, ports, blades.probe)
 
 
 def _modal_rate(
     body: Stack,
+    flexible: np.ndarray,
     omega: float,
     modal: np.ndarray,
     name: str,
@@ -177,12 +191,12 @@ def _modal_rate(
         push = impedance_rate(body, omega * orders, modal) * orders[:, None]
     else:
         push = damping_rate(body, omega * orders, modal)
-    return _pushed_modes(body, omega * orders, push)
+    return _pushed_modes(flexible, push)
 
 
 def _damper_rate(
     model: ReducedModel,
-    omega: float,
+    linear: Linear,
     force: np.ndarray,
     name: str,
 ) -> np.ndarray:
@@ -191,6 +205,7 @@ def _damper_rate(
         raise InputError("mass: expected a model with a damper")
     if name == "force":
         return np.zeros_like(force)
+    omega = linear.omega
     w = omega * np.arange(len(force))
     if isinstance(model.damper, RigidBody):
         B = model.damper.B[model.rows]
@@ -204,28 +219,25 @@ def _damper_rate(
         return np.zeros_like(force)
     ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
     ports[:, damper.contact] = force
-    modal = modal_amplitudes(damper, modal_flexibility(damper, w), ports)
+    first = model.blades(len(force) - 1).omega.shape[1]
+    flexible = linear.modal_part(first, first + damper.omega.shape[1])
+    modal = modal_amplitudes(damper, flexible, ports)
     if name == "mass":
         # with the mass: omega^2 m, half of 2 zeta sqrt(k m), and alpha m
         own = model.damper_damping
         push = (
             -(w[:, None] ** 2) + 1j * w[:, None] * (own.ratio * damper.omega + own.mass)
         ) * modal
-        rate = _pushed_modes(damper, w, push)
+        rate = _pushed_modes(flexible, push)
     else:
-        rate = _modal_rate(damper, omega, modal, name)
+        rate = _modal_rate(damper, flexible, omega, modal, name)
     return port_motion(damper, rate, np.zeros_like(ports), damper.contact)
 
 
-def _pushed_modes(
-    body: Stack,
-    w: np.ndarray,
-    push: np.ndarray,
-) -> np.ndarray:
+def _pushed_modes(flexible: np.ndarray, push: np.ndarray) -> np.ndarray:
     """(H+1, m) derivative of modal amplitudes from that of the impedance times the amplitudes; none
     of the mean.
     """
-    flexible = modal_flexibility(body, w)
     rate = -(flexible * push if flexible.ndim == 2 else (flexible @ push[:, :, None])[:, :, 0])
     rate[0] = 0.0
     return rate

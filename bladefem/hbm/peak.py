@@ -14,13 +14,13 @@ import numpy as np
 
 from ..errors import NotSolvedError
 from ..util.curve_extremum import cubic_minimum, tangents_meet
+from .frequency_walk import walk_in_frequency
 from .model import ReducedModel
 from .parameters import vary
 from .sensitivity import sensitivities
-from .solution import Solution
+from .solution import Solution, size
 from .solve import solve
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .sweep import size, walk_in_frequency
 from .validate_model import check_probe
 
 # points spent on one peak before giving up

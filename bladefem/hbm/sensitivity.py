@@ -5,7 +5,7 @@ each of them.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from .parameter_derivatives import (
     contact_load,
     contact_rate,
     residual_rate,
+    residual_rate_of_bodies,
 )
-from .solution import Solution, probe_motion
+from .solution import Solution, at_probes, blade_motion
 from .solver.residual import (
     Balance,
     Inverse,
@@ -70,21 +71,29 @@ def _one_sensitivity(
 ) -> Sensitivity:
     model = balance.model
     linear = balance.linear
-    dw = -inverse(residual_rate(balance, state, name), 1e-9)
-    df = force_change(balance, state, dw)
     probe = np.zeros_like(solution.probe)
+    direct = np.zeros_like(linear.free)
     if name in LINEAR_PARAMETERS:
         load = as_amplitudes(contact_load(model, state))
-        direct, probe = body_rate(model, linear.omega, load, name)
-    else:
+        direct, probe = body_rate(model, linear, load, name)
+    # the motion in full stick is linear in the loads: `residual_rate` has it from there
+    rate = (
+        residual_rate_of_bodies(balance, state, direct)
+        if name in LINEAR_PARAMETERS and name != "force"
+        else residual_rate(balance, state, name)
+    )
+    dw = -inverse(rate, 1e-9)
+    df = force_change(balance, state, dw)
+    if name not in LINEAR_PARAMETERS:
         df = df + contact_rate(balance, state, name)
-        direct = np.zeros_like(linear.free)
     force = as_amplitudes(df)
     rigid = np.zeros(len(linear.rigid))
     if linear.B.shape[1]:
         gap = as_amplitudes(dw)[0] - direct[0] + linear.bodies.mean_G @ force[0]
         rigid = linear.rigid @ (linear.B.T @ (linear.springs * gap.real))
-    probe = probe + probe_motion(replace(model, excitation={}), linear.omega, force, rigid)
+    flexible = linear.modal_part(0, model.blades(len(force) - 1).omega.shape[1])
+    moved = blade_motion(model, linear.omega, force, flexible, excited=False)
+    probe = probe + at_probes(moved, rigid)
     size = np.linalg.norm(solution.probe[1:], axis=0)
     slope = np.sum((solution.probe[1:].conj() * probe[1:]).real, axis=0) / np.maximum(
         size, np.finfo(float).tiny

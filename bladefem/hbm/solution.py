@@ -120,16 +120,22 @@ def blade_motion(
     model: ReducedModel,
     omega: float,
     force: np.ndarray,
+    flexible: np.ndarray | None = None,
+    excited: bool = True,
 ) -> tuple[Stack, np.ndarray, np.ndarray]:
     """Blades under the excitation and contact forces (H+1, m): stack, forces at all ports (H+1, P),
     modes (H+1, m).
+
+    Args:
+        flexible: `modal_flexibility` of the blades at this frequency, where it is known.
+        excited: False leaves the excitation out.
     """
     H = len(force) - 1
     blades = model.blades(H)
     ports = np.zeros((H + 1, blades.shapes.shape[1]), dtype=complex)
-    ports[:, blades.contact], ports[:, blades.load] = -force, model.loads(H)
-    return (
-        blades,
-        ports,
-        modal_amplitudes(blades, modal_flexibility(blades, omega * np.arange(H + 1)), ports),
-    )
+    ports[:, blades.contact] = -force
+    if excited:
+        ports[:, blades.load] = model.loads(H)
+    if flexible is None:
+        flexible = modal_flexibility(blades, omega * np.arange(H + 1))
+    return blades, ports, modal_amplitudes(blades, flexible, ports)

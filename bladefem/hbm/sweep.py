@@ -14,13 +14,13 @@ import numpy as np
 from ..errors import InputError, NotSolvedError
 from ..util.curve_extremum import find_maxima, parabola_at_middle
 from .branches import Branches, find_branches
+from .frequency_walk import all_stick, predicted_start, walk_in_frequency
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
-from .predictor import PREDICTOR_POINTS, extrapolate_solution
+from .predictor import PREDICTOR_POINTS
 from .sensitivity import sensitivities
 from .solution import Solution, size
 from .solve import leading_stuck_solutions, solve, solve_near
-from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULT_OPTIONS, Options
 from .solver.point_compiled import solve_along
 from .validate_model import check_point, check_probe
@@ -40,11 +40,6 @@ FIRST_LOOK_INTERVALS = 12
 POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
-# Newton steps of one point of a walk from a neighbour: more are better spent on shorter steps
-WALK_ITERATIONS = 20
-# points tried on one walk, and its shortest step as a share of the way
-MOST_WALK_POINTS = 48
-SHORTEST_WALK_STEP = 0.002
 # times the samples that are tried where walks end close to a point
 MORE_SAMPLES = (2, 4)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
@@ -88,7 +83,7 @@ def response(
             ready[i]
             if i in ready
             else _solve_off_resonance(
-                model, omegas[i], H, samples, _predicted_start(last, omegas[i], H), options
+                model, omegas[i], H, samples, predicted_start(last, omegas[i], H), options
             )
         )
 
@@ -114,7 +109,7 @@ def _at_once(
     """
     for omega in omegas:
         check_point(model, omega, H, samples)
-    sticks = not last or _all_stick(last[-1])
+    sticks = not last or all_stick(last[-1])
     found = leading_stuck_solutions(model, omegas, H) if options.frugal and sticks else []
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
@@ -130,6 +125,7 @@ def sweep(
     options: Options = DEFAULT_OPTIONS,
     notes: list[str] | None = None,
     paths: bool = True,
+    known: Sequence[Solution] = (),
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need.
 
@@ -148,17 +144,21 @@ def sweep(
         curve: distance of a point from the line through its neighbours, over the highest maximum.
         notes: takes what the search could not do, in sentences.
         paths: whether the response is followed round folds; otherwise one motion is looked for.
+        known: converged points of the band, of this model with these harmonics and samples, which
+            are not solved again; they come first.
 
     Raises:
         InputError: the band is empty or not positive.
     """
     _check_band(band)
     check_probe(model, options.probe)
-    solved: dict[float, Solution] = {}
+    solved = {point.omega: point for point in known}
+    yield from known
     slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
     lost: list[float] = []
-    for solution in _first_solutions(model, band, H, samples, options, paths, lost):
+    look = [omega for omega in first_look(model, band) if omega not in solved]
+    for solution in _first_solutions(model, look, solved, H, samples, options, paths, lost):
         solved[solution.omega] = solution
         yield solution
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
@@ -189,7 +189,8 @@ def _crossed(branches: Branches, omega: float) -> bool:
 
 def _first_solutions(
     model: ReducedModel,
-    band: tuple[float, float],
+    look: Sequence[float],
+    known: Mapping[float, Solution],
     H: int,
     samples: int,
     options: Options,
@@ -200,11 +201,13 @@ def _first_solutions(
     below does not lead to; but not where the response is followed, since paths may lead to them.
 
     Args:
-        lost: takes their circular frequencies.
+        look: circular frequencies of the first look.
+        known: points that are solved already.
+        lost: takes the circular frequencies of those points.
     """
     simply = replace(options, fallbacks=False)
-    solved: dict[float, Solution] = {}
-    for solution in response(model, first_look(model, band), H, samples, options=simply):
+    solved = dict(known)
+    for solution in response(model, look, H, samples, options=simply):
         if options.fallbacks and not solution.converged:
             lost.append(solution.omega)
             continue
@@ -341,39 +344,6 @@ def _walk_from(
     return [*walked, _solve_off_resonance(model, omega, H, samples, first, options)]
 
 
-def walk_in_frequency(
-    model: ReducedModel,
-    omega: float,
-    H: int,
-    samples: int,
-    start: Solution,
-    options: Options = DEFAULT_OPTIONS,
-) -> list[Solution]:
-    """Converged points from a solved one towards a frequency, each by Newton from the curve
-    through the last ones; the step is halved where that fails.
-
-    The last point is at the frequency, unless a fold or a corner of the curve ended the walk.
-    """
-    brief = replace(options, iterations=min(options.iterations, WALK_ITERATIONS))
-    way = [start]
-    step = (omega - start.omega) / 2
-    shortest = SHORTEST_WALK_STEP * abs(omega - start.omega)
-    for _ in range(MOST_WALK_POINTS if step else 0):
-        target = way[-1].omega + step
-        if abs(omega - way[-1].omega) <= 1.5 * abs(step):
-            target = omega
-        guess = _predicted_start(way[-PREDICTOR_POINTS:], target, H) or way[-1]
-        point = solve_near(model, target, H, samples, guess, brief)
-        if point.converged:
-            way.append(point)
-            step *= 1.0 if point.iterations > WALK_ITERATIONS / 2 else 2.0
-        else:
-            step = (target - way[-1].omega) / 4
-        if abs(step) < shortest or way[-1].omega == omega:
-            break
-    return way[1:]
-
-
 def _solve_off_resonance(
     model: ReducedModel,
     omega: float,
@@ -500,26 +470,3 @@ def _corner_targets(
         right = omegas[i + 2] - omegas[i + 1]
         if max(left, right) > 1e-5 * (omegas[-1] - omegas[0]):
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)
-
-
-def _predicted_start(
-    last: list[Solution],
-    omega: float,
-    H: int,
-) -> Solution | None:
-    """A start on the curve through the last solutions; None, which is full stick, where the last
-    one sticks.
-    """
-    if not last or _all_stick(last[-1]):
-        return None
-    known = np.array([match_harmonics(p.w, H) for p in last])
-    w = np.empty(known.shape[1:])
-    at = np.array([p.omega for p in last])
-    extrapolate_solution(
-        omega, known.reshape(len(last), -1, 2 * H + 1), at, len(last), w.reshape(-1, 2 * H + 1)
-    )
-    return replace(last[-1], w=w)
-
-
-def _all_stick(solution: Solution) -> bool:
-    return solution.states["stick"] == len(solution.w)

@@ -126,3 +126,28 @@ def test_a_path_through_a_maze_of_folds_is_left(folding, monkeypatch):
     swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
     found = find_branches(folding, BAND, swept, 3, 128)
     assert any("folds" in note for note in found.notes)
+
+
+def test_known_points_are_not_solved_again(folding, monkeypatch):
+    """They come first; a sweep that knows all of its points solves none."""
+    points = list(sweep(folding, BAND, 3, 128, paths=False))
+    assert all(p.converged for p in points)
+    monkeypatch.setattr(sweep_module, "response", lambda *arguments, **options: iter(()))
+    monkeypatch.setattr(sweep_module, "solve_from", None)
+    again = list(sweep(folding, BAND, 3, 128, paths=False, known=points))
+    assert len(again) == len(points)
+    assert all(one is other for one, other in zip(again, points, strict=True))
+
+
+def test_maxima_are_closed_in_by_their_slope(folding, monkeypatch):
+    """Short steps along the path take twice as many points, and find no higher maximum."""
+    known = list(response(folding, np.linspace(*BAND, 13), 7, 256))
+    by_slope = find_branches(folding, BAND, known, 7, 256, peak=1e-4)
+    monkeypatch.setattr(branches_module, "_by_slope", lambda *arguments: None)
+    by_steps = find_branches(folding, BAND, known, 7, 256, peak=1e-4)
+    assert 3 * len(by_slope.points) < 2 * len(by_steps.points)
+    assert len(by_slope.resonances) == len(by_steps.resonances)
+    for one, other in zip(by_slope.resonances, by_steps.resonances, strict=True):
+        assert one.height > (1 - 1e-6) * other.height
+        assert one.height == pytest.approx(other.height, rel=1e-3)
+        assert one.reached == other.reached

@@ -14,6 +14,7 @@ from bladefem.errors import InputError
 from bladefem.hbm import continuation
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.continuation import follow
+from bladefem.hbm.frequency_walk import walk_in_frequency
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
@@ -127,9 +128,9 @@ def test_a_walk_ends_at_the_frequency_or_before_a_fold():
     model = stop()
     omegas = np.linspace(0.9, 1.02, 25)
     *_, low = response(model, omegas, 5, 0)
-    way = sweep_module.walk_in_frequency(model, 1.05, 5, 0, low)
+    way = walk_in_frequency(model, 1.05, 5, 0, low)
     assert way[-1].omega == 1.05 and all(p.converged for p in way)
-    beyond = sweep_module.walk_in_frequency(model, 3.0, 5, 0, low, Options(iterations=3))
+    beyond = walk_in_frequency(model, 3.0, 5, 0, low, Options(iterations=3))
     assert all(p.converged for p in beyond)
 
 

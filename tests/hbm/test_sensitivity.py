@@ -97,6 +97,19 @@ def test_sensitivities_equal_differences(model, omega, names):
         assert found.size[0] == pytest.approx(height, rel=1e-6, abs=3e-7 * abs(probe).max()), name
 
 
+def test_derivatives_take_the_bodies_that_the_point_was_solved_with(monkeypatch):
+    """Modal flexibilities are those of the solved point: none is computed again."""
+    model = elastic_damper()
+    point = solve(model, 1.05, 3, 128, options=TIGHT)
+
+    def refused(*arguments):
+        raise AssertionError("flexibilities of the modes computed again")
+
+    monkeypatch.setattr("bladefem.hbm.solution.modal_flexibility", refused)
+    monkeypatch.setattr("bladefem.hbm.model.stack_bodies", refused)
+    assert set(sensitivities(model, point, ["omega", "damping"])) == {"omega", "damping"}
+
+
 def test_unknown_parameter():
     model = single_mass()
     with pytest.raises(InputError, match="did you mean 'load'"):

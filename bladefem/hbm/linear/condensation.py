@@ -62,6 +62,13 @@ class Linear:
         """(H+1, m, m) flexibility without contact springs and rigid motions [m/N]."""
         return unsprung_flexibility(self.bodies, *self.modal)
 
+    def modal_part(self, first: int, last: int) -> np.ndarray:
+        """(H+1, k), or (H+1, k, k) where damping couples modes: flexibilities of the k modes from
+        `first` on, those of the blades before those of the damper [s^2].
+        """
+        single, coupled = self.modal
+        return coupled[:, first:last, first:last] if len(coupled) else single[:, first:last]
+
 
 def condense(
     model: ReducedModel,

@@ -65,6 +65,8 @@ class Task:
     size: float
     options: Options
     memory: Memory = field(default_factory=Memory)
+    # crossings of other paths are looked for, by the sign of a determinant at each point
+    crossings: bool = True
 
 
 @dataclass(frozen=True)
@@ -294,4 +296,5 @@ def spot_at(
     slope = -linearise_balance(balance, state, task.memory)(
         residual_rate(balance, state, task.name)
     )
-    return Spot(x, balance, state, iterations, slope, sign, determinant_sign(balance, state))
+    orientation = determinant_sign(balance, state) if task.crossings else 0.0
+    return Spot(x, balance, state, iterations, slope, sign, orientation)

@@ -317,6 +317,7 @@ def covered_band(
     widen: bool = False,
     paths: bool | None = None,
     notes: list[str] | None = None,
+    known: Sequence[Solution] = (),
 ) -> list[Solution]:
     """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
     point lies inside.
@@ -325,6 +326,7 @@ def covered_band(
         widen: a given band may be widened as well.
         paths: whether the response is followed round folds; where accuracy is below 1 if left out.
         notes: takes what the last sweep could not do, in sentences.
+        known: points of this model with these settings and solver options, not to be solved again.
 
     Raises:
         NotSolvedError: no point converged.
@@ -332,7 +334,7 @@ def covered_band(
     (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
     for _ in range(1 if band and not widen else MAX_BAND_WIDENINGS):
         left_open: list[str] = []
-        points = response_points(model, settings, (low, high), accuracy, paths, left_open)
+        points = response_points(model, settings, (low, high), accuracy, paths, left_open, known)
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
         if good[0] < top < good[-1]:
@@ -362,6 +364,7 @@ def response_points(
     accuracy: float,
     paths: bool | None = None,
     notes: list[str] | None = None,
+    known: Sequence[Solution] = (),
 ) -> list[Solution]:
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
@@ -369,20 +372,25 @@ def response_points(
     Where several motions were followed, their points have a `branch`, and replace those
     that the sweep solved before.
 
+    Args:
+        known: points of this model with these settings and solver options, not to be solved again.
+
     Raises:
         NotSolvedError: no point converged.
     """
     rough = accuracy >= 1
+    ends = 2 * np.pi * band[0], 2 * np.pi * band[1]
     swept = partial(
         sweep,
         model,
-        (2 * np.pi * band[0], 2 * np.pi * band[1]),
+        ends,
         settings.harmonics,
         settings.samples,
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if rough else 0.02,
         notes=notes,
         paths=not rough if paths is None else paths,
+        known=[p for p in known if p.converged and ends[0] <= p.omega <= ends[1]],
     )
     options = solver_options(accuracy)
     points = list(swept(options=replace(options, fallbacks=not rough)))

@@ -64,14 +64,27 @@ def resonance_curve(
         settings = enriched_settings(settings, "harmonics") or settings
         points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
+    swept = settings, 1.0
     notes: list[str] = []
     for _ in range(MAX_SWEEPS):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
         paths = not unfollowed(family, used)
+        # paths are followed anew
+        again = any(p.branch for p in points) or not _same_points(swept, (used, accuracy))
+        known = [] if again else points
         points = covered_band(
-            family_member(family, used).model, used, span, mode, accuracy, widen, paths, notes
+            family_member(family, used).model,
+            used,
+            span,
+            mode,
+            accuracy,
+            widen,
+            paths,
+            notes,
+            known,
         )
+        swept = used, accuracy
         points = _with_peak(points, peak)
         if used.error is not None and used.error > FAR_BEYOND * accuracy:
             # the flanks of a peak that is far from right need no look of their own
@@ -86,6 +99,12 @@ def resonance_curve(
         elif size(peak_of(points)) <= (1 + accuracy / 2) * _height(peak, points):
             break
     return Checked(used, points, found, tuple(notes))
+
+
+def _same_points(one: tuple[Settings, float], other: tuple[Settings, float]) -> bool:
+    """Sweeps with two settings and accuracies solve the same points, and equally well."""
+    same = replace(one[0], error=None) == replace(other[0], error=None)
+    return same and solver_options(one[1]) == solver_options(other[1])
 
 
 def unfollowed(family: Family, settings: Settings) -> bool:
