@@ -100,7 +100,7 @@ def test_sensitivities_equal_differences(model, omega, names):
 def test_derivatives_take_the_bodies_that_the_point_was_solved_with(monkeypatch):
     """Modal flexibilities are those of the solved point: none is computed again."""
     model = elastic_damper()
-    point = solve(model, 1.05, 3, 128, options=TIGHT)
+    point = solve(model, 1.1, 3, 128)
 
     def refused(*arguments):
         raise AssertionError("flexibilities of the modes computed again")
