@@ -38,9 +38,19 @@ class Aerofoil:
         0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, circumferential"
     )
     sweep: float = quantity(0.0, "rad", -20 * DEG, 20 * DEG, "tilt of the stacking line, axial")
-    fillet: float = quantity(
-        0.0, "m", 0.0, 0.01, "radius between aerofoil and platform, 0 for a sharp edge"
+    fillet: float | None = quantity(
+        None,
+        "m",
+        0.0,
+        0.01,
+        "radius between aerofoil and platform, 0 for a sharp edge; 0.3 of the root's thickness "
+        "when left out, none where the elements asked for are larger than twice that",
     )
+
+    @property
+    def fillet_radius(self) -> float:
+        """0 where it is still open [m], see `geometry.fillet`."""
+        return self.fillet or 0.0
 
 
 @dataclass(frozen=True)

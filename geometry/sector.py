@@ -13,6 +13,7 @@ from bladefem.errors import InputError
 
 from .draw import clear_leftovers, imprint, polygon, prism
 from .extract_arrays import Groups
+from .fillet import with_fillet
 from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
@@ -53,6 +54,7 @@ def wedge_sector(
         InputError: a parameter has to change; the message names it.
     """
     check_sector(aerofoil, platform, shank, disc, wedge)
+    aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, size)
     shape = profile(platform, shank, disc, wedge)
     sizes = sector_sizes(
         aerofoil,
@@ -146,7 +148,7 @@ def _draw_aerofoil(
     instead of 0.1 s.
     """
     occ = gmsh.model.occ
-    foot = blade.fillet / blade.span
+    foot = blade.fillet_radius / blade.span
     stations = np.linspace(foot, 1, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
     with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
         rings = [_profile_wire(gmsh, outline(blade, top, t)) for t in stations]
@@ -159,7 +161,7 @@ def _draw_aerofoil(
             _profile_wire(gmsh, outline(blade, top, t, grow))
             for t, grow in zip(
                 foot * (1 - np.cos(arc) / np.cos(FILLET_ANGLE)),
-                blade.fillet * (1 - np.sin(arc)),
+                blade.fillet_radius * (1 - np.sin(arc)),
                 strict=True,
             )
         ]

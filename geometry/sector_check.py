@@ -10,9 +10,10 @@ import numpy as np
 
 from bladefem.errors import InputError
 
+from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
 from .profile import Profile, profile
-from .section import outline, shape
+from .section import shape
 from .sector_names import clearing_shift
 
 # of a length: a strip of this width keeps the shape quality of its elements above 0.05
@@ -161,28 +162,19 @@ def check_aerofoil(
                 f"aerofoil.{name}: the section crosses itself, expected less thickness or less "
                 "aerofoil.camber"
             )
-    root = outline(blade, section.top, 0.0, blade.fillet)
-    # less leaves a sliver between the aerofoil and the edge
-    edge = 0.1 * platform.thickness
     smaller = "aerofoil.chord_root or aerofoil.fillet" if blade.fillet else "aerofoil.chord_root"
     rules = (
-        (2, platform.length / 2, "axially", f"{smaller} or a larger platform.length"),
-        (
-            1,
-            section.corners[0, 1],
-            "circumferentially",
-            f"{smaller} or aerofoil.stagger, or fewer disc.sectors",
-        ),
+        ("axially", f"{smaller} or a larger platform.length"),
+        ("circumferentially", f"{smaller} or aerofoil.stagger, or fewer disc.sectors"),
     )
-    for axis, limit, what, cure in rules:
-        excess = np.abs(root[:, axis]).max() + edge - limit
-        if excess > 0:
+    for room, (what, cure) in zip(platform_room(blade, platform, section), rules, strict=True):
+        if room < 0:
             raise InputError(
                 f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the "
-                f"platform {what} by {excess:.3g} m; choose a smaller {cure}"
+                f"platform {what} by {-room:.3g} m; choose a smaller {cure}"
             )
     thinnest = blade.thickness_root * blade.chord_root
-    _at_most("aerofoil.fillet", blade.fillet, thinnest, "the thickness of the root section")
+    _at_most("aerofoil.fillet", blade.fillet_radius, thinnest, "the thickness of the root section")
 
 
 def crosses_itself(polygon: np.ndarray) -> bool:

@@ -64,11 +64,11 @@ def name_faces(
     ]
     above = {t: c[0] - profile.top for t, c in on_blade.items() if c[0] > profile.top + tolerance}
     if aerofoil.fillet:
-        faces["fillet"] = [t for t, height in above.items() if height < aerofoil.fillet]
+        faces["fillet"] = [t for t, height in above.items() if height < aerofoil.fillet_radius]
     sides = [
         t
         for t, height in above.items()
-        if height > aerofoil.fillet + tolerance and t not in faces["tip"]
+        if height > aerofoil.fillet_radius + tolerance and t not in faces["tip"]
     ]
     faces |= _aerofoil_faces(gmsh, sides, aerofoil)
     return Groups({"blade": [blade], "damper": [damper]}, faces)

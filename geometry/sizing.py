@@ -92,7 +92,7 @@ def sector_sizes(
         slender * min(base, 6 * TRAILING_EDGE_RATIO * tip),
         base / 3,
         slender * base,
-        (pi / 2 - FILLET_ANGLE) * aerofoil.fillet / arc_elements,
+        (pi / 2 - FILLET_ANGLE) * aerofoil.fillet_radius / arc_elements,
         arc_elements,
         0.0 if size.size else FOOT_SIZE * base,
     )

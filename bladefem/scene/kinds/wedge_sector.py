@@ -8,7 +8,7 @@ from math import cos, pi, sin, tan
 from ..tables import Scene
 from ..units import show
 from .conditions import BLADE_FACES, at_most, below, known_diameters
-from .record import ENGINE_TABLES, Kind, SceneCall
+from .record import ENGINE_TABLES, Kind, SceneCall, load_function
 
 SHAPE = ("aerofoil", "platform", "shank", "disc", "damper")
 FACES = (*BLADE_FACES, "cyclic_low", "cyclic_high", "trailing_edge")
@@ -58,7 +58,7 @@ def conditions(scene: Scene) -> Iterator[str]:
         "what fits platform.length at aerofoil.stagger",
     )
     yield from at_most(
-        "aerofoil.fillet", aerofoil.fillet, aerofoil.span / 4, "a quarter of aerofoil.span"
+        "aerofoil.fillet", aerofoil.fillet_radius, aerofoil.span / 4, "a quarter of aerofoil.span"
     )
     yield from known_diameters(scene, disc.sectors)
 
@@ -87,7 +87,10 @@ def flank_angles(scene: Scene) -> tuple[float, float]:
 
 def face_names(scene: Scene) -> tuple[str, ...]:
     """Faces and node sets of the blade; the fillet is a face where it has a radius."""
-    return (*FACES, "fillet") if scene.aerofoil.fillet > 0 else FACES
+    drawn = load_function("geometry.fillet:with_fillet")(
+        *(getattr(scene, name) for name in (*SHAPE, "mesh"))
+    )
+    return (*FACES, "fillet") if drawn.fillet_radius > 0 else FACES
 
 
 KIND = Kind(
