@@ -89,6 +89,62 @@ class Disc:
 
 
 @dataclass(frozen=True)
+class Root:
+    """How the blade sits in the disc: on a plain rim, or in a dovetail or fir-tree whose bearing
+    flanks are taken as bonded; slots part blade and disc elsewhere.
+    """
+
+    lobes: int = quantity(
+        0, "1", 0, 5, "0: plain, the shank grows out of the rim; 1: dovetail; 2 and more: fir-tree"
+    )
+    neck: float | None = quantity(
+        None, "m", 0.002, 0.2, "width of the uppermost neck, at the rim; shank.width when left out"
+    )
+    pitch: float = quantity(0.006, "m", 0.001, 0.1, "radial distance from lobe to lobe")
+    bearing: float = quantity(
+        0.003, "m", 5e-4, 0.05, "width of each bearing flank, along its slope"
+    )
+    flank_angle: float = quantity(
+        50 * DEG, "rad", 20 * DEG, 75 * DEG, "of the bearing flanks against the radial direction"
+    )
+    taper: float = quantity(
+        8 * DEG, "rad", 0.0, 30 * DEG, "half angle by which deeper necks become narrower"
+    )
+    clearance: float = quantity(
+        8e-4, "m", 1e-4, 0.01, "of the slots, along the bearing flanks where these end"
+    )
+
+
+@dataclass(frozen=True)
+class Shroud:
+    """A block on the aerofoil, one solid with it and free between neighbours: a tip shroud, or a
+    snubber part of the way up.
+    """
+
+    thickness: float = quantity(0.0, "m", 0.0, 0.05, "radial thickness; 0: no shroud")
+    at: float = quantity(
+        1.0,
+        "1",
+        0.3,
+        1.0,
+        "share of the span: 1 ends at the tip and covers it, less is the middle of a snubber, "
+        "which leaves leading and trailing edge free",
+    )
+    length: float | None = quantity(
+        None,
+        "m",
+        0.002,
+        0.5,
+        "axial length; when left out what covers the tip section, or a third of the section's "
+        "axial extent for a snubber",
+    )
+    width: float | None = quantity(
+        None, "m", 0.002, 0.5, "circumferential width; up to the gap when left out"
+    )
+    gap: float = quantity(0.001, "m", 1e-4, 0.05, "to the next shroud, at least")
+
+
+@dataclass(frozen=True)
 class Wedge:
     """The underplatform damper: a prism with two plane flanks, pressed outwards between two
     platforms.

@@ -4,6 +4,7 @@ all pairs match.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import pi
 from types import ModuleType
 
@@ -16,13 +17,13 @@ from .extract_arrays import Groups
 from .fillet import with_fillet
 from .finalise_mesh import complete, mesh_model
 from .mesh import Mesh
-from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
 from .profile import Profile, profile
+from .root import root_slots
 from .section import FILLET_ANGLE, outline
 from .sector_check import check_sector
 from .sector_names import (
     edge_curves,
-    foot_curves,
     link,
     mark_tip,
     motions,
@@ -32,8 +33,19 @@ from .sector_names import (
     sector,
 )
 from .session import attempt, gmsh_session
-from .sizing import Sizes, sector_sizes, set_fillet_grid, set_grids, set_sizes
+from .shroud import Block, shroud_block
+from .sizing import (
+    Refined,
+    Sizes,
+    refined_parts,
+    sector_sizes,
+    set_fillet_grid,
+    set_grids,
+    set_sizes,
+)
 
+PLAIN = Root()
+NO_SHROUD = Shroud()
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
 
 
@@ -44,6 +56,8 @@ def wedge_sector(
     disc: Disc,
     wedge: Wedge,
     size: MeshSize,
+    root: Root = PLAIN,
+    shroud: Shroud = NO_SHROUD,
 ) -> Mesh:
     """Blade, platform, shank and disc segment as body "blade", the wedge towards the next blade as
     "damper".
@@ -53,9 +67,10 @@ def wedge_sector(
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    check_sector(aerofoil, platform, shank, disc, wedge)
+    check_sector(aerofoil, platform, shank, disc, wedge, root, shroud)
     aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, size)
     shape = profile(platform, shank, disc, wedge)
+    block = shroud_block(shroud, aerofoil, disc, shape.top)
     sizes = sector_sizes(
         aerofoil,
         platform,
@@ -72,6 +87,8 @@ def wedge_sector(
             shank,
             disc,
             shape,
+            block,
+            root_slots(root, shank, disc),
         )
         marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
         with attempt("damper.length", "imprint the seats on the platform"):
@@ -87,10 +104,12 @@ def wedge_sector(
             disc,
             wedge,
             shape,
+            block,
         )
         groups = mark_tip(gmsh, groups, aerofoil, shape)
         link(gmsh, groups, shape)
-        _prescribe_sizes(gmsh, groups, shape, wedge, sizes, size)
+        details = refined_parts(gmsh, groups, shape, sizes, (root, shank, disc), block)
+        _prescribe_sizes(gmsh, groups, (shape, wedge), sizes, size, details)
         with attempt("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors), flat=SEATS)
@@ -100,15 +119,15 @@ def wedge_sector(
 def _prescribe_sizes(
     gmsh: ModuleType,
     groups: Groups,
-    shape: Profile,
-    wedge: Wedge,
+    section: tuple[Profile, Wedge],
     sizes: Sizes,
     size: MeshSize,
+    details: list[Refined],
 ) -> None:
     """Element sizes of the volumes, grids on fillet and seats."""
     fillet = groups.faces.get("fillet", [])
-    foot = foot_curves(gmsh, shape)
-    set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), fillet, foot)
+    shape, wedge = section
+    set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), details)
     with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
         set_fillet_grid(gmsh, fillet, sizes, size)
     # an element size on the seats without a number across asks for free triangles
@@ -140,16 +159,17 @@ def _draw_aerofoil(
     gmsh: ModuleType,
     blade: Aerofoil,
     top: float,
+    end: float = 1.0,
 ) -> int:
-    """Solid lofted from platform to tip; with a fillet, two lofts sewn at a common ring: flared
-    foot and blade.
+    """Solid lofted from platform to a share of the span; with a fillet, two lofts sewn at a common
+    ring: flared foot and blade.
 
     One loft through all rings oscillates, and a Boolean union of two tangent lofts takes 10 s
     instead of 0.1 s.
     """
     occ = gmsh.model.occ
     foot = blade.fillet_radius / blade.span
-    stations = np.linspace(foot, 1, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
+    stations = np.linspace(foot, end, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
     with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
         rings = [_profile_wire(gmsh, outline(blade, top, t)) for t in stations]
         if not foot:
@@ -196,8 +216,12 @@ def blade_solid(
     shank: Shank,
     disc: Disc,
     shape: Profile,
+    block: Block | None = None,
+    slots: Sequence[np.ndarray] = (),
 ) -> int:
-    """One solid of disc segment, shank, platform and aerofoil."""
+    """One solid of disc segment, shank, platform, aerofoil and shroud, less the slots of its
+    root.
+    """
     occ = gmsh.model.occ
     half = shank.width / 2
     foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
@@ -215,10 +239,16 @@ def blade_solid(
             -platform.length / 2,
             platform.length / 2,
         ),
-        _draw_aerofoil(gmsh, aerofoil, shape.top),
+        _draw_aerofoil(gmsh, aerofoil, shape.top, _aerofoil_end(aerofoil, shape, block)),
     ]
+    if block is not None:
+        parts.append(occ.addBox(*block.low, *(block.high - block.low)))
     with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
         solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])
+    if slots:
+        with attempt("root", "cut the slots of the root"):
+            cut = [(3, prism(gmsh, slot, -disc.width, disc.width)) for slot in slots]
+            solid, _ = occ.cut(solid, cut)
     volumes = [tag for dim, tag in solid if dim == 3]
     if len(volumes) != 1:
         raise InputError(
@@ -226,3 +256,12 @@ def blade_solid(
             "change aerofoil.stagger or platform.length"
         )
     return volumes[0]
+
+
+def _aerofoil_end(aerofoil: Aerofoil, shape: Profile, block: Block | None) -> float:
+    """Share of the span at which the loft ends: the middle of a tip shroud, whose outer face then
+    is the tip.
+    """
+    if block is None or not block.at_tip:
+        return 1.0
+    return float((block.low[0] + block.high[0]) / 2 - shape.top) / aerofoil.span

@@ -11,11 +11,15 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .fillet import platform_room
-from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
+from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
 from .profile import Profile, profile
+from .root import check_root
 from .section import shape
 from .sector_names import clearing_shift
+from .shroud import shroud_block
 
+PLAIN = Root()
+NO_SHROUD = Shroud()
 # of a length: a strip of this width keeps the shape quality of its elements above 0.05
 MIN_STRIP_SHARE = 0.02
 
@@ -26,6 +30,8 @@ def check_sector(
     shank: Shank,
     disc: Disc,
     wedge: Wedge,
+    root: Root = PLAIN,
+    shroud: Shroud = NO_SHROUD,
 ) -> None:
     """Refuse proportions that overlap or leave the sector.
 
@@ -49,6 +55,8 @@ def check_sector(
     check_platform(section, platform, shank, wedge)
     check_pocket(section, shank, disc, wedge)
     check_aerofoil(aerofoil, platform, section)
+    check_root(root, shank, disc)
+    shroud_block(shroud, aerofoil, disc, section.top)
 
 
 def _at_most(

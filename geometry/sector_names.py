@@ -17,6 +17,7 @@ from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
 from .profile import Profile, turn
 from .section import outline, place, placement
+from .shroud import Block
 
 
 def seat(
@@ -38,6 +39,7 @@ def name_faces(
     disc: Disc,
     wedge: Wedge,
     profile: Profile,
+    block: Block | None = None,
 ) -> Groups:
     """Find every named face by where its centre must be."""
     theta = profile.theta
@@ -62,7 +64,14 @@ def name_faces(
     faces["tip"] = [
         t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance
     ]
-    above = {t: c[0] - profile.top for t, c in on_blade.items() if c[0] > profile.top + tolerance}
+    shroud = shroud_faces(gmsh, list(on_blade), block)
+    faces |= {name: tags for name, tags in shroud.items() if block is not None and name}
+    on_block = {tag for tags in shroud.values() for tag in tags}
+    above = {
+        t: c[0] - profile.top
+        for t, c in on_blade.items()
+        if c[0] > profile.top + tolerance and t not in on_block
+    }
     if aerofoil.fillet:
         faces["fillet"] = [t for t, height in above.items() if height < aerofoil.fillet_radius]
     sides = [
@@ -72,6 +81,33 @@ def name_faces(
     ]
     faces |= _aerofoil_faces(gmsh, sides, aerofoil)
     return Groups({"blade": [blade], "damper": [damper]}, faces)
+
+
+def shroud_faces(
+    gmsh: ModuleType,
+    candidates: list[int],
+    block: Block | None,
+) -> dict[str, list[int]]:
+    """Faces of a shroud's block: its circumferential ends by name, towards the neighbours, and
+    the others under the name "".
+    """
+    if block is None:
+        return {}
+    tolerance = 1e-6 * float(block.high[0])
+    found: dict[str, list[int]] = {"shroud_left": [], "shroud_right": [], "": []}
+    for tag in candidates:
+        # boxes of faces that splines bound are loose: their centres, in planes, decide
+        centre = np.array(gmsh.model.occ.getCenterOfMass(2, tag))
+        outside = (centre < block.low - tolerance).any() or (centre > block.high + tolerance).any()
+        if outside or gmsh.model.getType(2, tag) != "Plane":
+            continue
+        if centre[1] < block.low[1] + tolerance:
+            found["shroud_left"].append(tag)
+        elif centre[1] > block.high[1] - tolerance:
+            found["shroud_right"].append(tag)
+        else:
+            found[""].append(tag)
+    return found
 
 
 def _aerofoil_faces(
@@ -122,6 +158,25 @@ def foot_curves(gmsh: ModuleType, profile: Profile) -> list[int]:
     return found
 
 
+def slot_curves(
+    gmsh: ModuleType,
+    slots: list[np.ndarray],
+    disc: Disc,
+) -> list[int]:
+    """Curves of a root's slots, those on the faces of the disc included."""
+    corners = np.vstack(slots)
+    low = np.append(corners.min(axis=0), -disc.width / 2)
+    high = np.append(corners.max(axis=0), disc.width / 2)
+    high[0] = disc.rim_radius
+    tolerance = 1e-6 * disc.rim_radius + 2e-7
+    found = []
+    for _, curve in gmsh.model.getEntities(1):
+        box = np.array(gmsh.model.getBoundingBox(1, curve)).reshape(2, 3)
+        if (box[0] > low - tolerance).all() and (box[1] < high + tolerance).all():
+            found.append(curve)
+    return found
+
+
 def sector(count: int) -> Sector:
     """The way to the next blade of a wheel."""
     return Sector(count, turn(2 * np.pi / count), np.zeros(3))
@@ -165,7 +220,8 @@ def mark_tip(
     """Groups with three points of the tip that are nodes of any mesh.
 
     tip_leading is the end of the leading edge; tip_trailing is the corner of the blunt edge on the
-    suction side; tip_mid (on the camber line at half chord) is embedded.
+    suction side; tip_mid (on the camber line at half chord) is embedded, and so are all of them in
+    the outer face of a tip shroud.
     """
     tip = groups.faces["tip"][0]
     corners = {
@@ -173,16 +229,20 @@ def mark_tip(
         for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)
     }
     edge = outline(aerofoil, profile.top, 1)
-    leading = _nearest_tag(corners, edge[len(edge) // 2])
-    trailing = _nearest_tag(corners, edge[0])
-    middle = gmsh.model.occ.addPoint(
-        *place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
-    )
+    middle = place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
+    wanted = {"tip_leading": edge[len(edge) // 2], "tip_mid": middle, "tip_trailing": edge[0]}
+    tags = {}
+    added = []
+    for name, point in wanted.items():
+        nearest = _nearest_tag(corners, point)
+        if np.linalg.norm(corners[nearest] - point) < 1e-6 * profile.top:
+            tags[name] = nearest
+        else:
+            tags[name] = gmsh.model.occ.addPoint(*point)
+            added.append(tags[name])
     gmsh.model.occ.synchronize()
-    gmsh.model.mesh.embed(0, [middle], 2, tip)
-    return replace(
-        groups, points={"tip_leading": [leading], "tip_mid": [middle], "tip_trailing": [trailing]}
-    )
+    gmsh.model.mesh.embed(0, added, 2, tip)
+    return replace(groups, points={name: [tag] for name, tag in tags.items()})
 
 
 def _nearest_tag(places: dict[int, np.ndarray], point: np.ndarray) -> int:

@@ -11,9 +11,13 @@ from typing import Any
 
 from bladefem.errors import InputError
 
-from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from .extract_arrays import Groups
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Wedge
 from .profile import Profile
+from .root import root_slots
 from .section import FILLET_ANGLE, TRAILING_EDGE_RATIO
+from .sector_names import foot_curves, shroud_faces, slot_curves
+from .shroud import Block
 
 # element along the leading edge over those of the aerofoil
 LEADING_EDGE_SIZE = 0.6
@@ -32,9 +36,28 @@ FILLET_GROWTH = 1.0
 # half of the error of the lowest frequencies came from this re-entrant edge
 FOOT_SIZE = 0.6
 FOOT_GROWTH = 0.6
+# elements along the slots of a root over their clearance, and their growth with the distance
+SLOT_SIZE = 1.5
+SLOT_GROWTH = 0.6
+# of elements larger than the automatic size, on the slots at most: larger ones become flat
+SLOT_COARSENING = 1.5
 # elements of an aerofoil with a fillet over the automatic size: they bend as exactly (frequencies
 # change by less than 2e-4), and what they save pays for the fillet
 AEROFOIL_COARSENING = 1.6
+
+
+@dataclass(frozen=True)
+class Refined:
+    """Curves or faces with small elements, which grow with the distance."""
+
+    # "CurvesList" or "SurfacesList"
+    kind: str
+    tags: list[int]
+    # [m]
+    size: float
+    growth: float
+    # elements grow up to 10 times this distance [m]
+    reach: float
 
 
 @dataclass(frozen=True)
@@ -61,6 +84,8 @@ class Sizes:
     arc_elements: float
     # along the re-entrant edges between shank and rim; 0 where the user gives the size of all
     foot: float
+    # of the elements along the slots of a root, over their automatic size
+    coarsening: float
 
 
 def sector_sizes(
@@ -95,6 +120,7 @@ def sector_sizes(
         (pi / 2 - FILLET_ANGLE) * aerofoil.fillet_radius / arc_elements,
         arc_elements,
         0.0 if size.size else FOOT_SIZE * base,
+        min(max(base / automatic, 1.0), SLOT_COARSENING),
     )
 
 
@@ -131,15 +157,13 @@ def set_sizes(
     wedge: Wedge,
     sizes: Sizes,
     edges: tuple[list[int], list[int]],
-    fillet: list[int],
-    foot: list[int],
+    details: list[Refined],
 ) -> None:
     """Boxes round both seats, one for all above the rim, and elements that follow the curvature.
 
     Args:
         edges: curves along the leading edge, and round the trailing edge.
-        fillet: its faces, none without one.
-        foot: curves between shank and rim.
+        details: parts with smaller elements.
     """
     field = gmsh.model.mesh.field
     reach = 4 * sizes.base
@@ -165,20 +189,52 @@ def set_sizes(
         _distance_field(field, curves, size, sizes.aerofoil)
         for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)
     ]
-    if fillet:
-        boxes.append(
-            _growing_field(field, "SurfacesList", fillet, sizes.fillet, FILLET_GROWTH, sizes.base)
-        )
-    if foot and sizes.foot:
-        boxes.append(
-            _growing_field(field, "CurvesList", foot, sizes.foot, FOOT_GROWTH, 2 * sizes.base)
-        )
+    boxes += [
+        _growing_field(field, one.kind, one.tags, one.size, one.growth, one.reach)
+        for one in details
+        if one.tags and one.size > 0
+    ]
     least = field.add("Min")
     field.setNumbers(least, "FieldsList", boxes)
     field.setAsBackgroundMesh(least)
     gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 8)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", min(sizes.least, sizes.contact, sizes.fillet or 1.0))
+    finest = min([one.size for one in details if one.size > 0], default=1.0)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", min(sizes.least, sizes.contact, finest))
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
+
+
+def refined_parts(
+    gmsh: ModuleType,
+    groups: Groups,
+    section: Profile,
+    sizes: Sizes,
+    below: tuple[Root, Shank, Disc],
+    block: Block | None,
+) -> list[Refined]:
+    """Fillet, foot of the shank, slots of the root and shroud, those that the sector has.
+
+    Args:
+        below: root, shank and disc.
+    """
+    fillet = groups.faces.get("fillet", [])
+    details = [
+        Refined("SurfacesList", fillet, sizes.fillet, FILLET_GROWTH, sizes.base),
+        Refined("CurvesList", foot_curves(gmsh, section), sizes.foot, FOOT_GROWTH, 2 * sizes.base),
+    ]
+    root, shank, disc = below
+    if root.lobes:
+        inside = slot_curves(gmsh, root_slots(root, shank, disc), disc)
+        wide = SLOT_SIZE * root.clearance * sizes.coarsening
+        details.append(Refined("CurvesList", inside, wide, SLOT_GROWTH, sizes.base))
+    if block is not None:
+        faces = [t for tags in shroud_faces(gmsh, _all_faces(gmsh), block).values() for t in tags]
+        thick = min(sizes.aerofoil, float(block.high[0] - block.low[0]))
+        details.append(Refined("SurfacesList", faces, thick, SLOT_GROWTH, sizes.base))
+    return details
+
+
+def _all_faces(gmsh: ModuleType) -> list[int]:
+    return [tag for _, tag in gmsh.model.getEntities(2)]
 
 
 def set_grids(

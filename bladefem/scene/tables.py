@@ -17,7 +17,9 @@ from geometry.parameters import (
     Plane,
     Platform,
     Punch,
+    Root,
     Shank,
+    Shroud,
     Wedge,
     ZMass,
 )
@@ -473,6 +475,8 @@ class Scene:
     platform: Platform = field(default_factory=Platform)
     shank: Shank = field(default_factory=Shank)
     disc: Disc = field(default_factory=Disc)
+    root: Root = field(default_factory=Root)
+    shroud: Shroud = field(default_factory=Shroud)
     damper: Wedge = field(default_factory=Wedge)
     plane: Plane = field(default_factory=Plane)
     z_mass: ZMass = field(default_factory=ZMass)

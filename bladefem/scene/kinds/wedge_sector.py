@@ -11,6 +11,7 @@ from .conditions import BLADE_FACES, at_most, below, known_diameters
 from .record import ENGINE_TABLES, Kind, SceneCall, load_function
 
 SHAPE = ("aerofoil", "platform", "shank", "disc", "damper")
+EXTRAS = ("root", "shroud")
 FACES = (*BLADE_FACES, "cyclic_low", "cyclic_high", "trailing_edge")
 
 
@@ -90,21 +91,23 @@ def face_names(scene: Scene) -> tuple[str, ...]:
     drawn = load_function("geometry.fillet:with_fillet")(
         *(getattr(scene, name) for name in (*SHAPE, "mesh"))
     )
-    return (*FACES, "fillet") if drawn.fillet_radius > 0 else FACES
+    fillet = ("fillet",) if drawn.fillet_radius > 0 else ()
+    shroud = ("shroud_left", "shroud_right") if scene.shroud.thickness > 0 else ()
+    return (*FACES, *fillet, *shroud)
 
 
 KIND = Kind(
     name="wedge sector",
-    tables=(*SHAPE, "mistuning", *ENGINE_TABLES),
+    tables=(*SHAPE, *EXTRAS, "mistuning", *ENGINE_TABLES),
     builder="geometry.sector:wedge_sector",
-    shape=(*SHAPE, "mesh"),
+    shape=(*SHAPE, "mesh", *EXTRAS),
     runner="bladefem.report.run:report_run",
     table="bladefem.cli.tables:run_table",
     result="forced responses",
     has_seat_grid=True,
     sectors="disc.sectors",
     flank_angles=flank_angles,
-    check=SceneCall("geometry.sector_check:check_sector", SHAPE),
+    check=SceneCall("geometry.sector_check:check_sector", (*SHAPE, *EXTRAS)),
     cells=SceneCall("geometry.sizing:count_sector_cells", (*SHAPE, "mesh")),
     face_names=face_names,
     pictures={

@@ -1,0 +1,146 @@
+"""Blade roots: dovetail and fir-tree as slots that part blade and disc everywhere but on the
+bearing flanks.
+
+Blade and disc are one solid. What a bonded root changes is where forces pass: through the bearing
+flanks alone, over necks and lobes that bend.
+"""
+
+from __future__ import annotations
+
+from math import cos, pi, sin, tan
+
+import numpy as np
+
+from bladefem.errors import InputError
+
+from .parameters import Disc, Root, Shank
+
+# of root.pitch: radial height of a bearing flank
+HIGHEST_BEARING = 0.7
+# of root.bearing, and of the part of the pitch that bears nothing
+WIDEST_SLOT = 0.4
+# of the uppermost neck's width
+NARROWEST_NECK = 0.3
+# of the half pitch of the sector: what the disc's post between two roots keeps
+POST = 0.15
+# of the height of the disc
+DEEPEST = 0.6
+# of the neck: a narrower step beside the shank leaves a strip that no good element fits into
+STEP = 0.05
+
+
+def root_corners(root: Root, shank: Shank, disc: Disc) -> tuple[np.ndarray, np.ndarray]:
+    """Where each bearing flank starts and ends, (lobes, 2) each [m], on the side y > 0 (x radial,
+    y circumferential), from the rim inwards.
+    """
+    bearing = root.bearing * _along_flank(root)
+    number = np.arange(root.lobes)
+    depth = _idle_height(root) + number * root.pitch
+    half = _neck(root, shank) / 2 - number * root.pitch * tan(root.taper)
+    start = np.column_stack([disc.rim_radius - depth, half])
+    return start, start + bearing
+
+
+def root_slots(root: Root, shank: Shank, disc: Disc) -> list[np.ndarray]:
+    """Outlines (n, 2) [m] of the slots on both sides, and of the one below the root."""
+    if root.lobes == 0:
+        return []
+    start, end = root_corners(root, shank, disc)
+    wide = root.clearance * _along_flank(root)
+    above = disc.rim_radius + shank.height / 10
+    side = [
+        np.array(
+            [
+                [above, start[0, 1]],
+                start[0],
+                start[0] + wide,
+                [above, start[0, 1] + wide[1]],
+            ]
+        )
+    ]
+    side += [
+        np.array([upper, lower, lower + wide, upper + wide])
+        for upper, lower in zip(end[:-1], start[1:], strict=True)
+    ]
+    mirror = np.array([1.0, -1.0])
+    foot = end[-1] - [_idle_height(root), 0.0]
+    half = np.array([end[-1], foot])
+    floor = foot + np.array([-root.clearance, wide[1]])
+    around = np.array([floor, end[-1] + wide])
+    bottom = np.vstack([half, half[::-1] * mirror, around[::-1] * mirror, around])
+    return [*side, *(one * mirror for one in side), bottom]
+
+
+def check_root(root: Root, shank: Shank, disc: Disc) -> None:
+    """Refuse roots whose parts leave no room for each other.
+
+    Raises:
+        InputError: the first rule that is broken, with the field to change.
+    """
+    if root.lobes == 0:
+        return
+    neck = _neck(root, shank)
+    step = (neck - shank.width) / 2
+    if step < 0 or 0 < step < STEP * neck:
+        raise InputError(
+            f"root.neck = {neck:.4g} m: expected shank.width = {shank.width:.4g} m or at least "
+            f"{shank.width / (1 - 2 * STEP):.4g} m, since the shank stands on the root"
+        )
+    idle = _idle_height(root)
+    if idle < (1 - HIGHEST_BEARING) * root.pitch:
+        limit = HIGHEST_BEARING * root.pitch / cos(root.flank_angle)
+        _refuse("bearing", root.bearing, limit, "70 % of root.pitch at this root.flank_angle")
+    widest = WIDEST_SLOT * min(root.bearing, idle)
+    if root.clearance > widest:
+        _refuse("clearance", root.clearance, widest, "40 % of a flank's width")
+    _check_room(root, shank, disc)
+
+
+def _check_room(root: Root, shank: Shank, disc: Disc) -> None:
+    """Necks, disc posts and depth."""
+    start, end = root_corners(root, shank, disc)
+    deepest = disc.rim_radius - end[-1, 0] + _idle_height(root) + root.clearance
+    limit = DEEPEST * (disc.rim_radius - disc.bore_radius)
+    if deepest > limit:
+        raise InputError(
+            f"root.lobes = {root.lobes}: the root is {deepest:.4g} m deep, expected at most "
+            f"{limit:.4g} m (60 % of the height of the disc); choose fewer lobes or a smaller "
+            "root.pitch"
+        )
+    if start[-1, 1] < NARROWEST_NECK * start[0, 1]:
+        raise InputError(
+            f"root.taper = {root.taper:.4g} rad: the innermost neck is {2 * start[-1, 1]:.3g} m "
+            f"wide, expected at least {2 * NARROWEST_NECK * start[0, 1]:.3g} m; choose less taper "
+            "or fewer lobes"
+        )
+    reach = end + root.clearance * _along_flank(root)
+    # the groove's floor is as wide as its last flank, further in
+    reach = np.vstack([reach, [disc.rim_radius - deepest, reach[-1, 1]]])
+    free = (1 - POST) * reach[:, 0] * tan(pi / disc.sectors) - reach[:, 1]
+    if free.min() < 0:
+        raise InputError(
+            f"root.neck = {_neck(root, shank):.4g} m: the lobes leave too thin a post of the disc "
+            f"between two roots, by {-free.min():.3g} m; choose a narrower neck (and shank.width), "
+            "a smaller root.bearing or fewer disc.sectors"
+        )
+
+
+def _refuse(name: str, value: float, limit: float, meaning: str) -> None:
+    raise InputError(
+        f"root.{name} = {value:.4g} m is too large: expected at most {limit:.4g} m ({meaning})"
+    )
+
+
+def _neck(root: Root, shank: Shank) -> float:
+    """Width of the uppermost neck [m]."""
+    return shank.width if root.neck is None else root.neck
+
+
+def _along_flank(root: Root) -> np.ndarray:
+    """Direction (2,) of the bearing flanks, inwards and away from the middle."""
+    return np.array([-cos(root.flank_angle), sin(root.flank_angle)])
+
+
+def _idle_height(root: Root) -> float:
+    """Radial height of the part of a lobe that bears nothing [m]."""
+    return root.pitch - root.bearing * cos(root.flank_angle)
