@@ -148,7 +148,9 @@ def draw_side(ax: Axes, blade: Aerofoil) -> None:
         f"stacking line\n{parameter_words(blade, 'lean')}\n{parameter_words(blade, 'sweep')}",
         (44, 0),
     )
-    draw_note(ax, (high[0], 0), parameter_words(blade, "fillet") if blade.fillet else "fillet", (12, 16))
+    draw_note(
+        ax, (high[0], 0), parameter_words(blade, "fillet") if blade.fillet else "fillet", (12, 16)
+    )
     equal_axes(ax, "side view", "z, engine axis", "x above the platform")
     ax.set_xlim(low.min() - 0.6 * tip, high.max() + 1.1 * tip)
 
