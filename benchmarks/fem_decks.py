@@ -3,7 +3,8 @@
     python benchmarks/fem_decks.py          writes tests/fem/ccx_decks.json
 
 Modes of three nodal diameters of a ring sector, one of twelve: C3D20, C3D20R, C3D15 with C3D20,
-C3D10, and C3D4 promoted to C3D10; and clamped bars of a cubic crystal and an orthotropic solid.
+C3D10, and C3D4 promoted to C3D10; clamped bars of a cubic crystal and an orthotropic solid; and a
+bar between walls whose properties are tables of temperature, heated evenly and unevenly.
 """
 
 from __future__ import annotations
@@ -61,6 +62,35 @@ def crystal(kind: str, folder: Path) -> list[float]:
     return found[:COUNT]
 
 
+def heated(kind: str, folder: Path) -> dict[str, object]:
+    """Frequencies [Hz] about the linear and the nonlinear state of a heated bar, and the largest
+    displacement of the linear one [m].
+    """
+    import decks
+    import numpy as np
+
+    mesh, m = decks.bar()
+    m.node_sets["far"] = np.unique(mesh.faces["x1"])
+    hot = decks.temperature(m.points)
+    uniform = 450.0 if kind == "uniform" else None
+    out: dict[str, object] = {}
+    for name in ("NLGEOM", "linear"):
+        job = decks.heated_job(m, hot, COUNT, uniform, nlgeom=name == "NLGEOM")
+        (folder / "job.inp").write_text(job)
+        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+        subprocess.run(
+            ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+        )
+        static, _, vibration = (folder / "job.dat").read_text().partition("E I G E N V A L U E")
+        rows = [line.split() for line in vibration.splitlines()]
+        found = [float(row[3]) for row in rows if len(row) == 5 and row[0].isdigit()]
+        out[name] = found[:COUNT]
+    rows = [line.split() for line in static.splitlines()]
+    moved = [row[1:] for row in rows if len(row) == 4 and row[0].isdigit()]
+    out["largest"] = float(np.abs(np.array(moved, float)).max())
+    return out
+
+
 def main() -> None:
     """Write the reference file."""
     sys.path[:0] = [str(TESTS), str(HERE), str(HERE.parent)]
@@ -74,6 +104,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         out = {case: reference(*how, Path(name)) for case, how in cases.items()}
         out["crystals"] = {kind: crystal(kind, Path(name)) for kind in ("cubic", "orthotropic")}
+        out["heated"] = {kind: heated(kind, Path(name)) for kind in ("uniform", "field")}
     GOLDEN.write_text(json.dumps(out, indent=1) + "\n")
 
 

@@ -15,6 +15,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..data import Patch, PressureMap
+from ..scene.material_table import operating_materials
 from ..scene.tables import Contact, Scene
 from ..scene.units import show
 from .face_profile import element_size
@@ -61,7 +62,7 @@ def edge_sentence(
     there = [load for load, seats in maps.items() if any(at_edge(m) for m in seats)]
     if not sharp or not there:
         return ""
-    modulus = contact_modulus(scene.material.blade, scene.material.damper)
+    modulus = contact_modulus(*operating_materials(scene))
     if all(
         modulus / areal_stiffness(m, scene) >= EDGE_ELEMENTS * element_size(m.patch, depth)
         for seats in maps.values()
@@ -77,7 +78,7 @@ def edge_sentence(
 
 def areal_stiffness(pressure: PressureMap, scene: Scene) -> float:
     """Largest normal stiffness of the interface layer [N/m^3]; infinite for rigid faces."""
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    ratio = pair_ratio(*operating_materials(scene))
     law = interface_law([pressure.patch], scene.contact, ratio)
     return float((stiffness_at(law, pressure.force) / pressure.patch.area).max())
 
@@ -115,7 +116,7 @@ def narrow_sentence(
         depth: of a plane mesh [m], 1 for solids.
     """
     contact = scene.contact
-    modulus = contact_modulus(scene.material.blade, scene.material.damper)
+    modulus = contact_modulus(*operating_materials(scene))
     if contact.bedded or not maps:
         return ""
     load = min(maps)

@@ -25,8 +25,19 @@ from .compat import (
     ufl,
     vector_space,
 )
-from .elasticity import Law, cellwise_constant, elastic_law, material_numbers
+from .elasticity import Law, elastic_law
 from .memory import check_memory
+from .temperature import (
+    Temperatures,
+    cell_temperatures,
+    density_at,
+    evaluate_materials,
+    form_coefficient,
+    material_numbers,
+)
+
+# degrees of quadrature for properties that vary in an element
+EXTRA_DEGREE = 2
 
 
 @dataclass(frozen=True)
@@ -57,6 +68,8 @@ class Body:
     spring: PETSc.Mat | None = None
     # face or node set, and the letters of the displacements held on it
     directions: tuple[tuple[str, str], ...] = ()
+    # None: properties are the constants of the materials
+    heat: Temperatures | None = None
 
     @property
     def scalar_rows(self) -> np.ndarray:
@@ -72,6 +85,7 @@ def assemble(
     comm: MPI.Comm | None = None,
     plane: str = "stress",
     quadrature: str = "exact",
+    heat: Temperatures | None = None,
 ) -> Body:
     """Stiffness and mass of one body, or of several that share nodes.
 
@@ -82,6 +96,8 @@ def assemble(
         plane: "stress" or "strain" (plane meshes only); the mesh's depth multiplies both matrices.
         quadrature: "exact" (up to the curvature of elements), or "ccx": degree 2 for both matrices,
             as CalculiX integrates C3D10.
+        heat: temperatures of the mesh, which decide on properties; their thermal stress is no part
+            of the matrices, see `rotation.body_under_rotation`.
 
     Raises:
         InputError: unknown body, unknown element type, turned-over elements, more than memory can
@@ -92,16 +108,17 @@ def assemble(
     cells, used, local = _check_cells(mesh, names, materials)
     comm = comm or MPI.COMM_WORLD
     dim = mesh.dimension
+    if heat is not None and plane == "strain":
+        raise InputError("temperature: not known in plane strain, expected plane stress or a solid")
     check_memory(dim * len(used), comm)
     domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
     space = vector_space(domain, CELLS[mesh.cell_type][1])
-    law, rho, depth = properties(mesh, {n: materials[n] for n in names}, domain, plane)
-    stiff, mass = degrees(mesh, cells, quadrature)
+    own = {n: materials[n] for n in names}
+    stiff, mass = degrees(mesh, cells, quadrature, heat)
+    law, rho, depth = properties(mesh, own, domain, plane, heat, (stiff, mass))
     u = ufl.TrialFunction(space)
     v = ufl.TestFunction(space)
-    e_u = ufl.sym(ufl.grad(u))
-    e_v = ufl.sym(ufl.grad(v))
-    energy = depth * ufl.inner(law(e_u), e_v)
+    energy = depth * ufl.inner(law(ufl.sym(ufl.grad(u))), ufl.sym(ufl.grad(v)))
     K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
     M = assemble_matrix(
         depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass})
@@ -110,7 +127,7 @@ def assemble(
     return Body(
         mesh,
         " + ".join(names),
-        {n: materials[n] for n in names},
+        own,
         dim,
         K,
         M,
@@ -118,6 +135,7 @@ def assemble(
         space,
         plane,
         comm,
+        heat=heat,
     )
 
 
@@ -126,14 +144,27 @@ def properties(
     materials: dict[str, Material],
     domain: Any,
     plane: str,
+    heat: Temperatures | None,
+    degree: tuple[int, int],
 ) -> tuple[Law, Any, Any]:
-    """Stress from strain, density [kg/m^3] with one value a cell of this rank, and the depth [m],
-    for forms.
+    """Stress from strain, density [kg/m^3] of the cells of this rank, and the depth [m], for forms.
+
+    Args:
+        degree: of the quadratures in which stress and density stand.
     """
-    density = np.array([material.rho for material in materials.values()])
-    rho = cellwise_constant(domain, density[material_numbers(mesh, materials, domain)])
+    stiff, mass = degree
+    temperature = cell_temperatures(mesh, materials, domain, heat, mass)
+    owner = material_numbers(mesh, materials, domain)
+    rho = form_coefficient(
+        domain, evaluate_materials(materials, owner, temperature, density_at), mass
+    )
     depth = dolfinx.fem.Constant(domain, float(mesh.depth if mesh.dimension == 2 else 1.0))
-    return elastic_law(mesh, materials, domain, plane), rho, depth
+    return elastic_law(mesh, materials, domain, plane, heat, stiff), rho, depth
+
+
+def body_properties(body: Body, degree: tuple[int, int]) -> tuple[Law, Any, Any]:
+    """``properties`` of a body."""
+    return properties(body.mesh, body.material, body.space.mesh, body.plane, body.heat, degree)
 
 
 def cells_of(body: Body) -> np.ndarray:
@@ -205,22 +236,23 @@ def degrees(
     mesh: Mesh,
     cells: np.ndarray,
     quadrature: str,
+    heat: Temperatures | None = None,
 ) -> tuple[int, int]:
-    """Quadrature degrees of stiffness and mass; elements with straight sides need less."""
+    """Quadrature degrees of stiffness and mass; elements with straight sides need less, properties
+    that vary with a temperature need more.
+    """
     if quadrature not in ("exact", "ccx"):
         raise InputError(f"quadrature is '{quadrature}'{suggestion(quadrature, ('exact', 'ccx'))}")
     _, degree = CELLS[mesh.cell_type]
     if quadrature == "ccx":
         return 2, 2
+    more = EXTRA_DEGREE if heat is not None and heat.varies else 0
     simplex = mesh.cell_type.startswith(("tri", "tet"))
     if not simplex:
-        return 2 * degree, 2 * degree + 2
-    straight = degree == 1 or _has_straight_cells(mesh, cells)
-    return (
-        (2 * degree - 2, 2 * degree)
-        if straight
-        else (4, 2 * degree + mesh.dimension * (degree - 1))
-    )
+        return 2 * degree + more, 2 * degree + 2 + more
+    if degree == 1 or _has_straight_cells(mesh, cells):
+        return 2 * degree - 2 + more, 2 * degree + more
+    return 4 + more, 2 * degree + mesh.dimension * (degree - 1) + more
 
 
 def _has_straight_cells(mesh: Mesh, cells: np.ndarray) -> bool:

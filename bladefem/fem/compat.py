@@ -125,6 +125,22 @@ def scalar_space(mesh: Any) -> Any:
     return _wait_for_build(lambda: make(mesh, ("DG", 0)))
 
 
+def quadrature_space(mesh: Any, degree: int) -> tuple[Any, np.ndarray]:
+    """One value a quadrature point of each cell, and the points (q, tdim) in the unit cell."""
+    import basix
+
+    name = mesh.topology.cell_type.name
+    points, _ = basix.make_quadrature(getattr(basix.CellType, name), degree)
+    if hasattr(ufl, "VectorElement"):
+        element = ufl.FiniteElement("Quadrature", mesh.ufl_cell(), degree, quad_scheme="default")
+    else:
+        import basix.ufl
+
+        element = basix.ufl.quadrature_element(name, degree=degree)
+    make = getattr(dolfinx.fem, "functionspace", None) or dolfinx.fem.FunctionSpace
+    return _wait_for_build(lambda: make(mesh, element)), np.asarray(points)
+
+
 def cell_dofs(space: Any) -> np.ndarray:
     """(cells of this rank with ghosts, k) local block numbers of each cell's nodes."""
     table = space.dofmap.list

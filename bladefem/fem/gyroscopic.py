@@ -19,7 +19,7 @@ import numpy as np
 
 from ..data import ModeSet
 from ..errors import InputError
-from .body import Body, cells_of, degrees, properties
+from .body import Body, body_properties, cells_of, degrees
 from .compat import PETSc, assemble_matrix, dolfinx, ufl
 from .linalg import apply_block, inner_products
 from .rotation import AXIS
@@ -54,16 +54,16 @@ class Waves:
 
 def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
     """G [kg]: times the speed [rad/s] it multiplies velocities in the rotating frame; skew."""
-    _, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
+    degree = degrees(body.mesh, cells_of(body), "exact", body.heat)
+    _, rho, depth = body_properties(body, degree)
     a = np.asarray(axis, float) / np.linalg.norm(axis)
     turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
     v = ufl.TestFunction(body.space)
     u = ufl.TrialFunction(body.space)
-    _, degree = degrees(body.mesh, cells_of(body), "exact")
     # a constant, since a matrix of zeros (a plane that holds the axis) would leave no form
     cross = dolfinx.fem.Constant(body.space.mesh, np.ascontiguousarray(turn))
     form = 2 * depth * rho * ufl.inner(v, cross * u)
-    return assemble_matrix(form * ufl.dx(metadata={"quadrature_degree": degree}))
+    return assemble_matrix(form * ufl.dx(metadata={"quadrature_degree": degree[1]}))
 
 
 def coupling(

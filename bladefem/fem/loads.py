@@ -11,6 +11,7 @@ from geometry.mesh import Mesh
 
 from ..errors import InputError, suggestion
 from . import shape_functions as shape
+from .temperature import density_at, point_temperatures
 
 if TYPE_CHECKING:
     from .body import Body
@@ -35,9 +36,13 @@ def body_volume(mesh: Mesh, name: str) -> float:
 
 def body_mass(body: Body) -> float:
     """Mass of a body [kg]."""
-    return sum(
-        material.rho * body_volume(body.mesh, name) for name, material in body.material.items()
-    )
+    total = 0.0
+    for name, material in body.material.items():
+        cells = body.mesh.bodies[name]
+        values, weight, _ = _quadrature_measure(body.mesh, cells, 6)
+        rho = density_at(material, point_temperatures(body.heat, cells, values))
+        total += float((rho * weight).sum())
+    return total
 
 
 def centrifugal(
@@ -60,7 +65,8 @@ def centrifugal(
         simplex = body.mesh.cell_type.startswith(("tri", "tet"))
         degree = SIMPLEX_DEGREE if simplex else TENSOR_DEGREE
         values, weight, x = _quadrature_measure(body.mesh, cells, degree)
-        field = ((x - centre) @ across)[:, :, : body.dim] * (material.rho * speed**2)
+        rho = density_at(material, point_temperatures(body.heat, cells, values))
+        field = ((x - centre) @ across)[:, :, : body.dim] * (rho[..., None] * speed**2)
         # (nc, d, k)
         share = np.tensordot(field * weight[:, :, None], values, axes=([1], [0]))
         np.add.at(force, cells, share.transpose(0, 2, 1))

@@ -1,11 +1,12 @@
-"""Steady rotation: centrifugal preload, stress stiffening and spin softening of an elastic body.
+"""Steady rotation and heat: preload, stress stiffening and spin softening of an elastic body.
 
 In the rotating frame a Saint Venant-Kirchhoff body has the potential
 
     integral of  E : C : E / 2  -  rho Omega^2 |P (X + u)|^2 / 2,      E = (F^T F - 1) / 2,
     F = 1 + grad u,
 
-P the projection across the axis. Its first derivative is the balance of the preload, its second the
+P the projection across the axis. In a body that is not at reference temperature, E less the thermal
+strain stands in the place of E. Its first derivative is the balance of the preload, its second the
 stiffness of small vibrations about it: stress stiffening and spin softening in one matrix.
 
 The linear preload, which other codes call a perturbation step, takes u0 from the linear balance K
@@ -24,11 +25,18 @@ import numpy as np
 
 from ..errors import InputError, NotSolvedError
 from . import shape_functions as shape
-from .body import Body, cells_of, degrees, properties
+from .body import Body, body_properties, cells_of, degrees
 from .compat import PETSc, assemble_matrix, assemble_vector, compile_form, dolfinx, ufl
 from .constraint import Constrained, expand_to_mesh, in_step, restrict_load
 from .flexibility import Flexibility, compliance, flexible
 from .loads import centrifugal
+from .temperature import (
+    cell_temperatures,
+    evaluate_materials,
+    form_coefficient,
+    material_numbers,
+    strain_at,
+)
 
 AXIS = (0.0, 0.0, 1.0)
 # iterations of one load step
@@ -41,7 +49,7 @@ ROUNDING_OVER_TOLERANCE = 1e3
 
 @dataclass(frozen=True)
 class Preload:
-    """The static state under rotation."""
+    """The static state under rotation and heat."""
 
     # (n_points, dim) [m], the same on every rank
     displacement: np.ndarray
@@ -51,7 +59,7 @@ class Preload:
     iterations: int
     # load steps
     steps: int
-    # |unbalanced force| over |centrifugal force|
+    # |unbalanced force| over |centrifugal and thermal force|
     residual: float
 
 
@@ -63,6 +71,8 @@ class _Forms:
 
     u: Any
     speed2: Any
+    # share of the thermal strain
+    heating: Any
     force: Any
     stiffness: Any
     # (local blocks,) mesh node of each block of this rank, ghosts included
@@ -88,6 +98,64 @@ def unit_speed_displacement(
     return expand_to_mesh(con, compliance(flex, restrict_load(con, load)))[:, :, 0].real
 
 
+def has_thermal_strain(body: Body) -> bool:
+    """Some of the body is not at reference temperature."""
+    return body.heat is not None and body.heat.strains
+
+
+def thermal_force(body: Body, quadrature: str = "exact") -> np.ndarray:
+    """(n_points*dim,) nodal forces [N] that hold against the thermal strain; the same on every
+    rank.
+
+    Args:
+        quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
+
+    Raises:
+        InputError: the expansion of a material is not known.
+    """
+    if not has_thermal_strain(body):
+        return np.zeros(body.dim * len(body.mesh.points))
+    degree = degrees(body.mesh, cells_of(body), quadrature, body.heat)
+    stress, _, depth = body_properties(body, degree)
+    v = ufl.TestFunction(body.space)
+    measure = ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": degree[0]})
+    hot = stress(_thermal_strain(body, degree[0]) * ufl.Identity(body.dim))
+    form = compile_form(depth * ufl.inner(hot, ufl.sym(ufl.grad(v))) * measure)
+    return _in_mesh_numbering(body, assemble_vector(form).array).ravel()
+
+
+def thermal_displacement(flex: Flexibility, quadrature: str = "exact") -> np.ndarray:
+    """(n_points, dim) linear displacement [m] by the thermal strain.
+
+    Args:
+        flex: the factorised body in nodal diameter 0 or without cyclic symmetry.
+    """
+    con = flex.con
+    if con.nodal_diameter not in (None, 0):
+        raise InputError(
+            f"nodal_diameter is {con.nodal_diameter}, expected 0: the temperature is that of all "
+            "sectors"
+        )
+    load = thermal_force(con.body, quadrature).reshape(-1, 1)
+    return expand_to_mesh(con, compliance(flex, restrict_load(con, load)))[:, :, 0].real
+
+
+def _thermal_strain(body: Body, degree: int) -> Any:
+    """Thermal strain [1] at the quadrature points of a degree, as a function of forms; 0 without
+    temperatures.
+    """
+    domain = body.space.mesh
+    heat = body.heat
+    temperature = cell_temperatures(body.mesh, body.material, domain, heat, degree)
+    if heat is None or temperature is None or not heat.strains:
+        return dolfinx.fem.Constant(domain, 0.0)
+    owner = material_numbers(body.mesh, body.material, domain)
+    values = evaluate_materials(
+        body.material, owner, temperature, lambda m, t: strain_at(m, heat, np.asarray(t))
+    )
+    return form_coefficient(domain, values, degree)
+
+
 def linear_tangent(
     body: Body,
     u0: np.ndarray,
@@ -98,20 +166,23 @@ def linear_tangent(
     """Stiffness of small vibrations about a linear preload, spin softening included [N/m].
 
     Args:
-        u0: (n_points, dim) linear displacement [m], see :func:`unit_speed_displacement`.
+        u0: (n_points, dim) linear displacement [m], of :func:`unit_speed_displacement` and
+            :func:`thermal_displacement`.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
     """
     v = ufl.TestFunction(body.space)
     w = ufl.TrialFunction(body.space)
-    stress, rho, depth = properties(body.mesh, body.material, body.space.mesh, body.plane)
+    degree = _elastic_degrees(body, quadrature)
+    stress, rho, depth = body_properties(body, degree)
     speed2 = dolfinx.fem.Constant(body.space.mesh, float(speed) ** 2)
     across = _across_axis(body, axis)
     gradient = ufl.grad(_displacement_function(body, u0))
     F = ufl.Identity(body.dim) + gradient
 
     moved = ufl.inner(stress(ufl.sym(F.T * ufl.grad(v))), ufl.sym(F.T * ufl.grad(w)))
-    geometric = ufl.inner(ufl.grad(v) * stress(ufl.sym(gradient)), ufl.grad(w))
-    elastic, inertial = _integral_measures(body, quadrature)
+    strain = ufl.sym(gradient) - _thermal_strain(body, degree[0]) * ufl.Identity(body.dim)
+    geometric = ufl.inner(ufl.grad(v) * stress(strain), ufl.grad(w))
+    elastic, inertial = _integral_measures(body, degree)
     out = assemble_matrix(
         depth * (moved + geometric) * elastic
         - depth * rho * speed2 * ufl.inner(across * v, w) * inertial
@@ -129,33 +200,33 @@ def preload(
     tolerance: float = 1e-10,
     quadrature: str = "exact",
 ) -> Preload:
-    """The nonlinear static state under a steady rotation, by Newton's method with load steps that
-    halve when it fails.
+    """The nonlinear static state under a steady rotation and heat, by Newton's method with load
+    steps that halve when it fails.
 
     A body with the pair "cyclic" moves alike in all sectors (nodal diameter 0).
 
     Args:
         speed: [rad/s].
         clamp: face or node set held fast.
-        tolerance: wanted |unbalanced force| over |centrifugal force|; rounding may leave more in
-            slender bodies.
+        tolerance: wanted |unbalanced force| over |centrifugal and thermal force|; rounding may
+            leave more in slender bodies.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
 
     Raises:
         InputError: speed is negative or not finite, no such face.
-        NotSolvedError: the state buckles or tears before the speed is reached; the message says
-            where.
+        NotSolvedError: the state buckles or tears before the speed and temperature are reached;
+            the message says where.
     """
     _check_speed(speed)
     if body.spring is not None:
         raise InputError(
             "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
         )
-    if speed == 0:
+    if speed == 0 and not has_thermal_strain(body):
         return Preload(np.zeros((len(body.mesh.points), body.dim)), speed, 0, 0, 0.0)
     forms = _potential_forms(body, axis, quadrature)
     con = in_step(body, clamp)
-    load = centrifugal(body, speed, axis)
+    load = centrifugal(body, speed, axis) + thermal_force(body, quadrature)
     size = _vector_length(con, restrict_load(con, load.reshape(-1, 1)))
     u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size)
     return Preload(u, speed, iterations, steps, misfit / size)
@@ -178,15 +249,17 @@ def _load_steps(
     misfit = 0.0
     while done < 1.0:
         target = min(done + part, 1.0)
+        forms.heating.value = target
         trial, used, error = _solve_newton(con, clamp, forms, u, target * speed**2, limit)
         iterations += used
         if isinstance(error, str):
             halvings = halvings + 1
             part = part / 2
             if halvings > MAX_LOAD_HALVINGS:
+                heated = f" and {done:.0%} of the heat" if has_thermal_strain(con.body) else ""
                 raise NotSolvedError(
                     f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} "
-                    f"of the speed {error}"
+                    f"of the speed{heated} {error}"
                 )
             continue
         u = trial
@@ -204,6 +277,7 @@ def tangent(
 ) -> PETSc.Mat:
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
     forms = _potential_forms(body, axis, quadrature)
+    forms.heating.value = 1.0
     return _tangent_matrix(forms, state.displacement, state.speed**2)
 
 
@@ -214,7 +288,8 @@ def body_under_rotation(
     axis: tuple[float, float, float] = AXIS,
     linear: bool = False,
 ) -> Body:
-    """The body with the stiffness that it has under a steady rotation; mass and nodes stay.
+    """The body with the stiffness that it has under a steady rotation and its temperatures; mass
+    and nodes stay.
 
     Args:
         speed: [rad/s].
@@ -225,11 +300,12 @@ def body_under_rotation(
         InputError, NotSolvedError: see :func:`preload`.
     """
     _check_speed(speed)
-    if speed == 0:
+    if speed == 0 and not has_thermal_strain(body):
         return body
     if not linear:
         return replace(body, K=tangent(body, preload(body, speed, clamp, axis), axis))
-    u0 = speed**2 * unit_speed_displacement(flexible(in_step(body, clamp)), axis)
+    flex = flexible(in_step(body, clamp))
+    u0 = speed**2 * unit_speed_displacement(flex, axis) + thermal_displacement(flex)
     return replace(body, K=linear_tangent(body, u0, speed, axis))
 
 
@@ -289,16 +365,22 @@ def _vector_length(con: Constrained, r: np.ndarray) -> float:
     return float(np.sqrt(con.body.comm.allreduce(float((np.abs(r) ** 2).sum()))))
 
 
-def _integral_measures(body: Body, quadrature: str) -> tuple[Any, Any]:
-    """Measures for the elastic and the inertial integrals; the elastic one is of fourth power in
-    grad u.
+def _elastic_degrees(body: Body, quadrature: str) -> tuple[int, int]:
+    """Quadrature degrees of the elastic integrals, which are of fourth power in grad u, and of the
+    inertial ones.
     """
-    stiff, mass = degrees(body.mesh, cells_of(body), quadrature)
+    stiff, mass = degrees(body.mesh, cells_of(body), quadrature, body.heat)
     if quadrature == "exact" and stiff < 4:
         stiff *= 2
-    return tuple(
-        ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": d}) for d in (stiff, mass)
+    return stiff, mass
+
+
+def _integral_measures(body: Body, degree: tuple[int, int]) -> tuple[Any, Any]:
+    """Measures for the elastic and the inertial integrals."""
+    elastic, inertial = (
+        ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": d}) for d in degree
     )
+    return elastic, inertial
 
 
 def _across_axis(body: Body, axis: tuple[float, float, float]) -> Any:
@@ -318,11 +400,16 @@ def _potential_forms(
     speed2 = dolfinx.fem.Constant(domain, 0.0)
     v = ufl.TestFunction(body.space)
     w = ufl.TrialFunction(body.space)
-    stress, rho, depth = properties(body.mesh, body.material, domain, body.plane)
+    degree = _elastic_degrees(body, quadrature)
+    stress, rho, depth = body_properties(body, degree)
+    heating = dolfinx.fem.Constant(domain, 0.0)
     # F^T F - 1 would cancel small strains
     E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2
+    # of free expansion: ((1 + strain)^2 - 1) / 2
+    free = heating * _thermal_strain(body, degree[0])
+    E = E - (free + free**2 / 2) * ufl.Identity(body.dim)
     place = _across_axis(body, axis) * (ufl.SpatialCoordinate(domain) + u)
-    elastic, inertial = _integral_measures(body, quadrature)
+    elastic, inertial = _integral_measures(body, degree)
     potential = (
         depth / 2 * ufl.inner(stress(E), E) * elastic
         - depth * rho * speed2 / 2 * ufl.inner(place, place) * inertial
@@ -331,6 +418,7 @@ def _potential_forms(
     return _Forms(
         u,
         speed2,
+        heating,
         compile_form(force),
         compile_form(ufl.derivative(force, u, w)),
         _block_nodes(body),
@@ -345,12 +433,16 @@ def _unbalanced_force(
 ) -> np.ndarray:
     """(n_points*dim, 1) unbalanced force in mesh numbering [N]."""
     _set_state(forms, u, speed2)
-    part = assemble_vector(forms.force).array
+    return _in_mesh_numbering(body, assemble_vector(forms.force).array).reshape(-1, 1)
+
+
+def _in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
+    """(n_points, dim) of an assembled vector's share of this rank; the same on every rank."""
     rows = np.concatenate(body.comm.allgather(part))
     out = np.zeros((body.rows.size, body.dim))
     inside = body.rows >= 0
     out[inside] = rows.reshape(-1, body.dim)[body.rows[inside]]
-    return out.reshape(-1, 1)
+    return out
 
 
 def _tangent_matrix(

@@ -21,6 +21,7 @@ from . import shape_functions as shape
 from .body import Body
 from .elasticity import stiffness
 from .stress import element_stress, extrapolation_matrix
+from .temperature import Temperatures
 
 # cells at a time
 CELLS_PER_BLOCK = 2000
@@ -65,7 +66,7 @@ def _weighted_differences(
     found = [element_stress(body, u, name, cells[rows]) for rows in blocks]
     mean = _nodal_mean(len(mesh.points), cells, blocks, found, continuation)
     mass = _mass_root(mesh.cell_type)
-    compliance = _compliance_root(material)
+    compliance = _compliance_root(material, body.heat)
     for rows, (volume, stress) in zip(blocks, found, strict=True):
         difference = mean[cells[rows]] - _at_nodes(continuation, stress)
         fields = np.tensordot(mass, difference @ compliance, axes=([1], [1]))
@@ -111,9 +112,12 @@ def _mass_root(cell_type: str) -> np.ndarray:
     return np.linalg.cholesky(mass).T
 
 
-def _compliance_root(material: Material) -> np.ndarray:
-    """(6, 6) symmetric root of the compliance [Pa^-1/2], in the order of `stress`."""
+def _compliance_root(material: Material, heat: Temperatures | None) -> np.ndarray:
+    """(6, 6) symmetric root of the compliance [Pa^-1/2], in the order of `stress`; of the mean
+    temperature, which is enough for an estimate.
+    """
+    mean = None if heat is None else np.asarray(heat.nodal.mean())
     order = [0, 1, 2, 5, 3, 4]
-    compliance = np.linalg.inv(stiffness(material))[np.ix_(order, order)]
+    compliance = np.linalg.inv(stiffness(material, mean))[np.ix_(order, order)]
     values, vectors = np.linalg.eigh(compliance)
     return (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T

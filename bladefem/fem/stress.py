@@ -15,6 +15,7 @@ from ..errors import InputError
 from . import shape_functions as shape
 from .body import Body
 from .elasticity import lame_parameters, stress_of
+from .temperature import point_temperatures, strain_at
 
 VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
@@ -41,6 +42,7 @@ def gauss_stress(
     body: Body,
     u: np.ndarray,
     large: bool = False,
+    heated: bool = False,
 ) -> GaussStress:
     """Stresses in the cells, ordered as ``cells_of(body)``.
 
@@ -49,6 +51,8 @@ def gauss_stress(
             amplitude.
         large: Cauchy stress of a Saint Venant-Kirchhoff body after large displacements (nonlinear
             preload).
+        heated: the displacement is that of the static state, which contains the thermal strain;
+            vibrations do not.
 
     Raises:
         InputError: the field does not fit the mesh, or a complex one with large displacements.
@@ -63,7 +67,7 @@ def gauss_stress(
     if not np.isfinite(u).all():
         raise InputError("displacement has values that are not finite")
     parts = [
-        _of_cells(body, np.asarray(u)[:, : body.dim], name, block, large)
+        _of_cells(body, np.asarray(u)[:, : body.dim], name, block, large, heated)
         for name in body.material
         for block in np.array_split(
             mesh.bodies[name], len(mesh.bodies[name]) // CELLS_PER_BLOCK + 1
@@ -76,6 +80,7 @@ def nodal_stress(
     body: Body,
     u: np.ndarray,
     large: bool = False,
+    heated: bool = False,
 ) -> np.ndarray:
     """(n_points, 6) stresses at the nodes [Pa]: each cell's Gauss points continued to its nodes,
     then the mean over the cells of one material, weighted by volume; 0 outside the body.
@@ -83,7 +88,7 @@ def nodal_stress(
     A node between two materials takes the mean of the material with the larger von Mises stress
     there.
     """
-    found = gauss_stress(body, u, large)
+    found = gauss_stress(body, u, large, heated)
     out = np.zeros((len(body.mesh.points), 6), found.stress.dtype)
     largest = np.full(len(out), -1.0)
     start = 0
@@ -230,6 +235,7 @@ def _of_cells(
     name: str,
     cells: np.ndarray,
     large: bool,
+    heated: bool = False,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, volumes and stresses at the Gauss points of some cells of one material."""
     mesh = body.mesh
@@ -244,10 +250,14 @@ def _of_cells(
     strain = (slope + slope.swapaxes(2, 3)) / 2
     if large:
         strain = strain + slope.swapaxes(2, 3) @ slope / 2
-    stress = stress_of(body.material[name], strain, body.plane)
+    temperature = point_temperatures(body.heat, cells, values)
+    if heated and body.heat is not None and temperature is not None:
+        thermal = strain_at(body.material[name], body.heat, temperature)
+        strain = strain - thermal[..., None, None] * np.eye(d)
+    stress = stress_of(body.material[name], strain, body.plane, temperature)
     across = None
     if d == 2 and body.plane == "strain":
-        lam, _ = lame_parameters(body.material[name], d, body.plane)
+        lam = lame_parameters(body.material[name], d, body.plane)[..., 0]
         across = lam * np.trace(strain, axis1=2, axis2=3)
     if large:
         F = np.eye(d) + slope
@@ -278,7 +288,7 @@ def element_stress(
     """
     d = body.dim
     at, weight = _best_points(body.mesh.cell_type)
-    _, gradients = shape.tabulate(body.mesh.cell_type, at)
+    values, gradients = shape.tabulate(body.mesh.cell_type, at)
     tangents = np.einsum("ckg,qkd->cqgd", body.mesh.points[cells][:, :, :d], gradients)
     depth = body.mesh.depth if d == 2 else 1.0
     volume = (np.abs(np.linalg.det(tangents)) * weight * depth).sum(axis=1)
@@ -286,10 +296,12 @@ def element_stress(
     spatial = gradients @ np.linalg.inv(tangents)
     slope = np.einsum("ckim,cqkj->cqmij", u[cells], spatial, optimize=True)
     strain = (slope + slope.swapaxes(3, 4)) / 2
-    stress = stress_of(body.material[name], strain, body.plane)
+    temperature = point_temperatures(body.heat, cells, values)
+    hot = None if temperature is None else temperature[..., None]
+    stress = stress_of(body.material[name], strain, body.plane, hot)
     across = None
     if d == 2 and body.plane == "strain":
-        lam, _ = lame_parameters(body.material[name], d, body.plane)
+        lam = lame_parameters(body.material[name], d, body.plane)[..., 0]
         across = lam * np.trace(strain, axis1=3, axis2=4)
     return volume, _stress_vector(stress, across)
 

@@ -1,5 +1,5 @@
 """Materials of the named volumes of a user's mesh, from texts such as "disc: E=114 GPa; nu=0.34;
-rho=4430 kg/m^3".
+rho=4430 kg/m^3", and "disc at 600 degC: E=90 GPa" for a row over temperature.
 """
 
 from __future__ import annotations
@@ -21,24 +21,35 @@ def part_materials(scene: Scene) -> dict[str, Material]:
             twice.
     """
     found: dict[str, Material] = {}
+    rows: dict[str, list[str]] = {}
     for text in scene.imported.materials or ():
-        name, colon, values = text.partition(":")
-        name = "_".join(name.lower().split())
-        if not colon or not name or not values.strip() or name in found:
+        head, colon, values = text.partition(":")
+        volume, at, temperature = head.partition(" at ")
+        name = "_".join(volume.lower().split())
+        if not colon or not name or not values.strip() or (name in found and not at):
             raise InputError(
                 f"imported.materials = {text!r}: expected one text for each volume, such as 'disc: "
                 "E=114 GPa; nu=0.34; rho=4430 kg/m^3'"
             )
+        if at:
+            rows.setdefault(name, []).append(f"{temperature}:{values}")
+            continue
+        # rows of another material would overrule the constants given here
         found[name] = replace(
-            scene.material.blade, **dict(_parse_property(item, text) for item in values.split(";"))
+            scene.material.blade,
+            table=None,
+            **dict(_parse_property(item, text) for item in values.split(";")),
         )
+    for name, texts in rows.items():
+        material = found.get(name, scene.material.blade)
+        found[name] = replace(material, table=tuple(texts))
     return found
 
 
 def _parse_property(item: str, text: str) -> tuple[str, Any]:
     """One property."""
     name, _, value = (part.strip() for part in item.partition("="))
-    known = [each.name for each in fields(Material)]
+    known = [each.name for each in fields(Material) if each.name != "table"]
     if name not in known:
         raise InputError(
             f"imported.materials = {text!r}: '{name}' is no property{suggestion(name, known)}"

@@ -53,6 +53,19 @@ class Material:
         2 * pi,
         "of the crystal: about the blade's x (radial), the new y, the new z",
     )
+    expansion: float | None = quantity(
+        None,
+        "1/K",
+        -1e-4,
+        1e-3,
+        "thermal expansion, mean coefficient from temperature.reference; needed where the "
+        "temperature is another one",
+    )
+    table: tuple[str, ...] | None = quantity(
+        None,
+        help="rows of properties over temperature, such as '600 degC: E=180 GPa; nu=0.31; "
+        "expansion=1.4e-5 1/K', linear in between; what no row gives stays constant",
+    )
 
 
 @dataclass(frozen=True)
@@ -185,6 +198,25 @@ class Operation:
     )
     damping: float = quantity(
         0.001, "1", 0.0, 0.5, "modal damping ratio of all modes without friction"
+    )
+
+
+@dataclass(frozen=True)
+class Temperature:
+    """How hot the bodies are. Nothing given: properties at reference temperature, no thermal
+    stress.
+    """
+
+    uniform: float | None = quantity(
+        None, "K", 0.0, 5000.0, "of blade and damper, such as '650 degC'"
+    )
+    file: str = quantity(
+        "",
+        help="CSV file of places and temperatures, columns x, y, z, T with units in brackets such "
+        "as 'T [degC]' (m and K without), interpolated; relative to the scene file",
+    )
+    reference: float = quantity(
+        293.15, "K", 0.0, 5000.0, "at which the bodies are as drawn and free of thermal stress"
     )
 
 
@@ -429,7 +461,8 @@ class Imported:
     )
     materials: tuple[str, ...] | None = quantity(
         None,
-        help="materials of named volumes: 'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'",
+        help="materials of named volumes: 'disc: E=114 GPa; nu=0.34; rho=4430 kg/m^3'; rows over "
+        "temperature as 'disc at 600 degC: E=90 GPa'",
     )
     names: tuple[str, ...] | None = quantity(
         None,
@@ -488,6 +521,7 @@ class Scene:
     material: Materials = field(default_factory=Materials)
     contact: Contact = field(default_factory=Contact)
     operation: Operation = field(default_factory=Operation)
+    temperature: Temperature = field(default_factory=Temperature)
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     mistuning: Mistuning = field(default_factory=Mistuning)

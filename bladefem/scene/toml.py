@@ -95,6 +95,11 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
         scene = dataclasses.replace(
             scene, mistuning=dataclasses.replace(scene.mistuning, pattern=whole)
         )
+    if scene.temperature.file:
+        whole = str((Path(folder) / scene.temperature.file).resolve())
+        scene = dataclasses.replace(
+            scene, temperature=dataclasses.replace(scene.temperature, file=whole)
+        )
     validate(scene)
     return scene
 

@@ -15,46 +15,49 @@ from numbers import Real
 
 from ..errors import InputError
 
-# unit: (factor to SI, exponents of kg, m, s, rad)
+# unit: (factor to SI, exponents of kg, m, s, rad, K)
 _UNITS = {
-    "m": (1.0, (0, 1, 0, 0)),
-    "mm": (1e-3, (0, 1, 0, 0)),
-    "cm": (1e-2, (0, 1, 0, 0)),
-    "km": (1e3, (0, 1, 0, 0)),
-    "um": (1e-6, (0, 1, 0, 0)),
-    "nm": (1e-9, (0, 1, 0, 0)),
-    "in": (0.0254, (0, 1, 0, 0)),
-    "kg": (1.0, (1, 0, 0, 0)),
-    "g": (1e-3, (1, 0, 0, 0)),
-    "mg": (1e-6, (1, 0, 0, 0)),
-    "t": (1e3, (1, 0, 0, 0)),
-    "s": (1.0, (0, 0, 1, 0)),
-    "ms": (1e-3, (0, 0, 1, 0)),
-    "us": (1e-6, (0, 0, 1, 0)),
-    "min": (60.0, (0, 0, 1, 0)),
-    "h": (3600.0, (0, 0, 1, 0)),
-    "N": (1.0, (1, 1, -2, 0)),
-    "mN": (1e-3, (1, 1, -2, 0)),
-    "kN": (1e3, (1, 1, -2, 0)),
-    "MN": (1e6, (1, 1, -2, 0)),
-    "Pa": (1.0, (1, -1, -2, 0)),
-    "kPa": (1e3, (1, -1, -2, 0)),
-    "MPa": (1e6, (1, -1, -2, 0)),
-    "GPa": (1e9, (1, -1, -2, 0)),
-    "bar": (1e5, (1, -1, -2, 0)),
-    "J": (1.0, (1, 2, -2, 0)),
-    "mJ": (1e-3, (1, 2, -2, 0)),
-    "W": (1.0, (1, 2, -3, 0)),
-    "Hz": (1.0, (0, 0, -1, 0)),
-    "kHz": (1e3, (0, 0, -1, 0)),
-    "rad": (1.0, (0, 0, 0, 1)),
-    "mrad": (1e-3, (0, 0, 0, 1)),
-    "deg": (pi / 180, (0, 0, 0, 1)),
-    "rev": (2 * pi, (0, 0, 0, 1)),
-    "rpm": (2 * pi / 60, (0, 0, -1, 1)),
-    "%": (1e-2, (0, 0, 0, 0)),
-    "1": (1.0, (0, 0, 0, 0)),
+    "m": (1.0, (0, 1, 0, 0, 0)),
+    "mm": (1e-3, (0, 1, 0, 0, 0)),
+    "cm": (1e-2, (0, 1, 0, 0, 0)),
+    "km": (1e3, (0, 1, 0, 0, 0)),
+    "um": (1e-6, (0, 1, 0, 0, 0)),
+    "nm": (1e-9, (0, 1, 0, 0, 0)),
+    "in": (0.0254, (0, 1, 0, 0, 0)),
+    "kg": (1.0, (1, 0, 0, 0, 0)),
+    "g": (1e-3, (1, 0, 0, 0, 0)),
+    "mg": (1e-6, (1, 0, 0, 0, 0)),
+    "t": (1e3, (1, 0, 0, 0, 0)),
+    "s": (1.0, (0, 0, 1, 0, 0)),
+    "ms": (1e-3, (0, 0, 1, 0, 0)),
+    "us": (1e-6, (0, 0, 1, 0, 0)),
+    "min": (60.0, (0, 0, 1, 0, 0)),
+    "h": (3600.0, (0, 0, 1, 0, 0)),
+    "N": (1.0, (1, 1, -2, 0, 0)),
+    "mN": (1e-3, (1, 1, -2, 0, 0)),
+    "kN": (1e3, (1, 1, -2, 0, 0)),
+    "MN": (1e6, (1, 1, -2, 0, 0)),
+    "Pa": (1.0, (1, -1, -2, 0, 0)),
+    "kPa": (1e3, (1, -1, -2, 0, 0)),
+    "MPa": (1e6, (1, -1, -2, 0, 0)),
+    "GPa": (1e9, (1, -1, -2, 0, 0)),
+    "bar": (1e5, (1, -1, -2, 0, 0)),
+    "J": (1.0, (1, 2, -2, 0, 0)),
+    "mJ": (1e-3, (1, 2, -2, 0, 0)),
+    "W": (1.0, (1, 2, -3, 0, 0)),
+    "Hz": (1.0, (0, 0, -1, 0, 0)),
+    "kHz": (1e3, (0, 0, -1, 0, 0)),
+    "rad": (1.0, (0, 0, 0, 1, 0)),
+    "mrad": (1e-3, (0, 0, 0, 1, 0)),
+    "deg": (pi / 180, (0, 0, 0, 1, 0)),
+    "rev": (2 * pi, (0, 0, 0, 1, 0)),
+    "rpm": (2 * pi / 60, (0, 0, -1, 1, 0)),
+    "K": (1.0, (0, 0, 0, 0, 1)),
+    "%": (1e-2, (0, 0, 0, 0, 0)),
+    "1": (1.0, (0, 0, 0, 0, 0)),
 }
+# scales of temperature that do not start at absolute zero: [K] of their zero
+_ZEROS = {"degC": 273.15, "°C": 273.15, "C": 273.15}
 _SPELLINGS = {
     "µm": "um",
     "μm": "um",
@@ -79,6 +82,7 @@ _READABLE = {
     "N/m^3": ("N/mm^3",),
     "N/m": ("N/m",),
     "J": ("J", "mJ"),
+    "K": ("K",),
 }
 _NUMBER = re.compile(
     r"\s*([+-]?(?:\d[\d_]*\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)\b)\s*"
@@ -115,6 +119,8 @@ def parse(
         raise InputError(f"{name} = {shortened(value)}: expected a finite number{_in_unit(unit)}")
     if not written:
         return number
+    if unit == "K" and written in _ZEROS:
+        return number + _ZEROS[written]
     factor, dimension = _parse_dimension(written, f"{name} = {shortened(value)}")
     _, wanted = _parse_dimension(unit, name)
     if dimension != wanted:
@@ -202,7 +208,7 @@ def _parse_dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
         raise InputError(f"{where}: unknown unit '{shortened(text, 20)}'")
     # exact: 7.85 g/cm^3 is 7850, not 7849.999...
     factor = Fraction(1)
-    exponents = [0, 0, 0, 0]
+    exponents = [0, 0, 0, 0, 0]
     for place, part in enumerate(text.replace("**", "^").split("/")):
         for word in filter(None, re.split(r"[ *·]+", part)):
             size, dimension, power = _parse_unit(word, where)
@@ -249,5 +255,5 @@ def _in_unit(unit: str) -> str:
 def _unit_examples(unit: str) -> str:
     if unit == "1":
         return "a plain number or %"
-    known = [*_READABLE.get(unit, ()), unit]
+    known = [*_READABLE.get(unit, ()), *(("degC",) if unit == "K" else ()), unit]
     return " or ".join(dict.fromkeys(known))

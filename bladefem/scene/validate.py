@@ -15,8 +15,11 @@ from ..errors import InputError
 from .fields import convert, each_field, value_at
 from .kinds import kind_named
 from .kinds.conditions import at_most
+from .material_table import expands, material_at, operating_temperature
+from .part_materials import part_materials
 from .support import area_springs, held_letters
 from .tables import Scene
+from .temperature_file import read_temperatures
 from .units import show
 from .validate_contact import contact_problems
 
@@ -38,6 +41,7 @@ def validate(scene: Scene) -> None:
     problems = [
         *kind.conditions(scene),
         *_check_crystals(scene),
+        *_check_temperature(scene),
         *_check_supports(scene),
         *_check_numerics(scene),
         *contact_problems(scene),
@@ -74,6 +78,38 @@ def _check_crystals(scene: Scene) -> Iterator[str]:
             yield (
                 f"material.{name}.orthotropic has {len(constants)} values, expected E1, E2, E3, "
                 "nu12, nu13, nu23, G12, G13, G23"
+            )
+
+
+def _check_temperature(scene: Scene) -> Iterator[str]:
+    """Tables can be read and hold the temperature; an expansion is known where it is needed."""
+    given = scene.temperature
+    named = {f"material.{name}": getattr(scene.material, name) for name in ("blade", "damper")}
+    if "temperature" not in kind_named(scene.kind).tables:
+        for name, material in named.items():
+            if material.table is not None:
+                yield (
+                    f"{name}.table: a scene of kind '{scene.kind}' has no temperature, expected "
+                    "constants"
+                )
+        return
+    if given.uniform is not None and given.file:
+        yield "temperature.file: expected either a file or temperature.uniform, not both"
+    hottest = coldest = operating_temperature(scene)
+    if given.file:
+        values = read_temperatures(given.file)[1]
+        coldest, hottest = float(values.min()), float(values.max())
+    if kind_named(scene.kind).name == "imported":
+        named |= {f"imported.materials, {name}": m for name, m in part_materials(scene).items()}
+    hot = given.file or (given.uniform is not None and given.uniform != given.reference)
+    for name, material in named.items():
+        for temperature in (coldest, hottest):
+            material_at(material, temperature)
+        if hot and not expands(material):
+            yield (
+                f"{name}.expansion is missing: the temperature differs from "
+                f"temperature.reference = {show(given.reference, 'K')}, expected the material's "
+                "thermal expansion such as 1.2e-5 1/K (0 for none)"
             )
 
 

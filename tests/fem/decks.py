@@ -207,6 +207,55 @@ def bar():
     )
 
 
+# reference temperature [K], and rows of temperature [K]: E, nu, expansion, density
+REFERENCE = 293.15
+ROWS = {
+    293.15: (2.1e11, 0.30, 1.10e-5, 8200.0),
+    600.0: (1.9e11, 0.31, 1.25e-5, 8150.0),
+    1000.0: (1.5e11, 0.34, 1.50e-5, 8050.0),
+}
+
+
+def heat_table():
+    """The rows as texts of a scene."""
+    return tuple(
+        f"{T} K: E={E} Pa; nu={nu}; expansion={a} 1/K; rho={rho} kg/m^3"
+        for T, (E, nu, a, rho) in ROWS.items()
+    )
+
+
+def temperature(points):
+    """(n,) [K] of places: hot at one end and on one side."""
+    x, y = points[:, 0] / 0.12, points[:, 1] / 0.03
+    return 300.0 + 500.0 * x**2 + 150.0 * y * (1 - 0.5 * x)
+
+
+def heated_job(m, hot, count, uniform=None, nlgeom=False):
+    """A bar for CalculiX, clamped at the end and at the node set ``far``, heated, then its modes
+    about that state.
+    """
+    n = len(m.points)
+    hot = hot if uniform is None else np.full(n, uniform)
+    return "\n".join(
+        [
+            *flat_deck(m, {}),
+            *["*MATERIAL, NAME=HOT", "*ELASTIC"],
+            *[f"{E}, {nu}, {T}" for T, (E, nu, _, _) in ROWS.items()],
+            f"*EXPANSION, ZERO={REFERENCE}",
+            *[f"{a}, {T}" for T, (_, _, a, _) in ROWS.items()],
+            "*DENSITY",
+            *[f"{rho}, {T}" for T, (*_, rho) in ROWS.items()],
+            "*SOLID SECTION, ELSET=EALL, MATERIAL=HOT",
+            *["*INITIAL CONDITIONS, TYPE=TEMPERATURE", f"NALL, {REFERENCE}"],
+            *["*BOUNDARY", "clamp, 1, 3", "far, 1, 3"],
+            *[f"*STEP{', NLGEOM' * nlgeom}", "*STATIC", "*TEMPERATURE"],
+            *[f"{i}, {T:.12e}" for i, T in enumerate(hot, 1)],
+            *["*NODE PRINT, NSET=NALL", "U", "*END STEP"],
+            *["*STEP, PERTURBATION", "*FREQUENCY", str(count), "*END STEP\n"],
+        ]
+    )
+
+
 def surface_lines(m, name):
     """A surface made of labelled element faces, through internal element sets as CAE writes
     them.

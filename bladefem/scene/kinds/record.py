@@ -14,7 +14,15 @@ from ..tables import Scene
 # tables that every kind reads
 COMMON_TABLES = ("mesh", "material", "contact", "study", "model")
 # tables of the kinds that vibrate in an engine
-ENGINE_TABLES = (*COMMON_TABLES, "operation", "excitation", "solver", "support", "fatigue")
+ENGINE_TABLES = (
+    *COMMON_TABLES,
+    "operation",
+    "temperature",
+    "excitation",
+    "solver",
+    "support",
+    "fatigue",
+)
 
 
 def no_conditions(_: Scene) -> Iterator[str]:

@@ -189,10 +189,10 @@ def half_widths(response: Forced) -> np.ndarray:
 
 
 def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
-    """(n_points, dim) displacement [m] by the rotation and a steady load [N] that is the same on
+    """(n_points, dim) displacement [m] by rotation, heat and a steady load [N] that is the same on
     all blades.
     """
-    offset = bodies.scene.operation.speed**2 * bodies.swell
+    offset = bodies.scene.operation.speed**2 * bodies.swell + bodies.thermal_displacement
     if load is None:
         return offset
     return (

@@ -144,19 +144,26 @@ def read_damping(text: str) -> Damping:
     return Damping(**values)
 
 
+# name of the static state, without and with thermal strain
+STATIC_STATES = {False: "rotation", True: "rotation and heat"}
+
+
 def stress_states(
     bodies: Bodies,
     modes: ModeSet,
     count: int,
     found: Answer | None = None,
 ) -> dict[str, np.ndarray]:
-    """Displacements (n_points, 3) [m] by name: of rotation, of modes scaled to 1 mm, of
+    """Displacements (n_points, 3) [m] by name: of rotation and heat, of modes scaled to 1 mm, of
     resonances.
     """
+    from ...fem.rotation import has_thermal_strain
+
     states = {}
-    if bodies.scene.operation.speed > 0:
+    heated = has_thermal_strain(bodies.still_blade)
+    if bodies.scene.operation.speed > 0 or heated:
         u0 = static_offset(bodies)
-        states["rotation"] = np.pad(u0, ((0, 0), (0, 3 - u0.shape[1])))
+        states[STATIC_STATES[heated]] = np.pad(u0, ((0, 0), (0, 3 - u0.shape[1])))
     for i, shape in enumerate(modes.shapes[:count]):
         largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
         # it swings to both sides
@@ -183,10 +190,11 @@ def stress_table(
     fields = {}
     cells = {}
     for name, u in states.items():
-        stress = nodal_stress(bodies.still_blade, u)
+        heated = name == STATIC_STATES[True]
+        stress = nodal_stress(bodies.still_blade, u, heated=heated)
         size = von_mises(stress)
         sides = principal_stresses(stress)
-        inside = von_mises(gauss_stress(bodies.still_blade, u).stress).max(1)
+        inside = von_mises(gauss_stress(bodies.still_blade, u, heated=heated).stress).max(1)
         worst, fields[name] = size.argmax(), {"von Mises": size, "largest principal": sides[:, 0]}
         cells[name] = {"von Mises at Gauss points": _of_all_bodies(bodies, inside)}
         # motion swings to both sides: its smallest is minus the largest

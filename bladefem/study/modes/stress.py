@@ -1,5 +1,5 @@
 """What the amplitude means for the blade's life: stress of the mode studied, next to that of
-rotation.
+rotation and heat.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ class Strength:
     alternating: float
     # (3,) where [m]
     alternating_at: RealArray
-    # of rotation [Pa]; 0 at rest
+    # of rotation and heat [Pa]; 0 at rest in a body without heat
     steady: float
     # (3,)
     steady_at: RealArray
-    # (n_points,) of rotation at the nodes, as signed von Mises stress [Pa]; 0 at rest
+    # (n_points,) of rotation and heat at the nodes, as signed von Mises stress [Pa]
     mean: RealArray
 
 
@@ -42,6 +42,7 @@ def strength(bodies: Bodies, modes: ModeSet) -> Strength:
     Args:
         modes: of the nodal diameter that the engine order excites.
     """
+    from ...fem.rotation import has_thermal_strain
     from ...fem.stress import nodal_stress, signed_von_mises
 
     excitation = bodies.scene.excitation
@@ -54,18 +55,20 @@ def strength(bodies: Bodies, modes: ModeSet) -> Strength:
     rest = 0.0, np.full(3, np.nan)
     mean = np.zeros(len(bodies.mesh.points))
     steady, place = rest
-    if bodies.scene.operation.speed > 0:
+    if bodies.scene.operation.speed > 0 or has_thermal_strain(bodies.still_blade):
         offset = static_offset(bodies)
-        steady, place = _worst_place(bodies, offset)
-        mean = signed_von_mises(nodal_stress(bodies.still_blade, offset))
+        steady, place = _worst_place(bodies, offset, heated=True)
+        mean = signed_von_mises(nodal_stress(bodies.still_blade, offset, heated=True))
     return Strength(excitation.mode, alternating, there, steady, place, mean)
 
 
-def _worst_place(bodies: Bodies, u: np.ndarray) -> tuple[float, np.ndarray]:
-    """Largest von Mises stress [Pa] of displacements (n_points, d) and its place (3,) [m]."""
+def _worst_place(bodies: Bodies, u: np.ndarray, heated: bool = False) -> tuple[float, np.ndarray]:
+    """Largest von Mises stress [Pa] of displacements (n_points, d) and its place (3,) [m]; heated:
+    of the static state.
+    """
     from ...fem.stress import gauss_stress, von_mises
 
-    found = gauss_stress(bodies.still_blade, u)
+    found = gauss_stress(bodies.still_blade, u, heated=heated)
     size = von_mises(found.stress)
     worst = np.unravel_index(size.argmax(), size.shape)
     return float(size[worst]), found.points[worst]

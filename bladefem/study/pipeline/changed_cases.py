@@ -20,6 +20,7 @@ from ...contact.numerical_stiffness import numerical_stiffness, split_stiffness,
 from ...contact.seating import ContactProblem
 from ...contact.seating import solve_seating as seat
 from ...data import PressureMap
+from ...scene.material_table import operating_materials
 from ...scene.tables import Contact, Scene, Seat
 from .assemble_model import LoadCase
 from .history import seat_by_history
@@ -39,7 +40,7 @@ def seated_case(
         maps: static pressure of each patch under the mean normal load [N] of a seat.
         tangents: 2 for solids, 1 for plane models.
     """
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    ratio = pair_ratio(*operating_materials(scene))
     elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
     # a layer that is given is that of the seating as well, however stiff
     stiffest = stiffest_layer(problem) if scene.contact.stiffness == "rigid" else np.inf
@@ -87,7 +88,7 @@ def changed_cases(
     "kt", "kn", "roughness" and "mu" change [contact] on both seats; "seat friction" the normal load
     that a nominal one makes; "damping" no contact.
     """
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    ratio = pair_ratio(*operating_materials(scene))
 
     @lru_cache(maxsize=64)
     def changed(name: str, factor: float) -> Callable[[float], LoadCase]:

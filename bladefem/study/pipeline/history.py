@@ -22,6 +22,7 @@ from ...contact.interface_elements import interface_law, layer_friction, pair_ra
 from ...contact.patch import rigid_ports
 from ...data import Patch
 from ...errors import InputError
+from ...scene.material_table import operating_materials
 from ...scene.tables import Scene
 from .stages import Bodies, seat_clearance
 
@@ -83,7 +84,7 @@ def seat_by_history(
         normal: wanted mean normal load of a seat at the operating speed [N]; None: by the damper's
             own mass.
     """
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    ratio = pair_ratio(*operating_materials(scene))
     law = interface_law(problem.patches, scene.contact, ratio)
     kt, mu = _layer(scene, problem.patches)
     return seat_with_friction(
@@ -154,7 +155,7 @@ def _without_friction(problem: FrictionalProblem, load: np.ndarray) -> float:
 
 
 def _layer(scene: Scene, patches: Sequence[Patch]) -> tuple[np.ndarray, np.ndarray]:
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    ratio = pair_ratio(*operating_materials(scene))
     return layer_friction(patches, scene.contact, ratio)
 
 

@@ -44,6 +44,7 @@ STAGE_INPUTS = {
             "operation.speed",
             "operation.stiffening",
             "operation.preload",
+            "temperature",
             "excitation.engine_order",
             "model.nodal_diameters",
             "solver",
@@ -65,6 +66,7 @@ STAGE_INPUTS = {
             "operation.speed",
             "operation.stiffening",
             "operation.preload",
+            "temperature",
             "support",
             "damper.mass",
             "plane.damper_mass",
@@ -153,6 +155,8 @@ def stage_key(name: str, scene: Scene, *more: Any) -> str:
     values = [_without(scene, field, STAGE_INPUTS[name]) for field in declared_fields(name, scene)]
     keys = [stage_key(earlier, scene) for earlier in STAGE_INPUTS[name].after]
     stamp = _file_stamp(scene) if name == "mesh" else []
+    if "temperature" in STAGE_INPUTS[name].fields and scene.temperature.file:
+        stamp = [Path(scene.temperature.file).stat().st_mtime]
     return key_of(name, keys, values, code_of(*STAGE_INPUTS[name].code), stamp, *more)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -12,7 +12,7 @@ import numpy as np
 from geometry.mesh import Mesh, sector_of
 
 from ...contact.interface_elements import pair_ratio, with_interface_law
-from ...contact.patch import make_patch
+from ...contact.patch import make_patch, normal_ports, port_matrix
 from ...contact.seating import ContactProblem, spin_axis
 from ...data import ModeSet, Patch, PortModel
 from ...errors import InputError, suggestion
@@ -20,9 +20,11 @@ from ...io.stage_cache import on_root
 from ...reduction.assemble import folded_diameter
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
+from ...scene.material_table import operating_materials, operating_temperature
 from ...scene.part_materials import part_materials
 from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
+from ...scene.temperature_file import read_temperatures
 from ...util.communicator import Communicator
 from ...util.progress import Progress, unwatched
 from .ports import Ports, blade_ports, damper_ports
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
     from ...fem.constraint import Transformation
     from ...fem.eigensolver import Eigensolver
     from ...fem.flexibility import Flexibility
+    from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
 # of each nodal diameter, in tables and pictures
@@ -48,11 +51,12 @@ class Bodies:
     """Blade and damper as finite elements, assembled and factorised when first asked for, then
     kept.
 
-    Vibrations use the stiffness under rotation (stress stiffening, spin softening) about the linear
-    preload, or about the nonlinear one where ``operation.preload`` says so. Seating the damper uses
-    the elastic stiffness at rest, under the whole centrifugal load: both are first-order theory, in
-    which displacements grow with the square of the speed, and the stiffness under rotation would
-    count the rotation twice. For static displacements the difference is of the order of the strain.
+    Vibrations use the stiffness under rotation (stress stiffening, spin softening) and thermal
+    stress about the linear preload, or about the nonlinear one where ``operation.preload`` says so.
+    Seating the damper uses the elastic stiffness at rest, under the whole centrifugal load: both
+    are first-order theory, in which displacements grow with the square of the speed, and the
+    stiffness under rotation would count the rotation twice. For static displacements the difference
+    is of the order of the strain.
     """
 
     scene: Scene
@@ -87,6 +91,27 @@ class Bodies:
         """The bodies on a group of ranks."""
         return self.alone if part.size == 1 else Bodies(self.scene, self.mesh, part, self.progress)
 
+    def heat(self, materials: Iterable[Material]) -> Temperatures | None:
+        """Temperatures of the nodes; None where neither the scene gives some nor a material has a
+        table.
+        """
+        from ...fem.temperature import Temperatures
+
+        given = self.scene.temperature
+        if given.file:
+            return Temperatures(self.temperatures_of_file, given.reference)
+        if given.uniform is None and all(material.table is None for material in materials):
+            return None
+        nodal = np.full(len(self.mesh.points), operating_temperature(self.scene))
+        return Temperatures(nodal, given.reference)
+
+    @cached_property
+    def temperatures_of_file(self) -> np.ndarray:
+        """(n_points,) [K]."""
+        from ...fem.temperature_field import interpolate_temperatures
+
+        return interpolate_temperatures(self.mesh, *read_temperatures(self.scene.temperature.file))
+
     @cached_property
     def still_blade(self) -> Body:
         """The blade at rest."""
@@ -94,25 +119,26 @@ class Bodies:
         from ...fem.supports import AreaSpring, supported
 
         mesh, materials = blade_parts(self.scene, self.mesh)
-        body = assemble(mesh, tuple(materials), materials, self.comm)
+        heat = self.heat(materials.values())
+        body = assemble(mesh, tuple(materials), materials, self.comm, heat=heat)
         support = self.scene.support
         springs = [AreaSpring(*spring) for spring in area_springs(support)]
         return supported(body, support.clamp, springs, held_letters(support))
 
     @cached_property
     def blade(self) -> Body:
-        """The blade, with the stiffness that it has under rotation."""
+        """The blade, with the stiffness that it has under rotation and heat."""
         return self.blade_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
 
     def blade_at(self, speed: float) -> Body:
         """The blade with its stiffness at a speed [rad/s]."""
-        from ...fem.rotation import body_under_rotation, linear_tangent
+        from ...fem.rotation import body_under_rotation, has_thermal_strain, linear_tangent
 
-        if speed == 0:
+        if speed == 0 and not has_thermal_strain(self.still_blade):
             return self.still_blade
         if self.scene.operation.preload == "nonlinear":
             return body_under_rotation(self.still_blade, speed, "clamp", spin_axis(self.mesh))
-        u0 = speed**2 * self.swell
+        u0 = speed**2 * self.swell + self.thermal_displacement
         return replace(
             self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh))
         )
@@ -125,18 +151,24 @@ class Bodies:
         return unit_speed_displacement(self.still, spin_axis(self.mesh))
 
     @cached_property
+    def thermal_displacement(self) -> np.ndarray:
+        """(n_points, dim) linear displacement of the blade by its temperatures [m]."""
+        from ...fem.rotation import has_thermal_strain, thermal_displacement
+
+        if not has_thermal_strain(self.still_blade):
+            return np.zeros((len(self.mesh.points), self.mesh.dimension))
+        return thermal_displacement(self.still)
+
+    @cached_property
     def damper(self) -> Flexibility:
         """The floating damper."""
         from ...fem.body import assemble
         from ...fem.constraint import constrain
         from ...fem.flexibility import flexible
 
-        return flexible(
-            constrain(
-                assemble(self.mesh, "damper", _damper_material(self.scene, self.mesh), self.comm),
-                clamp=None,
-            )
-        )
+        material = _damper_material(self.scene, self.mesh)
+        body = assemble(self.mesh, "damper", material, self.comm, heat=self.heat([material]))
+        return flexible(constrain(body, clamp=None))
 
     @cached_property
     def frame(self) -> Transformation:
@@ -365,7 +397,7 @@ def seat_damper(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
 
 def on_layer(scene: Scene, problem: ContactProblem) -> ContactProblem:
     """A contact problem with the scene's interface layer between its faces."""
-    ratio = pair_ratio(scene.material.blade, scene.material.damper)
+    ratio = pair_ratio(*operating_materials(scene))
     return with_interface_law(problem, scene.contact, ratio)
 
 
@@ -374,9 +406,27 @@ def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     from ...contact.frictional_seating import hold_axially
     from ...contact.seating import contact_problem
 
-    gap = seat_clearance(bodies, patches)
+    gap = seat_clearance(bodies, patches) + _thermal_gap(bodies, patches)
     problem = contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
     return hold_axially(problem) if bodies.scene.damper.axial == "held" else problem
+
+
+def _thermal_gap(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
+    """(n,) gap of the seats that the thermal strains of blade and damper open [m]."""
+    from ...fem.rotation import has_thermal_strain, thermal_displacement
+
+    mesh = bodies.mesh
+    ports = normal_ports(patches, mesh)
+    if not has_thermal_strain(bodies.still_blade):
+        return np.zeros(len(ports))
+    blade, damper = (
+        port_matrix(patches, mesh, side)[:, ports].T @ moved.ravel()
+        for side, moved in (
+            ("blade", bodies.thermal_displacement),
+            ("damper", thermal_displacement(bodies.damper)),
+        )
+    )
+    return np.asarray(damper - blade)
 
 
 def seat_clearance(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
@@ -536,4 +586,5 @@ def _damper_material(scene: Scene, mesh: Mesh) -> Material:
     given = value_at(scene, kind_named(scene.kind).damper_mass)
     if given is None:
         return scene.material.damper
-    return replace(scene.material.damper, rho=given / body_volume(mesh, "damper"))
+    # constants, lest a table of densities overrule the mass
+    return replace(operating_materials(scene)[1], rho=given / body_volume(mesh, "damper"))
