@@ -11,7 +11,7 @@ from bladefem.errors import InputError
 from bladefem.util.arrays import RealArray
 
 from .parameters import Aerofoil, Disc, Shroud
-from .section import POINTS, outline, placement
+from .section import outline, placement
 
 # of the shroud's thickness: between the aerofoil's skin and an edge of the block
 MARGIN = 0.3
@@ -51,7 +51,8 @@ def shroud_block(
     middle = aerofoil.span - half if at_tip else shroud.at * aerofoil.span
     _check_height(shroud, aerofoil, middle)
     shares = (middle + half * np.linspace(-1, 1, SECTIONS)) / aerofoil.span
-    rings = np.vstack([outline(aerofoil, top, t) for t in shares])[:, 1:]
+    sections = np.array([outline(aerofoil, top, t) for t in shares])[:, :, 1:]
+    rings = sections.reshape(-1, 2)
     centre = placement(aerofoil, top, middle / aerofoil.span)[0][1:]
     reach = np.abs(rings - centre).max(axis=0)
     margin = MARGIN * shroud.thickness
@@ -68,8 +69,9 @@ def shroud_block(
     if at_tip:
         _check_cover(shroud, np.array([width, length]), reach, margin)
     else:
-        edges = [outline(aerofoil, top, t)[[0, POINTS - 1, -1], 2] for t in shares]
-        _check_snubber(width, length, rings - centre, np.array(edges) - centre[1], margin)
+        # the outline starts and ends at the trailing edge, the leading one is its middle
+        edges = sections[:, [0, sections.shape[1] // 2, -1], 1] - centre[1]
+        _check_snubber(width, length, rings - centre, edges, margin)
     size = np.array([shroud.thickness, width, length])
     place = np.array([top + middle, *centre])
     return Block(place - size / 2, place + size / 2, at_tip)
