@@ -11,6 +11,7 @@ from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution
 from ...hbm.sweep import MAX_PATH_UNKNOWNS, size
+from .cheaper_settings import cheaper_settings
 from .check_points import (
     CHECKED_HEIGHT_SHARES,
     MAX_CHECKED_PEAKS,
@@ -128,7 +129,8 @@ def _chosen(
     """
     try:
         peak = peak_from(family, settings, top, settings, accuracy)
-        return choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
+        enough = choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
+        return cheaper_settings(family, *enough, accuracy)
     except NotSolvedError:
         return replace(settings, error=np.inf), None, None
 

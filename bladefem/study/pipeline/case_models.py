@@ -15,6 +15,7 @@ from geometry.mesh import Mesh
 from ...data import Patch
 from ...reduction.truncate import truncated
 from ...scene.tables import Scene
+from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
@@ -143,9 +144,8 @@ def reduced_sector(
         with named(case, model, mode, scene.excitation.force):
             rough = covered_band(model, settings, scene.study.band, mode, 1.0)
             peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
-        settings, _, found = choose_at_peak(
-            family, settings, peak, scene.accuracy, fixed=("modes",)
-        )
+        enough = choose_at_peak(family, settings, peak, scene.accuracy, fixed=("modes",))
+        settings, _, found = cheaper_settings(family, *enough, scene.accuracy)
         more = enriched_settings(settings, "modes")
         known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
         if not known or found.needs["modes"] <= scene.accuracy / 10 or more is None:

@@ -1,0 +1,114 @@
+"""Settings that hold at a peak, made poorer again where that costs less than it saves.
+
+A choice only climbs, in steps of several at once where an error is large, and takes over the damper
+model of another load. Here each respect that was chosen is tried one step poorer: the peak of the
+poorer model takes a few points, the curve that is swept next takes many.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ...errors import NotSolvedError
+from ...hbm.peak import Peak
+from .family import Family, family_member, lowest_harmonics
+from .resonance_choice import (
+    SHIFT_WEIGHT,
+    SUFFICIENT_SHARE,
+    PeakErrors,
+    peak_from,
+    rattles,
+)
+from .settings import DAMPER_MODELS, FIRST_SETTINGS, Settings
+
+# points of the sweep that follows a choice
+CURVE_POINTS = 40
+# points that the peak of a poorer model takes
+PEAK_POINTS = 5
+# how many times larger the error of a respect becomes by one step back, roughly: by half the
+# harmonics, or half the samples or points, whose errors are of second order
+ERROR_GROWTH = {"harmonics": 8.0, "samples": 4.0, "points": 4.0, "damper": 1.0}
+
+
+def cheaper_settings(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    errors: PeakErrors,
+    accuracy: float,
+) -> tuple[Settings, Peak, PeakErrors]:
+    """Settings from `choose_at_peak`, poorer in what is not needed; the peak with them, and its
+    errors.
+
+    A respect is made poorer where the error that its step back is expected to leave fits into the
+    accuracy, where the sweep that follows saves more than the poorer peak takes, and where that
+    peak lies as near as the accuracy asks for. What it differs by is added to the errors.
+    """
+    left = SUFFICIENT_SHARE * accuracy - sum(errors.needs.values())
+    for name, growth in ERROR_GROWTH.items():
+        poorer = _one_step_back(family, settings, name)
+        if poorer is None or left <= 0:
+            continue
+        expected = (growth - 1) * errors.needs[name]
+        if expected > left or not _saves(family, settings, poorer):
+            continue
+        try:
+            found = peak_from(family, settings, peak.solution, poorer, accuracy, fallbacks=False)
+        except NotSolvedError:
+            continue
+        height = abs(found.height / peak.height - 1)
+        shift = abs(found.omega / peak.omega - 1)
+        if max(height, SHIFT_WEIGHT * shift) > left or rattles(poorer, found.solution):
+            continue
+        errors = _with_error(errors, name, height, shift)
+        settings = replace(poorer, error=errors.total)
+        peak = found
+        left = SUFFICIENT_SHARE * accuracy - sum(errors.needs.values())
+    return settings, peak, errors
+
+
+def _one_step_back(family: Family, settings: Settings, name: str) -> Settings | None:
+    """Poorer settings in one respect; None where it is the user's, or the poorest already."""
+    value = getattr(settings, name)
+    if name not in settings.chosen or value is None:
+        return None
+    if name == "damper":
+        # the damper as a mass is no poorer model of the same thing: it has no rotation
+        elastic = value == DAMPER_MODELS[-1] and FIRST_SETTINGS["damper"] in family.dampers
+        return replace(settings, damper=FIRST_SETTINGS["damper"]) if elastic else None
+    least = FIRST_SETTINGS[name]
+    if name == "harmonics":
+        least = max(least, lowest_harmonics(family, settings))
+    if name == "samples":
+        least = max(least, 8 * (settings.harmonics + 1))
+    poorer = max(least, (value - 1) // 2 if name == "harmonics" else value // 2)
+    return replace(settings, **{name: poorer}) if poorer < value else None
+
+
+def _saves(family: Family, settings: Settings, poorer: Settings) -> bool:
+    """The curve saves more with poorer settings than their peak takes."""
+    before = _point_cost(family, settings)
+    after = _point_cost(family, poorer)
+    return CURVE_POINTS * (before - after) > PEAK_POINTS * after
+
+
+def _point_cost(family: Family, settings: Settings) -> float:
+    """Operations of a Newton step, roughly: the friction law with its derivative at each sample,
+    and the solution of the linear equations.
+    """
+    model = family_member(family, settings).model
+    unknowns = model.springs.size * (2 * settings.harmonics + 1)
+    modes = len(model.side(1).omega)
+    if isinstance(model.damper, tuple):
+        modes += len(model.damper[0].omega)
+    flexibility = settings.harmonics * model.springs.size**2 * modes
+    return float(unknowns * settings.samples * model.directions + unknowns**2 + flexibility)
+
+
+def _with_error(errors: PeakErrors, name: str, height: float, shift: float) -> PeakErrors:
+    """The errors of a model that is poorer in one respect, whose peak differs by this."""
+    heights = dict(errors.height)
+    shifts = dict(errors.frequency)
+    heights[name] += height
+    shifts[name] += shift
+    return replace(errors, height=heights, frequency=shifts)
