@@ -34,12 +34,12 @@ from choice_cases import Case, beam_cases, random_cases
 from bladefem.hbm.solve import solve
 from bladefem.study.chart.methods import (
     Point,
-    applicable,
-    balance,
-    integrated,
-    paper,
-    shooting,
-    tangential,
+    exact_shooting,
+    obstacle_in_time,
+    paper_iteration,
+    sampled_balance,
+    tangential_model,
+    time_steps,
 )
 
 WANTED = (0.02, 1e-3, 1e-5)
@@ -51,13 +51,13 @@ def ways(case: Case) -> dict[str, list[Run]]:
     """Methods that take a case, each from cheap to dear."""
     if case.model.elements.tangents > 1:
         return {}
-    found = {"exact events": [balance(H, 0) for H in HARMONICS]}
-    if not applicable(case.model):
+    found = {"exact events": [sampled_balance(H, 0) for H in HARMONICS]}
+    if not obstacle_in_time(case.model):
         found |= {
-            "the paper's iteration": [paper(H, averaged=True) for H in (1, 3)],
-            "shooting": [shooting],
-            "Newmark": [integrated(steps, explicit=False) for steps in (64, 256)],
-            "explicit steps": [integrated(steps, explicit=True) for steps in (512, 2048)],
+            "the paper's iteration": [paper_iteration(H, averaged=True) for H in (1, 3)],
+            "shooting": [exact_shooting],
+            "Newmark": [time_steps(steps, explicit=False) for steps in (64, 256)],
+            "explicit steps": [time_steps(steps, explicit=True) for steps in (512, 2048)],
         }
     return found
 
@@ -67,7 +67,7 @@ def spent(case: Case, run: Run, truth: complex) -> tuple[float, float]:
     seconds = []
     for _ in range(2):
         start = time.process_time()
-        point = run(tangential(case.model), case.omega, None)
+        point = run(tangential_model(case.model), case.omega, None)
         seconds.append(time.process_time() - start)
     return min(seconds), abs(point.first / truth - 1) if point.converged else np.inf
 
@@ -92,7 +92,10 @@ def main(every: int = 1) -> None:
             continue
         truth = complex(solve(case.model, case.omega, 63, 16384).probe[1, 0])
         sampled = [
-            balance(H, samples) for H in HARMONICS for samples in SAMPLES if samples >= 8 * H + 8
+            sampled_balance(H, samples)
+            for H in HARMONICS
+            for samples in SAMPLES
+            if samples >= 8 * H + 8
         ]
         if k == 0:
             spent(case, sampled[0], truth)  # compile

@@ -71,7 +71,7 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, family_member, family_of
 from bladefem.study.adaptive.frequency_list import adapt_frequency_list
-from bladefem.study.adaptive.settings import Settings, first_for, restarted
+from bladefem.study.adaptive.settings import Settings, first_for, restarted_settings
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
 from bladefem.study.pipeline.pipeline import run
 from bladefem.study.pipeline.stages import Bodies
@@ -139,7 +139,7 @@ def of_scene() -> Swept:
         f"{SCENE}, {case.load:g} N",
         rich,
         family,
-        restarted(settings),
+        restarted_settings(settings),
         around(rich(), scene.excitation.mode),
         1,
         RICH,

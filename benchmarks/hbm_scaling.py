@@ -49,7 +49,7 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.residual import Balance, evaluate_balance, start_in_stick
-from bladefem.reduction.truncate import truncated
+from bladefem.reduction.truncate import truncate_modes
 
 SIDES, HARMONICS, MODES = (3, 5, 7, 10, 14, 20, 32), (1, 3, 7, 15, 31), 60
 
@@ -71,7 +71,10 @@ def models(side: int) -> dict[str, ReducedModel]:
     others.
     """
     whole = patch(side, max(side**2 // 3, 3)).model
-    return {"all": whole, str(MODES): replace(whole, sides=(truncated(whole.sides[0], MODES),))}
+    return {
+        "all": whole,
+        str(MODES): replace(whole, sides=(truncate_modes(whole.sides[0], MODES),)),
+    }
 
 
 def measure(model: ReducedModel, modes: str, H: int, speed: float) -> dict[str, float]:

@@ -29,7 +29,7 @@ from bladefem.study.adaptive.family import family_member
 from bladefem.study.pipeline import case_models, pipeline
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stages import Bodies
-from bladefem.util.progress import unwatched
+from bladefem.util.progress import without_progress
 
 LOADS = (640.0, 1300.0, 2600.0)
 TOLERANCE = 1e-3
@@ -94,7 +94,7 @@ def main(count: int) -> None:
     cases = case_models.load_cases(scene, ready.mesh, ready.contact)
     settings, reduced = case_models.reduced_sector(
         scene,
-        Bodies(scene, ready.mesh, None, unwatched),
+        Bodies(scene, ready.mesh, None, without_progress),
         cases[len(cases) // 2],
         patches,
         lambda name, key, compute: compute(),

@@ -17,17 +17,17 @@ from typing import Any
 
 import numpy as np
 
-from bladefem.io.stage_cache import stage
+from bladefem.io.stage_cache import cached_stage
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.settings import Settings, first_settings
-from bladefem.study.chart.cpu_clock import running
+from bladefem.study.chart.cpu_clock import running_clock
 from bladefem.study.pipeline import case_models, pipeline
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stage_inputs import stage_key
 from bladefem.study.pipeline.stages import Bodies, harmonic_diameters, reduce_sector
-from bladefem.util.progress import unwatched
+from bladefem.util.progress import without_progress
 
 LAYERS = ("40", "400", "4000", "10000", "40000", "100000", "rigid", "default")
 LOADS = (80.0, 320.0)
@@ -63,11 +63,11 @@ def prepared(folder: str, stiffness: str) -> Layer:
         scene = vary(scene, "contact.kt_area", 1e9 * float(stiffness))
     ready = pipeline.run(scene, folder, until="contact")
     patches = list(ready.contact.problem.patches)
-    bodies = Bodies(scene, ready.mesh, None, unwatched)
+    bodies = Bodies(scene, ready.mesh, None, without_progress)
     diameters = harmonic_diameters(scene, ready.mesh, case_models.EXACT_HARMONICS)
     key = stage_key("reduction", scene, np.array(diameters), MODES)
     compute = partial(reduce_sector, bodies, patches, diameters, MODES)
-    reduced, _ = stage(folder, "reduction", key, compute)
+    reduced, _ = cached_stage(folder, "reduction", key, compute)
     cases = case_models.load_cases(scene, ready.mesh, ready.contact)
     family_of = partial(case_models.family_of_case, scene, ready.mesh, reduced, patches)
     settings = first_settings(scene)
@@ -78,7 +78,7 @@ def prepared(folder: str, stiffness: str) -> Layer:
 def print_response(layer: Layer, name: str, case: LoadCase) -> float:
     """One row of the table; its CPU seconds."""
     family = layer.family_of(case)
-    with running() as clock:
+    with running_clock() as clock:
         begin = clock.now()
         curve = curve_of(layer.scene, case, lambda case: family, layer.settings)
         seconds = clock.now() - begin

@@ -19,7 +19,7 @@ from bladefem.wheel.scatter import Scatter, drawn_patterns
 from bladefem.wheel.statistics import (
     free_respond,
     one_body_respond,
-    quantile,
+    quantile_interval,
     scatter_statistics,
 )
 
@@ -49,7 +49,7 @@ def main() -> None:
         lambda wheel, pattern: one_body_respond(wheel, pattern, 3, 64),
     )
     seconds = time.process_time() - start
-    p95 = quantile(free.factor[0], 0.95)
+    p95 = quantile_interval(free.factor[0], 0.95)
     print(f"without friction: 95 % of wheels below {p95.value:.3f} ({p95.low:.3f}, {p95.high:.3f})")
     columns = ["load", "p50", "p95", "p95_low", "p95_high", "worst", "unconverged", "points"]
     print(scatter_table(found)[columns].to_string(index=False, float_format="%.3f"))
@@ -58,7 +58,7 @@ def main() -> None:
     if len(sys.argv) > 2:
         bands = {}
         for name, share in (("half of the wheels", 0.5), ("95 % of the wheels", 0.95)):
-            rows = [quantile(row, share) for row in found.peak]
+            rows = [quantile_interval(row, share) for row in found.peak]
             bands[name] = np.array([[q.value, q.low, q.high] for q in rows])
         draw_bands(found.loads, found.tuned, bands, marked_optima(found), sys.argv[2])
 

@@ -7,7 +7,7 @@ cheap.
 
 from __future__ import annotations
 
-from .util.lazy import loader
+from .util.lazy import lazy_getattr
 
 __version__ = "0.1.0"
 
@@ -28,7 +28,7 @@ _WHERE = {
 }
 # a star import must not hide Python's own open
 __all__ = sorted(name for name in _WHERE if name != "open")
-__getattr__ = loader(__name__, _WHERE)
+__getattr__ = lazy_getattr(__name__, _WHERE)
 
 
 def __dir__() -> list[str]:

@@ -6,7 +6,7 @@ from :mod:`bladefem.hbm` and what it builds on; each is loaded when it is first 
 
 from __future__ import annotations
 
-from .util.lazy import loader
+from .util.lazy import lazy_getattr
 
 _WHERE = {
     # nouns: what is balanced, how, and what comes out
@@ -42,7 +42,7 @@ _WHERE = {
     "shared_response": ".hbm.parallel",
 }
 __all__ = sorted(_WHERE)
-__getattr__ = loader("bladefem", _WHERE)
+__getattr__ = lazy_getattr("bladefem", _WHERE)
 
 
 def __dir__() -> list[str]:

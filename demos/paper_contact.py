@@ -15,7 +15,7 @@ from mpi4py import MPI
 
 import bladefem
 from bladefem.study.kinds.punch import (
-    indent,
+    indent_punch,
     johnson_approach,
     johnson_pressure,
     ring_stiffness,
@@ -26,7 +26,7 @@ from verification.paper.view_contact import draw_punch
 coarse, comm = "BLADEFEM_COARSE" in os.environ, MPI.COMM_WORLD
 scenes = Path(__file__).resolve().parents[1] / "scenes"
 scene = bladefem.load_scene(scenes / "punch.toml", ["mesh.contact_size=0.4 mm"] if coarse else [])
-found = indent(scene, comm)  # finite elements on all ranks, a quarter of block and punch
+found = indent_punch(scene, comm)  # finite elements on all ranks, a quarter of block and punch
 if comm.rank:
     raise SystemExit
 

@@ -21,7 +21,7 @@ import bladefem
 from bladefem.damper.loops import Drive, ratio_table, spectrum, steady
 from bladefem.report.zmass import draw_motions
 from bladefem.scene.toml import vary
-from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
+from bladefem.study.kinds.zmass import mass_on_foundation, press_mass, steady_motions
 from bladefem.view.paper import draw_footprint
 
 coarse = "BLADEFEM_COARSE" in os.environ
@@ -38,14 +38,14 @@ scene = bladefem.load_scene(scenes / "zmass.toml", ["mesh.size=7 mm"] if coarse 
 # receding one: its pressure keeps its shape and follows the load in proportion (Eq. 27).
 
 # %%
-seat = press(scene, comm=comm).seat
+seat = press_mass(scene, comm=comm).seat
 skewed = vary(
     scene,
     foundation__skew=(0.5, 0.3),
     foundation__amplitude=(0.005, 0.003),
     foundation__ratios=(0.5,),
 )
-skew = press(skewed, comm=comm).seat
+skew = press_mass(skewed, comm=comm).seat
 if comm.rank:  # the rest is small: rank 0 does it, the others wait at the end
     raise SystemExit
 body = mass_on_foundation(scene, seat)
@@ -66,7 +66,7 @@ if not coarse:
 # of the slip, halved, within the smallest period of (velocity, force).
 
 # %%
-found = list(motions(scene, body, steps))
+found = list(steady_motions(scene, body, steps))
 results = {f"{float(d.ratio) * d.frequency:g} Hz": result for d, result in found}
 for name, result in results.items():
     frequency, lines = spectrum(result)
@@ -115,7 +115,7 @@ for stroke in (2e-3, 1.2e-3, 0.8e-3):  # m
 # grows towards one corner, on an elliptic foundation motion, does both.
 
 # %%
-_, result = next(motions(skewed, mass_on_foundation(skewed, skew), steps // 2))
+_, result = next(steady_motions(skewed, mass_on_foundation(skewed, skew), steps // 2))
 print(
     f"skewed: drift {result.drift[0]:+.4f}, {result.drift[1]:+.4f} m/s, turning up to "
     f"{np.abs(result.motion.velocity[:, 2]).max():.2f} rad/s, {result.loops} loops"

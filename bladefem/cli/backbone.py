@@ -14,19 +14,19 @@ def backbone(options: argparse.Namespace, comm: Communicator | None) -> None:
     scene, folder, bars = prepared(options, comm, responds=True)
     from ..io.stage_cache import on_root
     from ..report.backbone import backbone_sentences, prediction_table, write_backbones
-    from ..report.tables import readable
-    from ..study.backbone import backbones
+    from ..report.tables import readable_texts
+    from ..study.backbone import run_backbones
     from ..study.pipeline import pipeline
 
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
-    found, remarks = backbones(run, comm, bars)
+    found, remarks = run_backbones(run, comm, bars)
     files = on_root(comm, lambda: write_backbones(run, found, remarks))
     tell(
         options,
         comm,
         lambda: "\n".join(
             [
-                tables.frame_table(readable(prediction_table(found))),
+                tables.frame_table(readable_texts(prediction_table(found))),
                 "",
                 *backbone_sentences(found),
                 f"written: {', '.join(map(str, files))}",

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Print the resolved scene, and what in it is improbable."""
     from ..io.stage_cache import on_root
-    from ..scene.toml import given_keys, read_tables, resolved, scene_of
-    from ..scene.warnings import doubts
+    from ..scene.toml import given_keys, read_tables, resolved_rows, scene_of
+    from ..scene.warnings import implausible_values
     from ..study.pipeline.preflight import refuse_run
 
     file = scene_path(options.scene)
@@ -33,8 +33,8 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
         written = read_tables(file, options.overrides)
         scene = scene_of(written, file.resolve().parent)
         refuse_run(scene)
-        rows = tables.resolved_scene(resolved(scene, given_keys(written)))
-        return "\n".join([rows, *(f"note: {doubt}" for doubt in doubts(scene))])
+        rows = tables.resolved_scene(resolved_rows(scene, given_keys(written)))
+        return "\n".join([rows, *(f"note: {doubt}" for doubt in implausible_values(scene))])
 
     text = on_root(comm, table)
     if comm is None or comm.rank == 0:
@@ -98,10 +98,10 @@ def modes_wanted(options: argparse.Namespace) -> Wanted:
 
 def _parse_sizes(text: str | None, option: str) -> list[float] | None:
     """Element sizes [m] as given to an option; empty where they are to be chosen."""
-    from ..scene.fields import convert, field_at, split_values
+    from ..scene.fields import convert_value, field_at, split_values
 
     size = field_at("mesh.size")._replace(name=option)
-    return None if text is None else [convert(item, size) for item in split_values(text)]
+    return None if text is None else [convert_value(item, size) for item in split_values(text)]
 
 
 def contact(options: argparse.Namespace, comm: Communicator | None) -> None:
@@ -229,7 +229,7 @@ def prepared(
         responds: a forced response is to come.
     """
     from ..io.stage_cache import on_root
-    from ..util.progress import wanted, watch
+    from ..util.progress import progress_wanted, with_progress
 
     folder = Path(options.output or default_folder(options.scene))
     if comm is not None:
@@ -237,11 +237,11 @@ def prepared(
         from ..study.pipeline import preflight  # noqa: F401
 
     def prepare() -> Scene:
-        from ..io.run_folder import keep_given, locked, take_folder
+        from ..io.run_folder import keep_given, lock_run_folder, take_folder
 
         scene = given_scene(options, responds)
         given = _given_fields(options)
-        options.held.enter_context(locked(folder))
+        options.held.enter_context(lock_run_folder(folder))
         moved = take_folder(folder, scene)
         keep_given(folder, given)
         if moved and not options.quiet:
@@ -250,7 +250,7 @@ def prepared(
 
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
-    return scene, folder, partial(watch, shown=wanted(options.quiet, rank))
+    return scene, folder, partial(with_progress, shown=progress_wanted(options.quiet, rank))
 
 
 def _given_fields(options: argparse.Namespace) -> set[str]:

@@ -10,9 +10,13 @@ from typing import Any
 
 def installation_facts() -> list[tuple[str, str]]:
     """Rows of name and value: versions, solvers, BLAS, MPI, threads."""
-    from ..io.stage_cache import versions
+    from ..io.stage_cache import library_versions
 
-    rows = [("python", platform.python_version()), ("system", _system_text()), *versions().items()]
+    rows = [
+        ("python", platform.python_version()),
+        ("system", _system_text()),
+        *library_versions().items(),
+    ]
     rows += _solver_versions()
     rows += [
         (

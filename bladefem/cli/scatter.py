@@ -46,7 +46,7 @@ def _write_results(
     scene: Scene,
 ) -> tuple[Any, list[Path]]:
     """The table as text, and the files of the folder."""
-    from ..report.tables import readable, write_tables
+    from ..report.tables import readable_texts, write_tables
     from ..report.wheel import (
         optimum_table,
         scatter_drawings,
@@ -72,4 +72,4 @@ def _write_results(
     numbers = [*scatter_headlines(found), *use_headlines(used)]
     page = Page(numbers=numbers, stem="report_scatter")
     pages = write_report(folder, scene, parts, figures, sentences, page=page)
-    return readable(parts["wheel/scatter"]), [*files, *figures.values(), *pages]
+    return readable_texts(parts["wheel/scatter"]), [*files, *figures.values(), *pages]

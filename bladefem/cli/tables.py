@@ -165,11 +165,11 @@ def response_tables(response: Response) -> str:
     """
     import pandas as pd
 
-    from ..study.pipeline.loads import summary
+    from ..study.pipeline.loads import design_table
 
     undamped = response.free_peak[1]
     curves = response.curves
-    rows = pd.DataFrame(summary(curves, response.limits))
+    rows = pd.DataFrame(design_table(curves, response.limits))
     rows = rows[[name for name in SUMMARY_COLUMNS if name in rows]]
     rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
     best = min(curves, key=lambda c: c.peak_amplitude)
@@ -211,9 +211,9 @@ def side_by_side(name: str, best: pd.DataFrame) -> str:
 
 def report_table(rows: pd.DataFrame) -> str:
     """A pandas table of SI columns, in the units of the report."""
-    from ..report.tables import readable
+    from ..report.tables import readable_texts
 
-    return frame_table(readable(rows))
+    return frame_table(readable_texts(rows))
 
 
 def run_summary(run: Run) -> str:
@@ -261,15 +261,15 @@ def run_table(run: SolvedRun) -> str:
 
 def mass_table(run: Any) -> str:
     """What a run of a mass on its foundation ends with."""
-    from ..report.tables import readable
+    from ..report.tables import readable_texts
     from ..report.zmass import motion_table
 
-    return frame_table(readable(motion_table(run.motions)))
+    return frame_table(readable_texts(motion_table(run.motions)))
 
 
 def pair_table(run: Any) -> str:
     """What a run of a verification pair ends with."""
     from ..report.pair import pair_summary
-    from ..report.tables import readable
+    from ..report.tables import readable_texts
 
-    return frame_table(readable(pair_summary(run.states)))
+    return frame_table(readable_texts(pair_summary(run.states)))

@@ -25,7 +25,7 @@ from bladefem.errors import InputError
 from bladefem.hbm.linear.bodies import port_receptance
 from bladefem.hbm.model import ReducedModel, require_rigid_damper
 
-from ..friction.equivalent_linear import by_harmonic, from_harmonics
+from ..friction.equivalent_linear import from_harmonics, matrices_by_harmonic
 from ..friction.fourier import to_real
 from ..time.event_integrator import State
 from ..time.shooting import periodic_solution
@@ -164,7 +164,7 @@ def equivalent(
     """
     mean = np.zeros((1, u.shape[1]))
     u, force = (to_real(np.vstack([mean, x]).T) for x in (u, force))
-    fit = (from_harmonics if averaged else by_harmonic)(u, force, omega)
+    fit = (from_harmonics if averaged else matrices_by_harmonic)(u, force, omega)
     h = np.arange(1, u.shape[1] // 2 + 1)[:, None]
     return np.nan_to_num(fit.stiffness.T + 1j * h * omega * fit.damping.T)
 

@@ -18,7 +18,7 @@ from scipy.linalg import eigh
 
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
-from ..util.progress import Progress, unwatched
+from ..util.progress import Progress, without_progress
 from . import cyclic_schur as core
 from .body import Body
 from .constraint import Constrained, Transformation, at_diameter, high_part, transformation
@@ -110,7 +110,7 @@ def all_diameters(
     direct: bool = False,
     prove: bool = True,
     clamp: str | None = "clamp",
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
     solver: Eigensolver = SLEPC,
     kept: KeptPairs | None = None,
 ) -> list[ModeSet]:

@@ -76,7 +76,7 @@ def from_harmonics(
     return Approximation(K, C, f[..., 0] - K * u[..., 0])
 
 
-def by_harmonic(
+def matrices_by_harmonic(
     u: np.ndarray,
     f: np.ndarray,
     omega: float,
@@ -101,7 +101,7 @@ def by_harmonic(
     )
 
 
-def force_of(
+def linear_force(
     approximation: Approximation,
     u: np.ndarray,
     omega: float,

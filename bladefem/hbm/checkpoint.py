@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
-from ..io.stage_cache import code_of, key_of, stage
+from ..io.stage_cache import cached_stage, code_of, key_of
 from .model import ReducedModel
 from .solution import Solution
 from .solver.newton import DEFAULT_OPTIONS, Options
@@ -35,6 +35,6 @@ def response_with_checkpoints(
     def keep(omega: float, compute: Callable[[], Solution]) -> Solution:
         nonlocal count
         count += 1
-        return stage(folder, f"point-{count:06d}", key_of(base, float(omega)), compute)[0]
+        return cached_stage(folder, f"point-{count:06d}", key_of(base, float(omega)), compute)[0]
 
     yield from response(model, omegas, H, samples, options=options, keep=keep)

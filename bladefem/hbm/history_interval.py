@@ -22,7 +22,7 @@ from .linear.condensation import condense
 from .model import ReducedModel
 from .peak import Peak, find_peak
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .traction_gradient import Tractions, farthest, tractions
+from .traction_gradient import Tractions, admissible_tractions, farthest_start
 
 POINT = "point"
 MONOTONE = "monotone"
@@ -104,7 +104,7 @@ class _Search:
             self.reasons.append(str(error))
             return None
         self.points += peak.points
-        place = _Place(peak, tractions(model, peak.solution, self.options.probe))
+        place = _Place(peak, admissible_tractions(model, peak.solution, self.options.probe))
         self.places.append(place)
         return place
 
@@ -124,7 +124,7 @@ def history_interval(
         tolerance: of the height, relative.
         most: points of the balance after which no further move begins: the range is then sampled.
     """
-    here = _Place(peak, tractions(model, peak.solution, options.probe))
+    here = _Place(peak, admissible_tractions(model, peak.solution, options.probe))
     search = _Search(model, tolerance, most, options, [here], 0, [])
     if model.directions == model.elements.tangents or not model.coupled:
         # a prescribed normal load or fixed mean displacements: nothing acts back
@@ -179,7 +179,7 @@ def _climb(
         if not small:
             continue
         gradient = sign * place.free.gradient[place.free.nodes]
-        move = farthest(search.model, place.free, gradient)
+        move = farthest_start(search.model, place.free, gradient)
         if float(np.sum(gradient * move)) < search.tolerance * place.peak.height:
             return True
         change = np.zeros_like(place.free.start)

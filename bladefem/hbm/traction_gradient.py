@@ -60,7 +60,7 @@ class Tractions:
     room: RealArray
 
 
-def tractions(
+def admissible_tractions(
     model: ReducedModel,
     solution: Solution,
     probe: int = 0,
@@ -84,7 +84,7 @@ def tractions(
     )
 
 
-def farthest(
+def farthest_start(
     model: ReducedModel,
     found: Tractions,
     direction: np.ndarray,

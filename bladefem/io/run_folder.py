@@ -14,7 +14,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..scene.tables import Scene
-from ..scene.toml import dump, load_scene
+from ..scene.toml import dump_scene, load_scene
 from .stage_cache import open_folder, write_text
 
 EARLIER_FOLDER = "earlier"
@@ -36,7 +36,7 @@ RESULT_SUFFIXES = (
 
 
 @contextmanager
-def locked(folder: str | Path) -> Iterator[None]:
+def lock_run_folder(folder: str | Path) -> Iterator[None]:
     """Keep a run folder for this process; the system gives it back when the process ends, however
     it ends.
 
@@ -80,7 +80,7 @@ def take_folder(folder: str | Path, scene: Scene) -> str:
     folder = open_folder(folder)
     file = folder / "scene.toml"
     said = _put_away(folder) if file.is_file() and not _holds(file, scene) else ""
-    write_text(file, dump(scene))
+    write_text(file, dump_scene(scene))
     return said
 
 

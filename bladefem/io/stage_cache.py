@@ -52,7 +52,7 @@ def open_folder(path: str | Path) -> Path:
 
 
 @contextmanager
-def writing(path: str | Path) -> Iterator[Path]:
+def write_atomically(path: str | Path) -> Iterator[Path]:
     """A temporary name in the folder of ``path``; renamed to it when the block ends well, removed
     when it does not.
 
@@ -92,7 +92,7 @@ def code_of(*packages: str) -> str:
     return digest.hexdigest()[:20]
 
 
-def stage(
+def cached_stage(
     folder: str | Path | None,
     name: str,
     key: str,
@@ -145,7 +145,7 @@ def write_results(
     bind_h5py()
     path = Path(path)
     root = groups.get("/", xr.Dataset()).assign_attrs(attributes(scene_text))
-    with writing(path) as temporary:
+    with write_atomically(path) as temporary:
         _real(root).to_netcdf(temporary, mode="w", engine="h5netcdf")
         for name, dataset in groups.items():
             if name != "/":
@@ -188,19 +188,19 @@ def write_table(
     if unknown:
         raise KeyError(f"units for columns that are not there: {sorted(unknown)}")
     table = table.rename(columns={c: f"{c} [{units[c]}]" for c in table.columns if units.get(c)})
-    with writing(path) as temporary:
+    with write_atomically(path) as temporary:
         table.to_csv(temporary, index=False, float_format="%.9g")
     return Path(path)
 
 
 def write_text(path: str | Path, text: str) -> Path:
     """A text file, whole or not at all."""
-    with writing(path) as temporary:
+    with write_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return Path(path)
 
 
-def versions() -> dict[str, str]:
+def library_versions() -> dict[str, str]:
     """Versions of what results depend on; "absent" for what is not installed."""
     names = {
         "bladefem": "bladefem",
@@ -217,7 +217,7 @@ def versions() -> dict[str, str]:
 
 def attributes(scene_text: str = "") -> dict[str, str]:
     """What a result file says about its origin."""
-    made = "; ".join(f"{name} {version}" for name, version in versions().items())
+    made = "; ".join(f"{name} {version}" for name, version in library_versions().items())
     return {
         "title": "bladefem run",
         "scene": scene_text,
@@ -255,7 +255,7 @@ def _keep(
     made: tuple[Any, float],
 ) -> None:
     open_folder(path.parent)
-    with writing(path) as temporary:
+    with write_atomically(path) as temporary:
         write_npz(temporary, key, made)
 
 

@@ -94,7 +94,7 @@ def wheel_models(
     return tuple(models)
 
 
-def join(bodies: tuple[PortModel, ...]) -> PortModel:
+def join_bodies(bodies: tuple[PortModel, ...]) -> PortModel:
     """Several bodies side by side as one: ports of the same name follow each other in the order of
     the bodies.
     """
@@ -126,7 +126,7 @@ def join(bodies: tuple[PortModel, ...]) -> PortModel:
     )
 
 
-def recombine(body: PortModel, selection: np.ndarray) -> PortModel:
+def recombine_contact(body: PortModel, selection: np.ndarray) -> PortModel:
     """The body with other contact degrees of freedom: selection (k, contact dofs) times the present
     ones.
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from ..data import PortModel
 
 
-def truncated(body: PortModel, count: int) -> PortModel:
+def truncate_modes(body: PortModel, count: int) -> PortModel:
     """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count`
     modes would give.
     """

@@ -20,10 +20,10 @@ from ..io.stage_cache import on_root, write_results
 from ..scene.tables import Scene
 from ..study.modes.comparison import family_table
 from ..study.modes.linear_response_report import stress_states, stress_table
-from ..study.modes.survey import Survey, Wanted, excited_set, survey
+from ..study.modes.survey import Survey, Wanted, excited_set, survey_modes
 from ..study.pipeline.run_records import folder_of
 from ..util.communicator import Communicator
-from ..util.progress import Progress, unwatched
+from ..util.progress import Progress, without_progress
 from ..view import convergence, forced, mesh, modes, speed
 from ..view.live_curves import live_diameters
 from ..view.live_shapes import live_shapes
@@ -58,7 +58,7 @@ def report_survey(
     wanted: Wanted,
     pictures: int = MAX_DRAWN_MODES,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Survey:
     """Survey the modes and write the folder.
 
@@ -66,9 +66,9 @@ def report_survey(
         pictures: number of modes drawn on the sector and on the wheel; 0 for tables only.
 
     Raises:
-        InputError, NotSolvedError: see :func:`bladefem.study.modes.survey.survey`.
+        InputError, NotSolvedError: see :func:`bladefem.study.modes.survey.survey_modes`.
     """
-    result = survey(scene, folder, wanted, comm, progress)
+    result = survey_modes(scene, folder, wanted, comm, progress)
     start = time.perf_counter()
     stresses = _stresses(result)
     on_root(comm, lambda: _write(result, pictures, *stresses, progress))

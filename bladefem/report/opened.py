@@ -242,9 +242,9 @@ def open_run(folder: str | Path) -> RunFolder:
         InputError: the folder holds no run.
 
     >>> import tempfile
-    >>> from bladefem.scene.toml import dump
+    >>> from bladefem.scene.toml import dump_scene
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     _ = (Path(folder) / "scene.toml").write_text(dump(Scene(title="A wheel")))
+    ...     _ = (Path(folder) / "scene.toml").write_text(dump_scene(Scene(title="A wheel")))
     ...     open_run(folder).scene.title
     'A wheel'
     """

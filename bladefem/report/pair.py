@@ -13,11 +13,16 @@ import pandas as pd
 
 from bladefem.io.stage_cache import on_root, write_results
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import dump
-from bladefem.study.kinds.contact_pairs import COMPARED_RADIUS_SHARE, PairState, radii, solve_pair
+from bladefem.scene.toml import dump_scene
+from bladefem.study.kinds.contact_pairs import (
+    COMPARED_RADIUS_SHARE,
+    PairState,
+    node_radii,
+    solve_pair,
+)
 from bladefem.study.kinds.hertz import hertz_pressure
 from bladefem.study.kinds.punch import johnson_pressure
-from bladefem.util.progress import Progress, unwatched
+from bladefem.util.progress import Progress, without_progress
 from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
 from geometry.quality import quality_rows
@@ -44,7 +49,7 @@ def report_pair(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> PairRun:
     """Mesh and pressures on all ranks, the folder on rank 0.
 
@@ -113,7 +118,7 @@ def _points(result: PairRun) -> pd.DataFrame:
             pd.DataFrame(
                 {
                     "load": s.load,
-                    "radius": radii(s.seat, result.mesh.dimension),
+                    "radius": node_radii(s.seat, result.mesh.dimension),
                     "area": s.seat.patch.area,
                     "pressure": s.seat.pressure,
                     "pressure_exact": s.exact,
@@ -153,7 +158,7 @@ def _write(scene: Scene, result: PairRun) -> None:
             "resultants": resultants(tables["contact/resultants_of_the_meshed_part"]),
             "points": table_dataset(tables["contact/points"], "point"),
         },
-        dump(scene),
+        dump_scene(scene),
     )
     figures = {
         name: folder / f"{name.split('/')[1]}.png" for name in ("mesh/mesh", "contact/pressure")
@@ -181,7 +186,7 @@ def _draw(
     largest = max(result.states, key=lambda s: s.load)
     edge = largest.radius[1]
     solid = result.mesh.dimension == 3
-    radius = radii(largest.seat, result.mesh.dimension)
+    radius = node_radii(largest.seat, result.mesh.dimension)
 
     def exact(load: float) -> tuple[np.ndarray, np.ndarray]:
         if scene.kind == "hertz":

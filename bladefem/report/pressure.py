@@ -15,11 +15,11 @@ from ..data import PressureMap
 from ..errors import InputError
 from ..io.stage_cache import on_root, read_results, write_results, write_table
 from ..scene.tables import Scene
-from ..scene.toml import dump
+from ..scene.toml import dump_scene
 from ..study.pipeline import pipeline
 from ..study.pipeline.run_records import SeatedRun, folder_of
 from ..util.communicator import Communicator
-from ..util.progress import Progress, unwatched
+from ..util.progress import Progress, without_progress
 from ..view import contact
 from .datasets import contact_arrays, resultants
 from .headlines import Headline
@@ -40,7 +40,7 @@ def report_pressure(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> SeatedRun:
     """Seat the damper under each load and write the pressures into the folder.
 
@@ -93,7 +93,7 @@ def _write(result: SeatedRun) -> None:
         write_results(
             folder / "results.nc",
             {"contact": contact_arrays(maps), "resultants": resultants(table)},
-            dump(result.scene),
+            dump_scene(result.scene),
         )
 
 

@@ -23,7 +23,7 @@ from ..hbm.parallel import share_work
 from ..io.run_folder import take_folder
 from ..io.stage_cache import on_root, write_results, write_table
 from ..scene.tables import Scene
-from ..scene.toml import dump
+from ..scene.toml import dump_scene
 from ..scene.units import show
 from ..study.mistuning.stage import with_whole_wheel
 from ..study.mistuning.validate import check_mistuning, is_mistuned
@@ -33,14 +33,14 @@ from ..study.modes.survey import excited_set
 from ..study.pipeline import pipeline
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
-from ..study.pipeline.loads import Curve, summary
+from ..study.pipeline.loads import Curve, design_table
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
 from ..util.arrays import ComplexArray
 from ..util.communicator import Communicator
 from ..util.message import method, warning
-from ..util.progress import Progress, unwatched
+from ..util.progress import Progress, without_progress
 from ..view import mesh, modes, response, speed
 from ..view.influence import draw_influences
 from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
@@ -89,7 +89,7 @@ def report_run(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> SolvedRun:
     """Everything: mesh, modes, contact, responses, and the folder with pictures and report.
 
@@ -106,7 +106,7 @@ def report_run(
 def write_run(
     result: SolvedRun,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> SolvedRun:
     """Write the folder of a finished run; returns the run with the time that it took.
 
@@ -182,7 +182,7 @@ def _write(
         "cycle": node_arrays(nodes),
         "loops": loop_arrays(cycles, SEAT_WORDS),
     }
-    write_results(folder / "results.nc", groups, dump(result.scene))
+    write_results(folder / "results.nc", groups, dump_scene(result.scene))
     mesh.save_vtu(result.mesh, folder / "mesh.vtu")
     modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
     save_fatigue_vtu(result, folder / "fatigue.vtu")
@@ -344,7 +344,7 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 def _summary(result: SolvedRun) -> pd.DataFrame:
     """The design table, with the alternating stress at each resonance."""
-    table = pd.DataFrame(summary(result.response.curves, result.response.limits))
+    table = pd.DataFrame(design_table(result.response.curves, result.response.limits))
     table.insert(
         table.columns.get_loc("reduction") + 1,
         "alternating_stress",

@@ -12,7 +12,7 @@ import pandas as pd
 from ..scene.fields import field_at, value_at
 from ..scene.tables import Scene
 from ..scene.units import parse, show
-from ..study.pipeline.loads import summary
+from ..study.pipeline.loads import design_table
 from ..study.pipeline.run_records import Response
 from ..view.study import draw_study
 from .headlines import Headline
@@ -102,7 +102,7 @@ def study_tables(name: str, variants: Sequence[Variant]) -> tuple[pd.DataFrame, 
     best = []
     every = []
     for variant in variants:
-        rows = pd.DataFrame(summary(variant.response.curves, variant.response.limits))
+        rows = pd.DataFrame(design_table(variant.response.curves, variant.response.limits))
         rows.insert(0, "value", variant.text)
         damped = rows.iloc[1:-1]
         own = _number(name, variant.scene)

@@ -191,14 +191,14 @@ def units_of(table: pd.DataFrame) -> dict[str, str]:
     }
 
 
-def readable(table: pd.DataFrame) -> pd.DataFrame:
+def readable_texts(table: pd.DataFrame) -> pd.DataFrame:
     """The same table as text: titles with units in the head, numbers rounded and in the unit that
     people use.
     """
     columns = {name: COLUMNS.get(name, Column(_words(str(name)))) for name in table}
     return pd.DataFrame(
         {
-            head(column): [cell(value, column) for value in table[name]]
+            column_head(column): [cell_text(value, column) for value in table[name]]
             for name, column in columns.items()
         }
     )
@@ -209,13 +209,13 @@ def _words(name: str) -> str:
     return name if "." in name else name.replace("_", " ")
 
 
-def head(column: Column) -> str:
+def column_head(column: Column) -> str:
     """ "resonance amplitude [µm]"."""
     unit = column.shown or column.unit
     return f"{column.title} [{unit}]" if unit and unit != "1" else column.title
 
 
-def cell(value: Any, column: Column) -> str:
+def cell_text(value: Any, column: Column) -> str:
     """One entry: words as they are, numbers in the shown unit."""
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
@@ -237,17 +237,17 @@ def is_number(text: str) -> bool:
     return True
 
 
-def numeric(table: pd.DataFrame) -> list[bool]:
+def numeric_columns(table: pd.DataFrame) -> list[bool]:
     """Which columns of a readable table hold numbers only."""
     return [all(map(is_number, table[name])) for name in table]
 
 
 def to_markdown(table: pd.DataFrame) -> str:
     """A GitHub table with units in the head; numbers to the right."""
-    text = readable(table)
+    text = readable_texts(table)
     lines = [
         text.columns,
-        ["---:" if n else "---" for n in numeric(text)],
+        ["---:" if n else "---" for n in numeric_columns(text)],
         *text.itertuples(index=False),
     ]
     return (
@@ -260,16 +260,16 @@ def to_markdown(table: pd.DataFrame) -> str:
 
 def to_latex(table: pd.DataFrame, caption: str = "") -> str:
     """A booktabs tabular in a table float, with units in the head."""
-    text = readable(table)
-    rows = [" & ".join(map(escape, row)) + r" \\" for row in text.itertuples(index=False)]
-    align = "".join("r" if n else "l" for n in numeric(text))
+    text = readable_texts(table)
+    rows = [" & ".join(map(escape_latex, row)) + r" \\" for row in text.itertuples(index=False)]
+    align = "".join("r" if n else "l" for n in numeric_columns(text))
     lines = [
         r"\begin{table}",
         r"  \centering",
-        *([rf"  \caption{{{escape(caption)}}}"] if caption else []),
+        *([rf"  \caption{{{escape_latex(caption)}}}"] if caption else []),
         rf"  \begin{{tabular}}{{{align}}}",
         r"    \toprule",
-        "    " + " & ".join(map(escape, text.columns)) + r" \\",
+        "    " + " & ".join(map(escape_latex, text.columns)) + r" \\",
         r"    \midrule",
         *("    " + row for row in rows),
         r"    \bottomrule",
@@ -297,7 +297,7 @@ LATEX_ESCAPES = {
 }
 
 
-def escape(text: object) -> str:
+def escape_latex(text: object) -> str:
     """Text that LaTeX prints as it is."""
     return "".join(LATEX_ESCAPES.get(letter, letter) for letter in str(text))
 

@@ -18,7 +18,7 @@ from ..wheel.statistics import (
     Amplification,
     RobustOptimum,
     best_load,
-    quantile,
+    quantile_interval,
     robust_optimum,
 )
 from .headlines import Headline
@@ -123,7 +123,7 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
             "wheels": found.factor.shape[1],
         }
         for share in SCATTER_QUANTILES:
-            q = quantile(found.factor[i], share)
+            q = quantile_interval(found.factor[i], share)
             name = f"p{100 * share:g}"
             row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
         if found.checked.shape[1]:
@@ -138,7 +138,7 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def optima(found: Amplification) -> tuple[tuple[float, float], RobustOptimum]:
+def optima_of_scatter(found: Amplification) -> tuple[tuple[float, float], RobustOptimum]:
     """Load [N] and amplitude [m] of the tuned wheel's optimum, and the optimum of 95 % of the drawn
     wheels.
     """
@@ -147,7 +147,7 @@ def optima(found: Amplification) -> tuple[tuple[float, float], RobustOptimum]:
 
 def optimum_table(found: Amplification) -> pd.DataFrame:
     """The tuned optimum, which knows no scatter, and the robust one with its intervals."""
-    (load, height), robust = optima(found)
+    (load, height), robust = optima_of_scatter(found)
     rows = [
         {"optimum": "tuned wheel", "load": load, "highest_amplitude": height},
         {
@@ -210,10 +210,10 @@ def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
 
 def scatter_headlines(found: Amplification) -> list[Headline]:
     """First numbers of the statistics."""
-    (load, height), robust = optima(found)
+    (load, height), robust = optima_of_scatter(found)
     words = f"{100 * robust.share:g} % of {found.peak.shape[1]} wheels"
     i = int(np.argmin(found.tuned))
-    factor = quantile(found.factor[i], robust.share)
+    factor = quantile_interval(found.factor[i], robust.share)
     return [
         Headline(
             "robust optimum of the load of a seat",
@@ -257,7 +257,7 @@ def _upper(value: float) -> str:
 
 def scatter_sentences(found: Amplification) -> list[str]:
     """The answer, and what it is worth."""
-    (load, height), robust = optima(found)
+    (load, height), robust = optima_of_scatter(found)
     sentences = [
         f"tuned optimum: {load:.4g} N, {1e6 * height:.4g} um",
         f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
@@ -271,7 +271,7 @@ def scatter_sentences(found: Amplification) -> list[str]:
             "or the largest load: the interval is open there, expected a wider study.loads"
         )
     i = int(np.argmin(found.tuned))
-    q = quantile(found.factor[i], 0.95)
+    q = quantile_interval(found.factor[i], 0.95)
     sentences.append(
         f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of {found.peak.shape[1]} "
         f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {_upper(q.high)})"
@@ -290,7 +290,7 @@ def scatter_sentences(found: Amplification) -> list[str]:
 
 def marked_optima(found: Amplification) -> list[tuple[str, float, float, float]]:
     """Name, load and interval of the optima, for the chart."""
-    (load, _), robust = optima(found)
+    (load, _), robust = optima_of_scatter(found)
     name = f"robust optimum ({100 * robust.share:g} %)"
     own = robust.load
     return [("tuned optimum", load, load, load), (name, own.value, own.low, own.high)]
@@ -300,10 +300,12 @@ def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]
     """Bands against the load, and the histogram at the tuned optimum."""
     bands = {}
     for share in SCATTER_QUANTILES[:2]:
-        rows = [quantile(row, share) for row in found.peak]
+        rows = [quantile_interval(row, share) for row in found.peak]
         bands[f"{100 * share:g} % of wheels"] = np.array([[q.value, q.low, q.high] for q in rows])
     i = int(np.argmin(found.tuned))
-    marks = {f"{100 * s:g} %": quantile(found.factor[i], s).value for s in SCATTER_QUANTILES[:2]}
+    marks = {
+        f"{100 * s:g} %": quantile_interval(found.factor[i], s).value for s in SCATTER_QUANTILES[:2]
+    }
     drawings: dict[str, Callable[[Path], object]] = {
         "wheel/scatter_histogram": partial(
             view.draw_histogram, found.factor[i], marks, f"{found.loads[i]:g} N"

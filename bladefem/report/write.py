@@ -19,10 +19,10 @@ import pandas as pd
 
 from bladefem.errors import InputError
 from bladefem.io.run_folder import given_fields
-from bladefem.io.stage_cache import open_folder, versions, write_text
+from bladefem.io.stage_cache import library_versions, open_folder, write_text
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import dump, resolved
+from bladefem.scene.toml import dump_scene, resolved_rows
 from bladefem.util.message import by_level
 
 from .captions import caption_of
@@ -31,7 +31,7 @@ from .library import chart_library
 from .next_steps import next_steps
 from .page_tables import page_tables
 from .statements import assumed_stiffness, reliability, response_answer, wrong_speed
-from .tables import numeric, readable, to_markdown
+from .tables import numeric_columns, readable_texts, to_markdown
 
 SECTIONS = {
     "answer": "Answer",
@@ -115,10 +115,10 @@ def write_report(
     check_names(tables, figures)
     folder = open_folder(folder)
     given = given_fields(folder) if given is None else given
-    found = contents(scene, tables, figures, list(messages), dict(timings or {}), given, page)
+    found = page_contents(scene, tables, figures, list(messages), dict(timings or {}), given, page)
     loader = jinja2.PackageLoader("bladefem.report", "")
     html = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    html.filters["embed"] = embed
+    html.filters["embed"] = data_uri
     plain = jinja2.Environment(
         loader=loader, autoescape=False, trim_blocks=True, lstrip_blocks=True
     )
@@ -143,7 +143,7 @@ def check_names(tables: Mapping[str, Any], figures: Mapping[str, str | Path]) ->
             raise InputError(f"report figure '{name}': there is no file {file}")
 
 
-def contents(
+def page_contents(
     scene: Scene,
     tables: Mapping[str, pd.DataFrame],
     figures: Mapping[str, str | Path],
@@ -168,14 +168,14 @@ def contents(
         "subject": page.subject or scene.kind,
         "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "inputs_hash": inputs_hash(scene),
-        "inputs": resolved(scene, given),
+        "inputs": resolved_rows(scene, given),
         "mark": "changed" if given is None else "given",
         "statements": statements,
         "warnings": said["warning"],
         "information": said["information"],
         "methods": said["method"],
         "remarks": said["timing"],
-        "versions": versions(),
+        "versions": library_versions(),
         "timings": [(name, t, t / total if total else 0.0) for name, t in timings.items()],
         "total": total,
         "live_data": {keys[name]: _script_data(spec) for name, spec in live.items()},
@@ -284,13 +284,13 @@ def page_table(
     number: int,
 ) -> dict[str, Any]:
     """A table as text, cut to the longest that a page should hold."""
-    text = readable(table.head(MAX_PAGE_ROWS))
+    text = readable_texts(table.head(MAX_PAGE_ROWS))
     return {
         "number": number,
         "caption": caption_of(name),
         "frame": table.head(MAX_PAGE_ROWS),
         "head": list(text.columns),
-        "right": numeric(text),
+        "right": numeric_columns(text),
         "rows": text.to_numpy().tolist(),
         "left_out": max(len(table) - MAX_PAGE_ROWS, 0),
         "columns_left_out": table.attrs.get("left_out", []),
@@ -301,14 +301,14 @@ def inputs_hash(scene: Scene) -> str:
     """The first 16 hexadecimal digits of the SHA-256 sum of the resolved scene and of the file that
     it reads.
     """
-    digest = hashlib.sha256(dump(scene).encode())
+    digest = hashlib.sha256(dump_scene(scene).encode())
     for file in kind_named(scene.kind).files(scene):
         if file.is_file():
             digest.update(file.read_bytes())
     return digest.hexdigest()[:16]
 
 
-def embed(file: Path) -> str:
+def data_uri(file: Path) -> str:
     """A file as a data URI."""
     kind = mimetypes.guess_type(file.name)[0] or "application/octet-stream"
     return f"data:{kind};base64,{base64.b64encode(file.read_bytes()).decode()}"

@@ -16,9 +16,15 @@ from bladefem.damper.loops import Drive, Steady, spectrum
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.io.stage_cache import on_root, write_results, write_table
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import dump
-from bladefem.study.kinds.zmass import Pressed, mass_on_foundation, mean_load, motions, press
-from bladefem.util.progress import Progress, unwatched
+from bladefem.scene.toml import dump_scene
+from bladefem.study.kinds.zmass import (
+    Pressed,
+    mass_on_foundation,
+    mean_load,
+    press_mass,
+    steady_motions,
+)
+from bladefem.util.progress import Progress, without_progress
 from bladefem.view import contact, mesh, paper
 
 from ..util.communicator import Communicator
@@ -44,18 +50,18 @@ def report_zmass(
     scene: Scene,
     folder: str | Path,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> MassRun:
     """Pressure on all ranks, motions and folder on rank 0.
 
     Raises:
-        InputError, NotSolvedError: see ``study.kinds.zmass.press``.
+        InputError, NotSolvedError: see ``study.kinds.zmass.press_mass``.
     """
     start = perf_counter()
-    pressed = press(scene, folder, comm)
+    pressed = press_mass(scene, folder, comm)
     body = mass_on_foundation(scene, pressed.seat)
     pressure = perf_counter()
-    found = on_root(comm, lambda: list(motions(scene, body)))
+    found = on_root(comm, lambda: list(steady_motions(scene, body)))
     timings = {"pressure": pressure - start, "motion": perf_counter() - pressure}
     messages = [f"ratio {d.ratio}: {s.reason}" for d, s in found if s.reason != "periodic"]
     result = MassRun(Path(folder), pressed, body, found, timings, messages)
@@ -125,7 +131,7 @@ def _write(scene: Scene, result: MassRun) -> None:
             "nodes": table_dataset(points, "node"),
             "motion": table_dataset(tables["response/motion"], "case"),
         },
-        dump(scene),
+        dump_scene(scene),
     )
     contact.save_pressure_vtu({load: [seat]}, folder / "pressure.vtu")
     names = ("mesh/mesh", "contact/pressure_on_the_footprint", "response/loops", "response/spectra")

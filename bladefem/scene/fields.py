@@ -79,7 +79,7 @@ def value_at(scene: Scene, name: str) -> Any:
     return value
 
 
-def convert(value: object, field: Field) -> Any:
+def convert_value(value: object, field: Field) -> Any:
     """The SI value of a field from what was written, of the field's own type and within its range.
 
     ``None`` and "auto" leave an optional field to the program.

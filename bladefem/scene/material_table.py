@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import InputError, suggestion
 from ..util.arrays import RealArray
-from .fields import Field, convert, field_at
+from .fields import Field, convert_value, field_at
 from .tables import Material, Scene
 from .temperature_file import read_temperatures
 from .units import parse
@@ -120,7 +120,9 @@ def _parse_row(text: str) -> tuple[float, dict[str, Any]]:
                 f"material table, row {text!r}: '{name}' is no property of a "
                 f"row{suggestion(name, ROW_PROPERTIES)}"
             )
-        found[name] = convert(value, material_field(name)._replace(name=f"material table, {name}"))
+        found[name] = convert_value(
+            value, material_field(name)._replace(name=f"material table, {name}")
+        )
     constants = found.get("orthotropic")
     if constants is not None and len(constants) != 9:
         raise InputError(

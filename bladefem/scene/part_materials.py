@@ -8,7 +8,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from ..errors import InputError, suggestion
-from .fields import convert, field_at
+from .fields import convert_value, field_at
 from .tables import Material, Scene
 
 
@@ -54,6 +54,6 @@ def _parse_property(item: str, text: str) -> tuple[str, Any]:
         raise InputError(
             f"imported.materials = {text!r}: '{name}' is no property{suggestion(name, known)}"
         )
-    return name, convert(
+    return name, convert_value(
         value, field_at(f"material.blade.{name}")._replace(name=f"imported.materials, {name}")
     )

@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
 from ..errors import InputError, suggestion
-from .fields import Field, convert, each_field, field_at, value_at
+from .fields import Field, convert_value, each_field, field_at, value_at
 from .kinds import KINDS, kind_named
 from .tables import Scene
-from .units import exact, shortened, show
+from .units import shortened, show, show_exactly
 from .validate import validate
 
 
@@ -139,7 +139,7 @@ def given_keys(tables: dict[str, Any], path: str = "") -> set[str]:
     return names
 
 
-def resolved(scene: Scene, given: Iterable[str] | None = None) -> list[Row]:
+def resolved_rows(scene: Scene, given: Iterable[str] | None = None) -> list[Row]:
     """All values that this kind of scene uses; without ``given``, what differs from the default
     counts as given.
     """
@@ -154,7 +154,7 @@ def resolved(scene: Scene, given: Iterable[str] | None = None) -> list[Row]:
     return rows
 
 
-def dump(scene: Scene) -> str:
+def dump_scene(scene: Scene) -> str:
     """TOML text that :func:`load_scene` turns back into the very same scene, defaults written
     out.
     """
@@ -190,7 +190,7 @@ def _build_table(
         elif isinstance(value, dict):
             raise InputError(f"[{name}]: expected a single value, not a table")
         else:
-            values[key] = convert(value, leaves[name])
+            values[key] = convert_value(value, leaves[name])
     return table(**values)
 
 
@@ -243,7 +243,7 @@ def _replace_field(
         and dataclasses.is_dataclass(value)
     ):
         return dataclasses.replace(table, **{head: value})
-    return dataclasses.replace(table, **{head: convert(value, field_at(name))})
+    return dataclasses.replace(table, **{head: convert_value(value, field_at(name))})
 
 
 def _used_fields(scene: Scene) -> Iterable[Field]:
@@ -270,7 +270,7 @@ def _toml_value(value: Any, field: Field) -> str:
         return str(value)
     unit = field.meta.get("unit") or "1"
     if isinstance(value, float):
-        return repr(float(value)) if unit == "1" else json.dumps(exact(value, unit))
+        return repr(float(value)) if unit == "1" else json.dumps(show_exactly(value, unit))
     return json.dumps(value, ensure_ascii=False)
 
 

@@ -167,7 +167,7 @@ def show(value: float, unit: str = "1") -> str:
     return f"{number:.6g} {written}".rstrip()
 
 
-def exact(value: float, unit: str = "1") -> str:
+def show_exactly(value: float, unit: str = "1") -> str:
     """Like :func:`show`, but with as many digits as bring the very same number back through
     :func:`parse`.
     """

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from geometry.check_parameters import check_names, check_parameters
 
 from ..errors import InputError
-from .fields import convert, each_field, value_at
+from .fields import convert_value, each_field, value_at
 from .kinds import kind_named
 from .kinds.conditions import at_most
 from .material_table import expands, material_at, operating_temperature
@@ -37,7 +37,7 @@ def validate(scene: Scene) -> None:
     tables = kind.tables
     for field in each_field():
         if "." not in field.name or field.name.split(".")[0] in tables:
-            convert(value_at(scene, field.name), field)
+            convert_value(value_at(scene, field.name), field)
     problems = [
         *kind.conditions(scene),
         *_check_crystals(scene),

@@ -17,7 +17,7 @@ DENSITY_RANGE = (500.0, 25000.0)
 MAX_RIM_SPEED = 900.0
 
 
-def doubts(scene: Scene) -> list[str]:
+def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_doubtful_materials(scene), *_doubtful_mesh(scene)]
     if "operation" in kind_named(scene.kind).tables:

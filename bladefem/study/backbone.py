@@ -15,10 +15,10 @@ import numpy as np
 
 from ..hbm.model import ReducedModel
 from ..hbm.nonlinear_modes import force_at_resonance, nonlinear_mode
-from ..io.stage_cache import found_remark, on_root, stage
+from ..io.stage_cache import cached_stage, found_remark, on_root
 from ..util.arrays import BooleanArray, RealArray
 from ..util.communicator import Communicator
-from ..util.progress import Progress, unwatched
+from ..util.progress import Progress, without_progress
 from .adaptive.family import family_member
 from .pipeline.case_models import family_of_case, load_cases
 from .pipeline.loads import Curve
@@ -95,10 +95,10 @@ class Backbone:
         )
 
 
-def backbones(
+def run_backbones(
     run: SolvedRun,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> tuple[list[Backbone], list[str]]:
     """The nonlinear mode under every load of a run, and remarks on those that were found in the
     folder; computed on one rank.
@@ -119,7 +119,7 @@ def backbones(
         case = cases[curve.load, curve.mass]
         family = family_of_case(scene, run.mesh, run.reduced, patches, case)
         model = family_member(family, curve.settings).model
-        return backbone(model, curve, scene.excitation.mode - 1, ends)
+        return curve_backbone(model, curve, scene.excitation.mode - 1, ends)
 
     def compute(curve: Curve) -> Backbone:
         return on_root(comm, partial(alone, curve))
@@ -129,14 +129,14 @@ def backbones(
             "" if curve.mass is None else f"_{1e3 * curve.mass:g}g"
         )
         key = stage_key("response", scene, "backbone", curve.load, curve.mass, *ends)
-        made, seconds = stage(run.folder, name, key, partial(compute, curve), comm)
+        made, seconds = cached_stage(run.folder, name, key, partial(compute, curve), comm)
         found.append(made)
         if seconds is not None:
             remarks.append(found_remark(name, seconds))
     return found, remarks
 
 
-def backbone(
+def curve_backbone(
     model: ReducedModel,
     curve: Curve,
     mode: int,

@@ -129,7 +129,7 @@ def _read_diagram(texts: tuple[str, ...]) -> HaighDiagram:
     return HaighDiagram(table[:, 0], table[:, 1])
 
 
-def utilisation(
+def fatigue_utilisation(
     diagram: HaighDiagram,
     points: np.ndarray,
     alternating: np.ndarray,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..scene.fields import convert, field_at, split_values
-from ..scene.units import exact
+from ..scene.fields import convert_value, field_at, split_values
+from ..scene.units import show_exactly
 
 MOST_SAMPLES = 1000
 
@@ -39,7 +39,7 @@ def _read_range(text: str) -> Range:
     if not equals or len(values) != 2:
         raise InputError(f"--scatter {text}: expected key=low, high, such as contact.mu='0.2, 0.4'")
     field = field_at(name)
-    low, high = (convert(value, field) for value in values)
+    low, high = (convert_value(value, field) for value in values)
     numbers = all(isinstance(end, float) for end in (low, high))
     if not numbers:
         raise InputError(f"--scatter {text}: {name} is not a single real number, expected one")
@@ -81,4 +81,4 @@ def halton_values(ranges: Sequence[Range], count: int) -> list[tuple[str, ...]]:
 
 def _rounded(value: float, one: Range) -> str:
     """Six digits: names of folders are made from it."""
-    return exact(float(f"{value:.6g}"), one.unit)
+    return show_exactly(float(f"{value:.6g}"), one.unit)

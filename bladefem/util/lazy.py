@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 
 
-def loader(package: str, where: Mapping[str, str]) -> Callable[[str], object]:
+def lazy_getattr(package: str, where: Mapping[str, str]) -> Callable[[str], object]:
     """What a package's ``__getattr__`` has to be.
 
     Args:

@@ -1,7 +1,7 @@
 """Progress bars: on a terminal only, one for all ranks, and only for what takes over two seconds.
 
-Long loops take a :data:`Progress` that wraps what they go through; :func:`unwatched` shows nothing
-and is the default.
+Long loops take a :data:`Progress` that wraps what they go through; :func:`without_progress` shows
+nothing and is the default.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ DEFAULT_TERMINAL_SIZE = {"ncols": 80, "nrows": 24}
 Progress = Callable[..., Iterable[Any]]
 
 
-def unwatched(
+def without_progress(
     items: Iterable[T], label: str = "", total: int | None = None, **options: Any
 ) -> Iterable[T]:
     """The progress display that shows nothing."""
     return items
 
 
-def wanted(quiet: bool = False, rank: int = 0) -> bool:
+def progress_wanted(quiet: bool = False, rank: int = 0) -> bool:
     """Whether a bar is shown: not quiet, on rank 0, and the error stream is a terminal (mpirun: the
     starter's was).
     """
@@ -36,7 +36,7 @@ def wanted(quiet: bool = False, rank: int = 0) -> bool:
     )
 
 
-def watch(
+def with_progress(
     items: Iterable[T],
     label: str = "",
     total: int | None = None,
@@ -49,7 +49,7 @@ def watch(
         items: a list or a generator.
         label: what is being done.
         total: number of items, when ``items`` cannot say it.
-        shown: answer of :func:`wanted`.
+        shown: answer of :func:`progress_wanted`.
         options: passed on to tqdm.
     """
     if not shown:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..data import Elements, PortModel
 from ..hbm.linear.bodies import Damping
-from ..reduction.assemble import pair_model, recombine
+from ..reduction.assemble import pair_model, recombine_contact
 from ..reduction.matrices import port_model_from_matrices
 from .model import Pattern, Wheel, engine_order
 
@@ -79,7 +79,7 @@ def lumped_wheel(
             M, stiffness.real if real else stiffness, ports, nodal_diameter=d
         )
         pair = pair_model(body, slice(1, 2), phase)
-        sectors[d] = recombine(pair, np.array([[1.0, -1.0]]))
+        sectors[d] = recombine_contact(pair, np.array([[1.0, -1.0]]))
     element = Elements(np.array([kt]), np.zeros(1), np.ones(1), np.array([limit]), tangents=1)
     excitation = {1: engine_order(blades.count, order, np.array([force]))}
     return Wheel(blades.count, sectors, element, excitation, Damping(ratio=blades.damping))

@@ -85,12 +85,12 @@ def evaluate_wheel(
 ) -> WheelState:
     """Forces and residual at w (N, n, d, K)."""
     forces = contact_forces(balance.wheel, balance.elements, w, balance.samples, jacobian)
-    residual = w - balance.stuck + flexed(balance.flex, forces.p)
+    residual = w - balance.stuck + contact_motions(balance.flex, forces.p)
     size = max(np.linalg.norm(w), np.linalg.norm(balance.stuck), np.finfo(float).tiny)
     return WheelState(w, forces, residual, float(np.linalg.norm(residual) / size))
 
 
-def flexed(flex: WheelFlexibility, p: np.ndarray) -> np.ndarray:
+def contact_motions(flex: WheelFlexibility, p: np.ndarray) -> np.ndarray:
     """(N, n, d, K) motions by contact forces of the same shape."""
     count, _, _, K = p.shape
     moved = flex.contact_motion(to_complex(p.reshape(count, -1, K)))
@@ -175,7 +175,7 @@ class _Steps:
             self.products += 1
             x = prepare(y.reshape(flat))
             forces = (change @ x.reshape(len(change), -1, 1)).reshape(shape)
-            return (x.reshape(shape) + flexed(self.balance.flex, forces)).ravel()
+            return (x.reshape(shape) + contact_motions(self.balance.flex, forces)).ravel()
 
         size = state.residual.size
         operator = LinearOperator((size, size), matvec=product, dtype=float)

@@ -11,7 +11,7 @@ from ..data import PortModel, RigidBody
 from ..errors import InputError
 from ..hbm.linear.bodies import Damping
 from ..hbm.model import ReducedModel
-from ..reduction.assemble import join
+from ..reduction.assemble import join_bodies
 from .model import Pattern, Wheel, pattern_elements
 
 # residual flexibility of the blade readings over that of their modes: no deviation acts on it
@@ -72,7 +72,7 @@ def _all_dampers(wheel: Wheel) -> RigidBody | tuple[PortModel, ...] | None:
         ones = np.eye(wheel.count)
         mass = np.asarray(np.kron(ones, wheel.damper.mass), float)
         return RigidBody(mass, np.asarray(np.kron(ones, wheel.damper.B), float))
-    return None if wheel.damper is None else (join((wheel.damper,) * wheel.count),)
+    return None if wheel.damper is None else (join_bodies((wheel.damper,) * wheel.count),)
 
 
 def _port_rows(wheel: Wheel) -> dict[str, np.ndarray]:

@@ -20,7 +20,7 @@ from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ..util.arrays import IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
-from ..util.progress import Progress, unwatched
+from ..util.progress import Progress, without_progress
 from .model import Pattern, Wheel
 from .one_body import one_body_model
 from .resonance import Respond, WheelPeak, find_wheel_peak
@@ -87,10 +87,10 @@ class Amplification:
 
     def quantiles(self, share: float) -> list[Quantile]:
         """Of the amplification under each load."""
-        return [quantile(row, share) for row in self.factor]
+        return [quantile_interval(row, share) for row in self.factor]
 
 
-def quantile(
+def quantile_interval(
     sample: np.ndarray,
     share: float,
     confidence: float = CONFIDENCE_LEVEL,
@@ -121,7 +121,7 @@ def scatter_statistics(
     respond: Callable[[Wheel, Pattern], Respond],
     comm: Communicator | None = None,
     tolerance: float = 5e-3,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Amplification:
     """Peaks of all patterns under all loads; wheels are dealt out over the ranks.
 

@@ -18,7 +18,7 @@ import bladefem.study.pipeline
 from bladefem.cli.main import main, parser
 from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
-from bladefem.io.run_folder import locked
+from bladefem.io.run_folder import lock_run_folder
 from bladefem.scene.toml import load_scene
 from geometry.mesh import Mesh
 
@@ -358,7 +358,7 @@ def test_results_of_another_scene_are_put_away(pipeline, tmp_path, capsys):
 
 
 def test_one_command_at_a_time_in_a_folder(pipeline, tmp_path, capsys):
-    with locked(tmp_path):
+    with lock_run_folder(tmp_path):
         assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 2
         said = capsys.readouterr().err
         assert "another command works in it" in said and said.count("\n") == 1
@@ -484,9 +484,9 @@ from pathlib import Path
 from types import SimpleNamespace
 import bladefem.study.pipeline
 def run(scene, folder, until, comm=None, progress=None):
-    from bladefem.io.stage_cache import stage
-    stage(folder, "mesh", "key", lambda: 1.5)
-    stage(folder, "modes", "key", lambda: print("started", flush=True) or time.sleep(60))
+    from bladefem.io.stage_cache import cached_stage
+    cached_stage(folder, "mesh", "key", lambda: 1.5)
+    cached_stage(folder, "modes", "key", lambda: print("started", flush=True) or time.sleep(60))
 bladefem.study.pipeline.pipeline = SimpleNamespace(run=run)
 from bladefem.cli.main import main
 sys.exit(main(["modes", "scenes/wedge.toml", "-o", sys.argv[1]]))
@@ -602,6 +602,6 @@ def test_all_ranks_stop_on_a_scene_that_is_wrong(arguments, capsys):
 def test_all_ranks_stop_where_another_command_works(tmp_path, capsys):
     from mpi4py import MPI
 
-    with locked(tmp_path):
+    with lock_run_folder(tmp_path):
         assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 2
     assert ("another command" in capsys.readouterr().err) == (MPI.COMM_WORLD.rank == 0)

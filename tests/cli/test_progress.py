@@ -12,7 +12,7 @@ import subprocess
 import sys
 import termios
 
-from bladefem.util.progress import wanted, watch
+from bladefem.util.progress import progress_wanted, with_progress
 
 
 class Terminal(io.StringIO):
@@ -23,31 +23,37 @@ class Terminal(io.StringIO):
 def test_shown_on_a_terminal_only(monkeypatch):
     monkeypatch.delenv("BLADEFEM_TERMINAL", raising=False)
     monkeypatch.setattr(sys, "stderr", Terminal())
-    assert wanted() and not wanted(quiet=True) and not wanted(rank=1)
+    assert progress_wanted() and not progress_wanted(quiet=True) and not progress_wanted(rank=1)
     monkeypatch.setattr(sys, "stderr", io.StringIO())
-    assert not wanted()
+    assert not progress_wanted()
     monkeypatch.setenv("BLADEFEM_TERMINAL", "1")
-    assert wanted() and not wanted(rank=3)
+    assert progress_wanted() and not progress_wanted(rank=3)
 
 
 def test_items_pass_through_and_short_loops_stay_silent(monkeypatch):
     for shown in (True, False):
         screen = Terminal()
         monkeypatch.setattr(sys, "stderr", screen)
-        assert list(watch((i for i in range(5)), "loads", total=5, shown=shown)) == [0, 1, 2, 3, 4]
+        assert list(with_progress((i for i in range(5)), "loads", total=5, shown=shown)) == [
+            0,
+            1,
+            2,
+            3,
+            4,
+        ]
         assert "loads" not in screen.getvalue()
 
 
 def test_a_long_loop_shows_its_label(monkeypatch):
     screen = Terminal()
     monkeypatch.setattr(sys, "stderr", screen)
-    assert len(list(watch(range(3), "loads", delay=0.0, mininterval=0.0))) == 3
+    assert len(list(with_progress(range(3), "loads", delay=0.0, mininterval=0.0))) == 3
     assert "loads" in screen.getvalue()
 
 
 SIZELESS = """
-from bladefem.util.progress import watch
-for _ in watch(range(3), "loads", delay=0.0):
+from bladefem.util.progress import with_progress
+for _ in with_progress(range(3), "loads", delay=0.0):
     pass
 """
 

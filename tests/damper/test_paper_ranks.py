@@ -7,7 +7,7 @@ import pytest
 
 from bladefem.fem.compat import MPI
 from bladefem.scene.toml import load_scene
-from bladefem.study.kinds.zmass import press
+from bladefem.study.kinds.zmass import press_mass
 from verification.paper.plane_row import paper_model, row_of_blades
 
 pytestmark = pytest.mark.mpi
@@ -16,7 +16,8 @@ RANKS = (MPI.COMM_WORLD, MPI.COMM_SELF)
 
 def test_pressure_of_the_mass():
     together, alone = (
-        press(load_scene("scenes/zmass.toml", ["mesh.size=9 mm"]), comm=comm).seat for comm in RANKS
+        press_mass(load_scene("scenes/zmass.toml", ["mesh.size=9 mm"]), comm=comm).seat
+        for comm in RANKS
     )
     np.testing.assert_allclose(together.force, alone.force, rtol=1e-9)
 

@@ -7,7 +7,7 @@ import pytest
 
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.kinds.punch import (
-    indent,
+    indent_punch,
     johnson_approach,
     johnson_pressure,
     ring_stiffness,
@@ -20,7 +20,7 @@ A, E, NU = SCENE.punch.radius, SCENE.material.blade.E, SCENE.material.blade.nu
 
 @pytest.fixture(scope="module")
 def punched():
-    return indent(SCENE)
+    return indent_punch(SCENE)
 
 
 def test_pressure_is_johnsons(punched):
@@ -52,7 +52,7 @@ def test_springs_carry_the_load_but_only_half_of_the_moment(punched):
 
 def test_plane_punch():
     """p = P / (pi sqrt(a^2 - x^2)) for x < 0.8 a: within 1 % at a/10."""
-    found = indent(vary(SCENE, punch__dimension=2, mesh__contact_size=2e-4))
+    found = indent_punch(vary(SCENE, punch__dimension=2, mesh__contact_size=2e-4))
     inner = found.radius < 0.8 * A
     assert found.tilted is None
     assert found.pressure[inner] == pytest.approx(
@@ -64,6 +64,8 @@ def test_plane_punch_is_in_plane_strain():
     """Twice the block, 2 P (1 - nu^2) ln 2 / (pi E) more approach: -0.3 %; plane stress would be 10
     % more.
     """
-    near, far = (indent(vary(SCENE, punch__dimension=2, punch__half_width=w)) for w in (0.04, 0.08))
+    near, far = (
+        indent_punch(vary(SCENE, punch__dimension=2, punch__half_width=w)) for w in (0.04, 0.08)
+    )
     grown = 2 * near.total * (1 - NU**2) * np.log(2) / (np.pi * E)
     assert far.approach - near.approach == pytest.approx(grown, rel=0.01)

@@ -14,14 +14,20 @@ from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
 from bladefem.scene.toml import load_scene, vary
-from bladefem.study.kinds.zmass import clusters, drives, mass_on_foundation, motions, press
+from bladefem.study.kinds.zmass import (
+    cluster_nodes,
+    foundation_drives,
+    mass_on_foundation,
+    press_mass,
+    steady_motions,
+)
 
 SCENE = load_scene("scenes/zmass.toml", ["mesh.size=7 mm"])
 
 
 @pytest.fixture(scope="module")
 def pressed():
-    return press(SCENE)
+    return press_mass(SCENE)
 
 
 def test_the_solid_has_the_mass_and_inertia_of_table_1(pressed):
@@ -44,7 +50,7 @@ def test_pressure_is_balanced_symmetric_and_highest_at_the_edge(pressed):
 
 def test_pressure_is_linear_in_the_load(pressed):
     """The paper's Eq. 27, to rounding: the contact is a receding one."""
-    more = press(vary(SCENE, study__loads=(80.0,))).seat
+    more = press_mass(vary(SCENE, study__loads=(80.0,))).seat
     np.testing.assert_allclose(more.force / 80, pressed.seat.force / 50, rtol=1e-8)
 
 
@@ -52,12 +58,12 @@ def test_rigid_foundation_passes_the_patch_test():
     """Uniform pressure on top of a prism on a rigid plane is uniform below; here 48 times as stiff
     as the mass.
     """
-    pressure = press(vary(SCENE, material__blade__E=1e13)).seat.pressure
+    pressure = press_mass(vary(SCENE, material__blade__E=1e13)).seat.pressure
     assert np.ptp(pressure) / pressure.mean() < 0.03
 
 
 def test_loops_and_drift_of_the_paper(pressed):
-    found = list(motions(SCENE, mass_on_foundation(SCENE, pressed.seat), 1000))
+    found = list(steady_motions(SCENE, mass_on_foundation(SCENE, pressed.seat), 1000))
     assert [result.loops for _, result in found] == [1, 4, 2, 1]  # Fig. 10
     assert found[2][1].drift[0] == pytest.approx(0.105, rel=0.01)  # 0.1057 m/s at 50 Hz
     assert abs(found[0][1].drift[0]) < 1e-6
@@ -73,14 +79,14 @@ def test_skewed_top_pressure_moves_the_resultant_and_turns_the_mass():
         foundation__amplitude=(0.005, 0.003),
         foundation__ratios=(0.5,),
     )
-    body = mass_on_foundation(vary(scene, contact__points=None), press(scene).seat)
-    even = mass_on_foundation(vary(SCENE, contact__points=None), press(SCENE).seat)
+    body = mass_on_foundation(vary(scene, contact__points=None), press_mass(scene).seat)
+    even = mass_on_foundation(vary(SCENE, contact__points=None), press_mass(SCENE).seat)
     square = np.einsum(
         "n,ni,nj->ij", even.footprint.stiffness, even.footprint.points, even.footprint.points
     )
     wanted = square @ np.array(scene.foundation.skew) / (scene.z_mass.width / 2)
     assert body.footprint.share @ body.footprint.points == pytest.approx(wanted, rel=0.05)
-    _, result = next(motions(scene, mass_on_foundation(scene, press(scene).seat), 500))
+    _, result = next(steady_motions(scene, mass_on_foundation(scene, press_mass(scene).seat), 500))
     assert np.abs(result.motion.velocity[:, 2]).max() > 1.0  # rad/s
 
 
@@ -97,7 +103,7 @@ def test_pull_balances_mean_friction_while_the_mass_slips():
 
 def test_clusters_stay_on_the_solid(pressed):
     patch = pressed.seat.patch
-    label = clusters(patch.points[:, :2], patch.area, 20)
+    label = cluster_nodes(patch.points[:, :2], patch.area, 20)
     centres = [
         np.bincount(label, patch.area * x) / np.bincount(label, patch.area)
         for x in patch.points[:, :2].T
@@ -113,7 +119,7 @@ def test_refusals():
     with pytest.raises(InputError, match=r"foundation\.skew.*at most 1"):
         vary(SCENE, foundation__skew=(0.8, 0.5))
     with pytest.raises(InputError, match="expected 'z mass'"):
-        press(load_scene("scenes/punch.toml"))
+        press_mass(load_scene("scenes/punch.toml"))
 
 
 def test_scene_drives_the_motion(tmp_path, monkeypatch):
@@ -129,7 +135,7 @@ def test_scene_drives_the_motion(tmp_path, monkeypatch):
         "--set",
         "contact.points=10",
     ]
-    assert drives(SCENE)[1].ratio == Fraction(1, 4)
+    assert foundation_drives(SCENE)[1].ratio == Fraction(1, 4)
     assert main(["run", "scenes/zmass.toml", "-o", str(tmp_path), "-q", *options]) == 0
     text = (tmp_path / "motion.csv").read_text()
     assert "1/2" in text and "loops" in text

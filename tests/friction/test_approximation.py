@@ -11,10 +11,10 @@ from friction_cases import decay, random_case, single
 from bladefem.friction.aft import dissipated_energy
 from bladefem.friction.closed_form import jenkins
 from bladefem.friction.equivalent_linear import (
-    by_harmonic,
-    force_of,
     from_harmonics,
     from_series,
+    linear_force,
+    matrices_by_harmonic,
     work_of,
 )
 from bladefem.friction.fourier import derivative, synthesis
@@ -57,7 +57,7 @@ def test_it_is_the_least_squares_fit(signals):
 def test_work_is_equal_averaged_and_by_harmonic(signals):
     """Eq. 13. Eq. 16 as printed, without the factor k, misses the work by 3 to 10 times here."""
     u, f = signals
-    averaged, each = from_harmonics(u, f, OMEGA), by_harmonic(u, f, OMEGA)
+    averaged, each = from_harmonics(u, f, OMEGA), matrices_by_harmonic(u, f, OMEGA)
     np.testing.assert_allclose(work_of(averaged, u, OMEGA), work(u, f), rtol=1e-12)
     h = np.arange(1, 6)
     size = u[:, 1::2] ** 2 + u[:, 2::2] ** 2
@@ -102,7 +102,7 @@ def test_linear_force_of_a_series(signals):
         derivative(u) @ T.T
     )
     np.testing.assert_allclose(
-        force_of(fit, u @ T.T, OMEGA), expected + fit.constant[:, None], rtol=0, atol=1e-12
+        linear_force(fit, u @ T.T, OMEGA), expected + fit.constant[:, None], rtol=0, atol=1e-12
     )
 
 
@@ -115,7 +115,7 @@ def test_an_element_at_rest_has_none_and_leaves_the_others_theirs():
     for fit in (
         from_harmonics(u, f, OMEGA),
         from_series(u @ T.T, f @ T.T, OMEGA),
-        by_harmonic(u, f, OMEGA),
+        matrices_by_harmonic(u, f, OMEGA),
     ):
         assert np.isnan(fit.stiffness[0]).all()
         assert np.isnan(fit.damping[0]).all()
@@ -128,6 +128,6 @@ def test_an_element_at_rest_has_none_and_leaves_the_others_theirs():
 
 def test_a_harmonic_of_rounding_has_none():
     u, f = np.array([[0.0, 1.0, 0.0, 1e-17, 0.0]]), np.array([[0.0, 0.5, -0.3, 1e-16, 1e-16]])
-    fit = by_harmonic(u, f, OMEGA)
+    fit = matrices_by_harmonic(u, f, OMEGA)
     assert fit.stiffness[0, 0] == pytest.approx(0.5)
     assert np.isnan(fit.stiffness[0, 1])

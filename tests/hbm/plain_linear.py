@@ -16,7 +16,7 @@ from bladefem.hbm.linear.bodies import (
     port_motion,
     receptance_block,
 )
-from bladefem.hbm.linear.mean_motion import rigid_motions, with_springs
+from bladefem.hbm.linear.mean_motion import unheld_mean_motions, with_springs
 from bladefem.hbm.solution import Work, blade_motion
 
 
@@ -53,7 +53,7 @@ def plain_condense(model, omega, H):
         G += receptance_block(
             damper, modal_flexibility(damper, orders), damper.contact, damper.contact
         )
-    B, g, _ = rigid_motions(model, springs)
+    B, g, _ = unheld_mean_motions(model, springs)
     both = np.concatenate([G, free[:, :, None]], axis=2)
     solved = np.linalg.solve(G * springs + np.eye(len(springs)), both)
     A = solved[:, :, :-1].copy()

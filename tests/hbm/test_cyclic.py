@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 from bladefem.data import Elements, RigidBody
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.solve import solve
-from bladefem.reduction.assemble import join, recombine, wheel_models
+from bladefem.reduction.assemble import join_bodies, recombine_contact, wheel_models
 from bladefem.reduction.beam import reference_blade
 from bladefem.reduction.matrices import port_model_from_matrices
 
@@ -85,8 +85,8 @@ def test_a_sector_moves_as_the_whole_ring(damper):
     if damper is None:  # the contact is between the blades themselves
         pick = np.hstack([np.eye(2), -np.eye(2)])
         one, whole = (
-            tuple(recombine(body, pick) for body in one),
-            recombine(whole, np.kron(np.eye(N), pick)),
+            tuple(recombine_contact(body, pick) for body in one),
+            recombine_contact(whole, np.kron(np.eye(N), pick)),
         )
     e, force = elements(1 if damper is None else 2, 0.5), {1: np.array([2.0]), 2: np.array([0.3j])}
     sector = ReducedModel(one, e, force, Damping(ratio=0.02), damper)
@@ -119,7 +119,9 @@ def test_two_unlike_blades_with_a_damper_between_them():
     zero.
     """
     light, heavy = (reference_blade(1, platform=mass) for mass in (0.05, 0.06))
-    both = recombine(join((light, heavy)), np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0]]))
+    both = recombine_contact(
+        join_bodies((light, heavy)), np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0]])
+    )
     e = Elements(np.full(2, 1e6), np.zeros(2), np.ones(2), np.array([1.4, 1.0]), tangents=1)
     force = {1: np.array([1.0, 0.5j])}
     joined = ReducedModel(

@@ -23,7 +23,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import contact_forces
 from bladefem.hbm.sweep import size
-from bladefem.hbm.traction_gradient import farthest, tractions
+from bladefem.hbm.traction_gradient import admissible_tractions, farthest_start
 
 LINEAR = Options(tolerance=1e-12)
 
@@ -151,7 +151,7 @@ def test_the_derivative_by_the_start_is_that_of_differences():
     model = wedge_between_masses(10.0)
     omega = 2 * np.pi * 56.6
     point = solve(model, omega, 3, 0, options=LINEAR)
-    found = tractions(model, point)
+    found = admissible_tractions(model, point)
     assert len(found.nodes) == 1
     ends = []
     for step in (0.01, -0.01):
@@ -165,10 +165,10 @@ def test_the_farthest_admissible_forces_keep_every_node_in_stick():
     model = block(3, n0=4.0, force=0.4, mu=0.4)
     point = solve(model, 1.3, 3, 128)
     assert point.states["stick"] == 3
-    found = tractions(model, point)
+    found = admissible_tractions(model, point)
     for seed in range(4):
         direction = np.random.default_rng(seed).normal(size=(3, 2))
-        move = farthest(model, found, direction)
+        move = farthest_start(model, found, direction)
         # the polygon is 3.5 % too wide
         inside = solve(replace(model, start=0.93 * move), 1.3, 3, 128)
         assert inside.f[:, 1:, 0] - 0.93 * move == pytest.approx(

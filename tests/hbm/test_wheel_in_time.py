@@ -17,7 +17,7 @@ from numba import njit
 
 from bladefem.contact.seating import solve_seating as seat
 from bladefem.hbm.solve import solve
-from bladefem.reduction.truncate import truncated
+from bladefem.reduction.truncate import truncate_modes
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.assemble_model import joint_model
 from bladefem.study.pipeline.case_models import load_cases
@@ -44,7 +44,9 @@ def wheel():
     patches = found_patches(scene, mesh, excited=True)
     problem = seat_damper(bodies, patches)
     reduced = reduce_sector(bodies, patches, [0, 9, 18], 2 * MODES)
-    sector = {n: without_residual(truncated(body, MODES)) for n, body in reduced.sector.items()}
+    sector = {
+        n: without_residual(truncate_modes(body, MODES)) for n, body in reduced.sector.items()
+    }
     reduced = replace(reduced, sector=sector, damper=without_residual(reduced.damper))
     return SimpleNamespace(
         scene=scene, mesh=mesh, patches=patches, problem=problem, reduced=reduced

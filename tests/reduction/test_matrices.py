@@ -5,10 +5,16 @@ import pytest
 from scipy import io, linalg
 
 from bladefem.errors import InputError
-from bladefem.reduction.assemble import folded_diameter, join, pair_models, recombine, wheel_models
+from bladefem.reduction.assemble import (
+    folded_diameter,
+    join_bodies,
+    pair_models,
+    recombine_contact,
+    wheel_models,
+)
 from bladefem.reduction.beam import beam_matrices, reference_blade
 from bladefem.reduction.matrices import port_model_from_matrices, read_matrices
-from bladefem.reduction.truncate import truncated
+from bladefem.reduction.truncate import truncate_modes
 
 
 def receptance(body, w):
@@ -55,7 +61,7 @@ def test_modes_left_out_later_are_those_left_out_at_once(C):
     K, M = beam_matrices()
     ports = {"contact": np.array([10, 12]), "probe": np.array([38])}
     C = C * K if isinstance(C, float) else C
-    cut = truncated(port_model_from_matrices(M, K, ports, C=C), 4)
+    cut = truncate_modes(port_model_from_matrices(M, K, ports, C=C), 4)
     once = port_model_from_matrices(M, K, ports, C=C, count=4)
     np.testing.assert_allclose(receptance(cut, 3000.0), receptance(once, 3000.0), rtol=1e-9)
 
@@ -142,7 +148,7 @@ def test_in_antiphase_and_in_phase_models_stay_real():
 
 def test_two_bodies_as_one_with_relative_contact():
     one = reference_blade(1, modes=3)
-    both = recombine(join((one, one)), np.array([[1.0, 0.0, -1.0, 0.0]]))
+    both = recombine_contact(join_bodies((one, one)), np.array([[1.0, 0.0, -1.0, 0.0]]))
     R, S = receptance(one, 1000.0), receptance(both, 1000.0)
     assert both.ports == {"contact": slice(0, 1), "load": slice(1, 3), "probe": slice(3, 5)}
     np.testing.assert_allclose(S[0, 0], 2 * R[0, 0], rtol=1e-12)

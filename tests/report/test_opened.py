@@ -22,7 +22,7 @@ from bladefem.report.response_arrays import (
     resonance_arrays,
 )
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import dump
+from bladefem.scene.toml import dump_scene
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.run_records import (
     ModalRun,
@@ -92,7 +92,7 @@ def curves() -> list:
 def run(tmp_path_factory):
     folder = tmp_path_factory.mktemp("run")
     scene = Scene(title="A <run>")
-    (folder / "scene.toml").write_text(dump(scene))
+    (folder / "scene.toml").write_text(dump_scene(scene))
     groups = {
         "response": curve_arrays(points()),
         "resonance": resonance_arrays(curves()),
@@ -100,7 +100,7 @@ def run(tmp_path_factory):
         "loops": loop_arrays(cycles(), {"this": "right seat"}),
         "summary": xr.Dataset.from_dataframe(synthetic.summary()),
     }
-    write_results(folder / "results.nc", groups, dump(scene))
+    write_results(folder / "results.nc", groups, dump_scene(scene))
     return bladefem.open(folder)
 
 

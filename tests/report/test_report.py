@@ -22,7 +22,7 @@ from bladefem.report.statements import (
     response_answer,
     wrong_speed,
 )
-from bladefem.report.tables import readable, to_latex, to_markdown, write_tables
+from bladefem.report.tables import readable_texts, to_latex, to_markdown, write_tables
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import vary
@@ -73,7 +73,7 @@ def report(tmp_path):
 
 
 def test_readable_units():
-    text = readable(
+    text = readable_texts(
         pd.DataFrame(
             {
                 "load": [0.0, np.inf],

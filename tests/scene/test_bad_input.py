@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene.fields import convert, field_at
+from bladefem.scene.fields import convert_value, field_at
 from bladefem.scene.tables import Contact, Scene
 from bladefem.scene.toml import load_scene, scene_of
 from bladefem.scene.validate import validate
@@ -149,7 +149,7 @@ def test_scene_made_in_python_is_checked_as_well():
 def test_limits_themselves_are_allowed(limit):
     """As text too: 10 um is 9.999999999999999e-06 m."""
     name, _, text = limit.partition("=")
-    convert(text, field_at(name))
+    convert_value(text, field_at(name))
 
 
 def test_files_that_are_no_scenes(tmp_path):

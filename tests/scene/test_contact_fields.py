@@ -6,7 +6,7 @@ import pytest
 
 from bladefem.errors import InputError
 from bladefem.scene.tables import Seat
-from bladefem.scene.toml import dump, load_scene, resolved
+from bladefem.scene.toml import dump_scene, load_scene, resolved_rows
 
 WEDGE = "scenes/wedge.toml"
 
@@ -30,9 +30,9 @@ def test_seats_and_units(tmp_path):
         load_scene(WEDGE, ["contact.wear_coefficient=1e-14 m^2/N"]).contact.wear_coefficient
         == 1e-14
     )
-    (tmp_path / "again.toml").write_text(dump(scene))
+    (tmp_path / "again.toml").write_text(dump_scene(scene))
     assert load_scene(tmp_path / "again.toml") == scene
-    rows = {row.name: row for row in resolved(scene)}
+    rows = {row.name: row for row in resolved_rows(scene)}
     assert rows["contact.left.kt"].value == "2e+06 N/m" and rows["contact.left.kt"].help
     assert rows["contact.right.mu"].value == "auto"
 

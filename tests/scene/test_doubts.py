@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from bladefem.scene.toml import load_scene
-from bladefem.scene.warnings import doubts
+from bladefem.scene.warnings import implausible_values
 
 ROOT = Path(__file__).parents[2]
 
@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
     "file", sorted((ROOT / "scenes").glob("*.toml")), ids=lambda file: file.stem
 )
 def test_shipped_scenes_raise_none(file):
-    assert doubts(load_scene(file)) == []
+    assert implausible_values(load_scene(file)) == []
 
 
 @pytest.mark.parametrize(
@@ -44,7 +44,7 @@ def test_shipped_scenes_raise_none(file):
     ],
 )
 def test_of_the_wedge(override, sentence):
-    (said,) = doubts(load_scene(ROOT / "scenes" / "wedge.toml", [override]))
+    (said,) = implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", [override]))
     assert sentence in said
 
 
@@ -55,4 +55,4 @@ def test_limits_themselves_raise_none():
         "material.blade.rho=500 kg/m^3",
         "mesh.size=5 mm",
     ]
-    assert doubts(load_scene(ROOT / "scenes" / "wedge.toml", text)) == []
+    assert implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", text)) == []

@@ -12,7 +12,15 @@ from bladefem.errors import InputError
 from bladefem.scene.fields import each_field
 from bladefem.scene.kinds import KINDS
 from bladefem.scene.tables import Material, Scene
-from bladefem.scene.toml import dump, given_keys, load_scene, read_tables, resolved, scene_of, vary
+from bladefem.scene.toml import (
+    dump_scene,
+    given_keys,
+    load_scene,
+    read_tables,
+    resolved_rows,
+    scene_of,
+    vary,
+)
 
 SCENES = sorted(Path("scenes").glob("*.toml"))
 WEDGE = Path(__file__).with_name("wedge.toml")  # does not follow the shipped one
@@ -21,7 +29,7 @@ WEDGE = Path(__file__).with_name("wedge.toml")  # does not follow the shipped on
 @pytest.mark.parametrize("path", SCENES, ids=lambda p: p.stem)
 def test_shipped_scenes_load_and_come_back_from_their_own_text(path, tmp_path):
     scene = load_scene(path)
-    (tmp_path / "scene.toml").write_text(dump(scene), encoding="utf-8")
+    (tmp_path / "scene.toml").write_text(dump_scene(scene), encoding="utf-8")
     assert load_scene(tmp_path / "scene.toml") == scene
 
 
@@ -84,19 +92,21 @@ def test_vary_checks_values_that_were_made_in_python():
 
 def test_resolved_table_marks_defaults():
     written = read_tables(WEDGE, ["contact.points=12"])
-    rows = {r.name: r for r in resolved(scene_of(written), given_keys(written))}
+    rows = {r.name: r for r in resolved_rows(scene_of(written), given_keys(written))}
     assert not rows["aerofoil.twist"].is_default and rows["aerofoil.twist"].value == "20 deg"
     assert rows["aerofoil.camber"].is_default and rows["damper.mass"].value == "auto"
     assert rows["contact.points"].value == "12" and not rows["contact.points"].is_default
     assert not any(name.startswith("plane.") for name in rows)
     assert all(r.help for r in rows.values())
-    assert {r.name for r in resolved(Scene(contact=Scene().contact)) if not r.is_default} == set()
+    assert {
+        r.name for r in resolved_rows(Scene(contact=Scene().contact)) if not r.is_default
+    } == set()
 
 
 @pytest.mark.parametrize("kind", [k for k in KINDS if k != "imported"])
 def test_defaults_of_every_kind_are_a_valid_scene(kind):
     scene = scene_of({"kind": kind})
-    assert scene_of(tomllib.loads(dump(scene))) == scene
+    assert scene_of(tomllib.loads(dump_scene(scene))) == scene
 
 
 def test_relative_mesh_file_starts_at_the_scene(tmp_path):
@@ -108,7 +118,7 @@ def test_relative_mesh_file_starts_at_the_scene(tmp_path):
 
 def test_text_with_quotes_and_letters_of_other_languages_comes_back():
     scene = Scene(title='a "quoted" \\ title, µ, 叶片')
-    assert scene_of(tomllib.loads(dump(scene))) == scene
+    assert scene_of(tomllib.loads(dump_scene(scene))) == scene
 
 
 def test_every_field_has_a_help_and_a_range_that_holds_its_default():

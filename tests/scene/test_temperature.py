@@ -8,7 +8,7 @@ from bladefem.scene.material_table import material_at, operating_materials, prop
 from bladefem.scene.part_materials import part_materials
 from bladefem.scene.tables import Imported, Material, Scene
 from bladefem.scene.temperature_file import read_temperatures
-from bladefem.scene.toml import dump, scene_of
+from bladefem.scene.toml import dump_scene, scene_of
 from bladefem.scene.units import parse
 
 ROWS = [
@@ -56,7 +56,7 @@ def test_a_scene_with_a_table(tmp_path):
     from bladefem.scene.toml import load_scene
 
     file = tmp_path / "scene.toml"
-    file.write_text(dump(hot))
+    file.write_text(dump_scene(hot))
     assert load_scene(file) == hot
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene.units import exact, parse, show
+from bladefem.scene.units import parse, show, show_exactly
 
 # The right column is worked out by hand, not by the table of units.
 VALUES = [
@@ -116,4 +116,4 @@ def test_exact_text_brings_the_very_same_number_back(unit):
         1 / 3,
         *(rng.standard_normal(200) * 10.0 ** rng.integers(-12, 12, 200)),
     ]:
-        assert parse(exact(value, unit), unit) == value
+        assert parse(show_exactly(value, unit), unit) == value

@@ -7,8 +7,14 @@ import pytest
 import xarray as xr
 
 from bladefem.errors import InputError
-from bladefem.io.stage_cache import read_results, versions, write_results, write_table, write_text
-from bladefem.scene.toml import dump, load_scene
+from bladefem.io.stage_cache import (
+    library_versions,
+    read_results,
+    write_results,
+    write_table,
+    write_text,
+)
+from bladefem.scene.toml import dump_scene, load_scene
 
 
 def curve() -> xr.Dataset:
@@ -25,7 +31,7 @@ def curve() -> xr.Dataset:
 
 
 def test_groups_units_complex_numbers_and_origin_come_back(tmp_path):
-    scene = dump(load_scene("scenes/wedge.toml"))
+    scene = dump_scene(load_scene("scenes/wedge.toml"))
     path = write_results(
         tmp_path / "results.nc", {"response": curve(), "modes": curve()[["residual"]]}, scene
     )
@@ -63,5 +69,5 @@ def test_folder_that_vanished_is_an_input_error(tmp_path):
 
 
 def test_versions_name_the_finite_elements():
-    assert {"bladefem", "dolfinx", "petsc4py", "numpy"} <= set(versions())
-    assert versions()["dolfinx"] != "absent"
+    assert {"bladefem", "dolfinx", "petsc4py", "numpy"} <= set(library_versions())
+    assert library_versions()["dolfinx"] != "absent"

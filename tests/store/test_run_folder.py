@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.io.run_folder import locked, take_folder
+from bladefem.io.run_folder import lock_run_folder, take_folder
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 
@@ -60,8 +60,8 @@ def test_a_scene_that_cannot_be_read_counts_as_another(tmp_path):
 
 HOLDER = """
 import sys
-from bladefem.io.run_folder import locked
-with locked(sys.argv[1]):
+from bladefem.io.run_folder import lock_run_folder
+with lock_run_folder(sys.argv[1]):
     print("held", flush=True)
     sys.stdin.readline()
 """
@@ -72,9 +72,9 @@ def test_another_process_is_kept_out_and_a_dead_one_is_not(tmp_path):
         [sys.executable, "-c", HOLDER, tmp_path], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     )
     assert holder.stdout.readline() == b"held\n"
-    with pytest.raises(InputError, match="another command works in it"), locked(tmp_path):
+    with pytest.raises(InputError, match="another command works in it"), lock_run_folder(tmp_path):
         pass
     holder.kill()
     holder.communicate()
-    with locked(tmp_path):
+    with lock_run_folder(tmp_path):
         pass

@@ -12,7 +12,7 @@ from bladefem.contact.patch import make_patch
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.toml import load_scene
 from bladefem.study.modes.clamped_aerofoil import clamped_blade
-from bladefem.study.modes.stress import strength
+from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline import stages
 from bladefem.study.pipeline.stage_inputs import STAGE_INPUTS, declared_fields, stage_key
 from geometry.builders import build_here
@@ -66,7 +66,7 @@ STAGES = {
         stages.find_modes(stages.Bodies(scene, known.mesh)),
         clamped_blade(stages.Bodies(scene, known.mesh)),
     ),
-    "stress": lambda scene, known: strength(
+    "stress": lambda scene, known: mode_strength(
         stages.Bodies(scene, known.mesh), stages.excited_modes(scene, known.mesh, known.modes)
     ),
     "contact": lambda scene, known: stages.condense_contact(

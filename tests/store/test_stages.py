@@ -14,7 +14,7 @@ import scipy.sparse
 from bladefem.data import Elements, ModeSet, Patch, PortModel, PressureMap, RigidBody
 from bladefem.errors import InputError
 from bladefem.io.array_codec import read_npz, write_npz
-from bladefem.io.stage_cache import code_of, key_of, open_folder, stage, writing
+from bladefem.io.stage_cache import cached_stage, code_of, key_of, open_folder, write_atomically
 from bladefem.scene.tables import Scene
 from geometry.mesh import Mesh, Pair, Sector
 
@@ -137,36 +137,36 @@ def test_stage_is_computed_once_and_again_when_its_input_changes(tmp_path):
         calls.append(1)
         return {"x": np.arange(3.0)}
 
-    assert stage(tmp_path, "mesh", "a", compute)[1] is None
-    value, seconds = stage(tmp_path, "mesh", "a", compute)
+    assert cached_stage(tmp_path, "mesh", "a", compute)[1] is None
+    value, seconds = cached_stage(tmp_path, "mesh", "a", compute)
     assert 0 <= seconds < 10 and len(calls) == 1
     np.testing.assert_array_equal(value["x"], np.arange(3.0))
-    assert stage(tmp_path, "mesh", "b", compute)[1] is None
+    assert cached_stage(tmp_path, "mesh", "b", compute)[1] is None
     assert len(calls) == 2
-    assert stage(None, "mesh", "b", compute)[1] is None
+    assert cached_stage(None, "mesh", "b", compute)[1] is None
 
 
 @pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", b"not a zip"])
 def test_damaged_stage_is_computed_again(tmp_path, damage):
-    stage(tmp_path, "modes", "a", lambda: 1.5)
+    cached_stage(tmp_path, "modes", "a", lambda: 1.5)
     (tmp_path / "stages" / "modes.npz").write_bytes(damage)
-    assert stage(tmp_path, "modes", "a", lambda: 2.5) == (2.5, None)
+    assert cached_stage(tmp_path, "modes", "a", lambda: 2.5) == (2.5, None)
 
 
 def test_interrupted_stage_leaves_the_finished_ones(tmp_path):
-    stage(tmp_path, "mesh", "a", lambda: 1.0)
+    cached_stage(tmp_path, "mesh", "a", lambda: 1.0)
 
     def interrupted():
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        stage(tmp_path, "modes", "a", interrupted)
+        cached_stage(tmp_path, "modes", "a", interrupted)
     assert sorted(p.name for p in (tmp_path / "stages").iterdir()) == ["mesh.npz"]
-    assert stage(tmp_path, "mesh", "a", lambda: 2.0)[0] == 1.0
+    assert cached_stage(tmp_path, "mesh", "a", lambda: 2.0)[0] == 1.0
 
 
 def test_a_file_is_there_whole_or_not_at_all(tmp_path):
-    with pytest.raises(KeyboardInterrupt), writing(tmp_path / "x.txt") as temporary:
+    with pytest.raises(KeyboardInterrupt), write_atomically(tmp_path / "x.txt") as temporary:
         temporary.write_text("half")
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
@@ -186,11 +186,11 @@ def test_every_rank_gets_the_stage_and_its_error(tmp_path_factory):
 
     comm = MPI.COMM_WORLD
     folder = comm.bcast(tmp_path_factory.mktemp("run"))
-    assert stage(folder, "x", "k", lambda: np.arange(4), comm)[1] is None
-    value, seconds = stage(folder, "x", "k", lambda: None, comm)
+    assert cached_stage(folder, "x", "k", lambda: np.arange(4), comm)[1] is None
+    value, seconds = cached_stage(folder, "x", "k", lambda: None, comm)
     assert seconds is not None and value.tolist() == [0, 1, 2, 3]
     with pytest.raises(InputError, match="cannot be written"):
-        stage("/proc/run", "x", "k", lambda: 1, comm)
+        cached_stage("/proc/run", "x", "k", lambda: 1, comm)
 
 
 WRITE = """

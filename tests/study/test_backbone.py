@@ -15,7 +15,7 @@ from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.report.backbone import backbone_sentences, prediction_table
-from bladefem.study.backbone import backbone
+from bladefem.study.backbone import curve_backbone
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "hbm"))
 from models import single_mass
@@ -37,7 +37,7 @@ def test_one_element_in_closed_form():
     """Damping and frequency of a Jenkins element, and the amplitude at which a force meets them."""
     kt, limit = 0.6, 0.5
     model = single_mass(kt, limit)
-    found = backbone(model, curve_of(1.0, 1.0, 1, 0), 0, (0.1, 30.0))
+    found = curve_backbone(model, curve_of(1.0, 1.0, 1, 0), 0, (0.1, 30.0))
     assert found.converged.all()
     law = jenkins(found.amplitude, kt, limit)
     omega = np.sqrt(1 + law.stiffness)
@@ -57,7 +57,7 @@ def test_the_balance_of_the_reference_blade_is_predicted(load):
     model = reference_model(load=load, phase=1.0, points=2, modes=8, harmonics=3)
     peak = find_peak(model, 1.02 * float(model.side(1).omega[0]), 3, 128)
     curve = curve_of(peak.height, peak.omega / (2 * np.pi), 3, 128, load)
-    found = backbone(model, curve, 0, (0.03 * peak.height, 3 * peak.height))
+    found = curve_backbone(model, curve, 0, (0.03 * peak.height, 3 * peak.height))
     assert found.converged.all()
     assert abs(found.error) < 0.03
     assert found.predicted[1] == pytest.approx(found.balance[1], rel=0.005)
@@ -75,7 +75,7 @@ def test_the_balance_of_the_reference_blade_is_predicted(load):
 
 
 def test_a_force_that_no_amplitude_meets_is_said():
-    found = backbone(single_mass(0.6, 0.5), curve_of(1.0, 1.0, 1, 0), 0, (1e-6, 2e-6))
+    found = curve_backbone(single_mass(0.6, 0.5), curve_of(1.0, 1.0, 1, 0), 0, (1e-6, 2e-6))
     assert np.isnan(found.error)
     (_, said) = backbone_sentences([found])
     assert "reaches no resonance" in said and said.level == "warning"

@@ -67,14 +67,14 @@ def test_modes_in_another_phase_and_order_soften_the_same_model():
     errors = body_mesh.mode_errors(bodies, patches, modes)
     turned = replace(modes, shapes=modes.shapes * np.array([1, -1, 1, -1, -1, 1])[:, None, None])
     others = body_mesh.mode_errors(bodies, patches, turned)
-    first, second = (body_mesh.softened(reduced, e).sector[0] for e in (errors, others))
+    first, second = (body_mesh.softened_sector(reduced, e).sector[0] for e in (errors, others))
     np.testing.assert_allclose(first.omega, second.omega, rtol=1e-12)
     drop = 1 - first.omega[:6] / reduced.sector[0].omega[:6]
     alone = errors.energies.diagonal().real / reduced.sector[0].omega[:6] ** 2 / 2
     np.testing.assert_allclose(drop, alone, rtol=0.2)
 
     strangers = replace(errors, shapes=errors.shapes[:, ::-1] ** 2)
-    assert body_mesh.softened(reduced, strangers) is None
+    assert body_mesh.softened_sector(reduced, strangers) is None
 
 
 def test_reported_error_is_not_below_half_of_the_true_one():

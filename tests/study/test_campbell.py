@@ -8,7 +8,7 @@ from bladefem.errors import InputError
 from bladefem.fem.constraint import constrain
 from bladefem.fem.gyroscopic import coupling, waves
 from bladefem.fem.modes import modes
-from bladefem.study.modes.campbell import campbell, campbell_table, read_speeds
+from bladefem.study.modes.campbell import campbell_table, campbell_tables, read_speeds
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_orders_cross_the_wave_that_they_excite(wheel):
     """Of 6 blades EO 2 meets the backward wave, EO 4 the forward wave of nodal diameter 2, EO 3 a
     standing one.
     """
-    found = campbell(wheel, np.linspace(0, 12000, 7), [2, 3, 4], count=2)
+    found = campbell_tables(wheel, np.linspace(0, 12000, 7), [2, 3, 4], count=2)
     assert set(found.table["nodal_diameter"]) == {2, 3}
     assert 2500.0 in set(found.table["speed"])
     for order, column in ((2, "backward"), (4, "forward")):

@@ -17,11 +17,17 @@ from bladefem.report.chart import write_chart
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings, first_for
-from bladefem.study.chart.chart import chart
-from bladefem.study.chart.cpu_clock import running
+from bladefem.study.chart.chart import method_chart
+from bladefem.study.chart.cpu_clock import running_clock
 from bladefem.study.chart.meshes import mesh_table, mesh_variants
-from bladefem.study.chart.methods import Point, applicable, exact, shooting, tangential
-from bladefem.study.chart.rows import Bench, Job, resonance, rows
+from bladefem.study.chart.methods import (
+    Point,
+    exact_balance,
+    exact_shooting,
+    obstacle_in_time,
+    tangential_model,
+)
+from bladefem.study.chart.rows import Bench, Job, chart_rows, parabola_resonance
 from bladefem.study.pipeline.stages import build_mesh
 from bladefem.view.chart import draw_errors
 
@@ -31,7 +37,7 @@ PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 @pytest.fixture(scope="module")
 def made():
     family = family_of(reference_model(load=3.0, points=2, modes=12, harmonics=63))
-    return chart(family, first_for(family.modes), 2, 0.02, 8.0, (1150.0, 1600.0))
+    return method_chart(family, first_for(family.modes), 2, 0.02, 8.0, (1150.0, 1600.0))
 
 
 class FalseClock:
@@ -48,7 +54,7 @@ def _bench(run):
     omegas = np.linspace(0.96, 1.04, 9)
     return Bench(
         omegas,
-        resonance(omegas, np.array([run(None, omega, None).first for omega in omegas])),
+        parabola_resonance(omegas, np.array([run(None, omega, None).first for omega in omegas])),
         {"error": 0.0},
     )
 
@@ -104,8 +110,10 @@ def test_compilation_is_nobodys_time():
 
     bench = _bench(lambda model, omega, start: Point(1 / (0.02j + omega - 1), True, ""))
     begun = time.process_time()
-    with running() as clock:
-        (row,) = rows([Job("slow to compile", "new", None, run, bench)], clock.now() + 0.1, clock)
+    with running_clock() as clock:
+        (row,) = chart_rows(
+            [Job("slow to compile", "new", None, run, bench)], clock.now() + 0.1, clock
+        )
     spent = time.process_time() - begun
     assert row["converged"] and row["error"] < 1e-12
     assert clock.compiled > 0.9 * spent > 10 * row["time"]
@@ -137,7 +145,7 @@ def test_the_budget_is_used_and_cheap_ones_go_first():
         for name, s in costs.items()
     ]
     clock.time = 0.0
-    table = pd.DataFrame(rows(jobs, 50.0, clock)).set_index("name")
+    table = pd.DataFrame(chart_rows(jobs, 50.0, clock)).set_index("name")
     assert list(table.index) == list(costs)
     assert list(table.index[table["converged"]]) == ["dear 1", "dear 2", "cheap 1", "lost 2"]
     assert list(table.index[table["left_out"]]) == ["dear 3"]
@@ -170,23 +178,23 @@ def test_exact_events_and_shooting_agree_with_the_balance():
     """Shooting has no truncation, the balance of 15 harmonics 2e-6 of it; stiff modes are
     quasi-static to 1e-3.
     """
-    model = tangential(reference_model(load=3.0, points=1, modes=8, harmonics=15))
+    model = tangential_model(reference_model(load=3.0, points=1, modes=8, harmonics=15))
     omega = 2 * np.pi * 1340.0
     balance = solve(model, omega, 15, 4096).probe[1, 0]
-    assert exact(15)(model, omega, None).first == pytest.approx(balance, rel=1e-5)
-    assert shooting(model, omega, None).first == pytest.approx(balance, rel=1e-4)
+    assert exact_balance(15)(model, omega, None).first == pytest.approx(balance, rel=1e-5)
+    assert exact_shooting(model, omega, None).first == pytest.approx(balance, rel=1e-4)
 
 
 def test_methods_in_time_refuse_what_they_cannot_do():
-    assert applicable(reference_model(phase=1.0)) == "blades are not in phase"
-    assert applicable(reference_model()) == ""
+    assert obstacle_in_time(reference_model(phase=1.0)) == "blades are not in phase"
+    assert obstacle_in_time(reference_model()) == ""
 
 
 def test_resonance_of_one_mode_is_exact():
     """1/amplitude^2 of a weakly damped oscillator is a parabola in omega^2."""
     omega = np.linspace(0.97, 1.03, 7)
     first = 1 / (1 - omega**2 + 0.02j)
-    peak = resonance(omega, first)
+    peak = parabola_resonance(omega, first)
     assert peak.frequency * 2 * np.pi == pytest.approx(1.0, rel=1e-9)
     assert peak.amplitude == pytest.approx(50.0, rel=1e-9)
 

@@ -22,11 +22,11 @@ from bladefem.study.modes.mesh_convergence import (
     PLAUSIBLE_ORDERS,
     SIZE_RATIOS,
     _convergence_summary,
-    converge,
     default_sizes,
-    fitted,
+    fitted_order,
+    mesh_convergence,
     of_meshes,
-    paired,
+    paired_modes,
     richardson,
 )
 from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
@@ -49,11 +49,11 @@ def test_values_out_of_line_have_no_order(f):
 def test_more_meshes_are_fitted_and_their_scatter_told():
     h = np.array([2.0, 1.7, 1.4, 1.2, 1.0])
     exact = 100 + 3 * h**3
-    assert fitted(h, exact) == pytest.approx((100, 3, 0), abs=1e-4)
+    assert fitted_order(h, exact) == pytest.approx((100, 3, 0), abs=1e-4)
     noise = 0.3 * np.array([1, -1, 1, -1, 1])
-    limit, order, scatter = fitted(h, exact + noise)
+    limit, order, scatter = fitted_order(h, exact + noise)
     assert limit == pytest.approx(100, abs=1.5) and 2 < order < 4 and 0.2 < scatter < 0.6
-    assert np.isnan(fitted(h, 100 + noise)[1])
+    assert np.isnan(fitted_order(h, 100 + noise)[1])
 
 
 @pytest.mark.parametrize(
@@ -95,10 +95,10 @@ def test_plane_blade_converges():
     it says.
     """
     scene = load_scene("scenes/plane.toml")
-    found = converge(scene, [6e-3, 4e-3, 2.8e-3], count=3)
+    found = mesh_convergence(scene, [6e-3, 4e-3, 2.8e-3], count=3)
     assert len(found.points) == 9 and len(found.summary) == 3
     finer = (
-        converge(scene, [2.8e-3, 2e-3, 1.4e-3], count=3)
+        mesh_convergence(scene, [2.8e-3, 2e-3, 1.4e-3], count=3)
         .points.query("dofs == dofs.max()")["frequency"]
         .to_numpy()
     )
@@ -121,7 +121,7 @@ def test_modes_that_cross_keep_their_names():
     turned = replace(
         coarse, frequencies=coarse.frequencies[[1, 0, 2, 3]], shapes=coarse.shapes[[1, 0, 2, 3]]
     )
-    numbers, match = paired(meshes[0], turned, meshes[1], fine, 3)
+    numbers, match = paired_modes(meshes[0], turned, meshes[1], fine, 3)
     assert list(numbers) == [1, 0, 2] and match.min() > 0.99
 
 
@@ -142,9 +142,9 @@ def test_wrong_sizes():
     scene = load_scene("scenes/plane.toml")
     for sizes in ([1e-3, 2e-3, 3e-3], [2e-3, 1e-3]):
         with pytest.raises(InputError, match="at least three element sizes, from coarse to fine"):
-            converge(scene, sizes)
+            mesh_convergence(scene, sizes)
     with pytest.raises(InputError, match="its mesh is given"):
-        converge(replace(scene, kind="imported"), [3, 2, 1])
+        mesh_convergence(replace(scene, kind="imported"), [3, 2, 1])
     fine = replace(scene, mesh=replace(scene.mesh, size=1e-3))
     assert default_sizes(fine) == pytest.approx([1e-3 * r for r in SIZE_RATIOS])
     assert default_sizes(replace(scene, mesh=replace(scene.mesh, size=None))) == list(SIZE_RATIOS)

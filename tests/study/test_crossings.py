@@ -4,7 +4,12 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bladefem.study.modes.crossings import campbell_crossings, fold, interference_table, margins
+from bladefem.study.modes.crossings import (
+    campbell_crossings,
+    crossing_margins,
+    fold_order,
+    interference_table,
+)
 
 
 def southwell(speeds, still=300.0, factor=1.7):
@@ -17,7 +22,7 @@ def southwell(speeds, still=300.0, factor=1.7):
     [(6, 36, 6), (30, 36, 6), (36, 36, 0), (18, 36, 18), (43, 36, 7), (0, 12, 0)],
 )
 def test_folding(order, sectors, diameter):
-    assert fold(order, sectors) == diameter
+    assert fold_order(order, sectors) == diameter
 
 
 def test_crossing_of_a_southwell_line_is_exact_with_three_speeds():
@@ -69,4 +74,8 @@ def test_interference_and_margins():
     assert np.allclose(
         rows["margin"], [390 / 400 - 1, 1.5, 390 / 800 - 1, 0.25, 390 / 1000 - 1, 0.0]
     )
-    assert margins(table, 12, speed, [4, 8, 10])["verdict"].tolist() == ["close", "ok", "close"]
+    assert crossing_margins(table, 12, speed, [4, 8, 10])["verdict"].tolist() == [
+        "close",
+        "ok",
+        "close",
+    ]

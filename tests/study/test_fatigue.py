@@ -12,7 +12,7 @@ from bladefem.fem.stress import signed_von_mises, von_mises
 from bladefem.report.wheel import use_sentences
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
-from bladefem.study.fatigue import haigh_diagram, utilisation
+from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram
 from bladefem.study.mistuning.scatter_use import scattered_use
 from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.utilisation import highest_use, run_utilisation, utilisation_message
@@ -32,7 +32,7 @@ def test_goodman_line_is_its_closed_form():
     diagram = haigh_diagram(Fatigue(endurance=300 * MPA, ultimate=900 * MPA))
     mean = np.array([-400.0, 0.0, 300.0, 600.0]) * MPA
     alternating = np.array([150.0, 150.0, 200.0, 100.0]) * MPA
-    used = utilisation(diagram, nodes(4), alternating, mean).used
+    used = fatigue_utilisation(diagram, nodes(4), alternating, mean).used
     assert used == pytest.approx([0.5, 0.5, 1.0, 1.0], rel=1e-12)
 
 
@@ -46,7 +46,7 @@ def test_table_is_straight_between_its_points():
 
 def test_nothing_lasts_at_the_ultimate_strength():
     diagram = haigh_diagram(Fatigue(endurance=300 * MPA, ultimate=900 * MPA))
-    found = utilisation(diagram, nodes(2), np.array([1.0, 0.0]), np.full(2, 900 * MPA))
+    found = fatigue_utilisation(diagram, nodes(2), np.array([1.0, 0.0]), np.full(2, 900 * MPA))
     assert np.isinf(found.used[0])
     assert found.used[1] == 0
 
@@ -56,7 +56,7 @@ def test_worst_places_are_apart():
     count = 1001
     alternating = 100 * MPA * np.exp(-((np.linspace(0, 1, count) - 0.3) ** 2) / 0.02)
     diagram = haigh_diagram(Fatigue(endurance=300 * MPA, ultimate=900 * MPA))
-    found = utilisation(diagram, nodes(count), alternating, np.zeros(count))
+    found = fatigue_utilisation(diagram, nodes(count), alternating, np.zeros(count))
     places = found.worst_places(5)
     assert places[0] == found.worst == 300
     assert np.all(np.diff(found.used[places]) <= 0)
@@ -67,7 +67,7 @@ def test_worst_places_are_apart():
 def test_mean_stress_outside_of_the_diagram_names_the_place():
     diagram = haigh_diagram(Fatigue(haigh=("0 MPa: 300 MPa", "400 MPa: 180 MPa")))
     with pytest.raises(InputError, match=r"450 MPa at \(1000.0, 0.0, 0.0\) mm.*0 Pa to 400 MPa"):
-        utilisation(diagram, nodes(2), np.ones(2), np.array([100.0, 450.0]) * MPA)
+        fatigue_utilisation(diagram, nodes(2), np.ones(2), np.array([100.0, 450.0]) * MPA)
 
 
 @pytest.mark.parametrize(

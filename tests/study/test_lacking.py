@@ -52,7 +52,7 @@ def no_work(monkeypatch):
 
 def test_names_are_checked_before_the_modes(no_work):
     with pytest.raises(InputError, match="forced, nose"):
-        survey.survey(Scene(), None, survey.Wanted(loads=[("nose", 500.0)]))
+        survey.survey_modes(Scene(), None, survey.Wanted(loads=[("nose", 500.0)]))
     with pytest.raises(InputError, match=r"'nose'.*'this'"):
         pipeline.run(NOSE, None)
 

@@ -9,7 +9,7 @@ from bladefem.data import Elements, PortModel
 from bladefem.errors import NotSolvedError
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.study.pipeline.assemble_model import LoadCase
-from bladefem.study.pipeline.liftoff import named, seat_travel
+from bladefem.study.pipeline.liftoff import naming_the_load, seat_travel
 
 OMEGA, RATIO, FORCE = 1000.0, 1e-3, 2.0
 SHAPES = np.array(
@@ -41,7 +41,7 @@ def test_failures_name_the_load(load, lifts):
     case, model = case_of(load, 1e6)
     with (
         pytest.raises(NotSolvedError, match=r"study\.loads = .*N: .*line search stalled") as told,
-        named(case, model, 1, FORCE),
+        naming_the_load(case, model, 1, FORCE),
     ):
         raise NotSolvedError("line search stalled")
     assert ("lifts off" in str(told.value)) == lifts

@@ -14,17 +14,17 @@ from bladefem.fem.stress import nodal_stress, von_mises
 from bladefem.hbm.model import Damping
 from bladefem.scene.tables import Material
 from bladefem.study.modes.linear_response import (
-    displacement,
+    displacement_at,
     excitation_load,
-    forced,
+    find_linear_peak,
     half_widths,
-    peak,
+    linear_response,
     pressure_load,
-    probe,
+    probe_response,
     static_offset,
 )
 from bladefem.study.modes.linear_response_report import (
-    answer,
+    forced_response_answer,
     read_damping,
     read_loads,
     stress_states,
@@ -94,13 +94,13 @@ def test_sector_answers_as_the_whole_wheel(order, damping):
     """
     one = bodies(order=order, count=COUNT, divisions=SMALL)
     load = excitation_load(one).astype(complex) + pressure_load(one, "tip", 50.0 + 20.0j)
-    response = forced(one, load, damping, modes=25)
+    response = linear_response(one, load, damping, modes=25)
     for frequency in (0.0, 0.97 * response.omega[0] / (2 * np.pi)):
         exact = whole_wheel(one, load, order, frequency, damping)
         if frequency == 0.0 and damping.structural:
             continue  # a loss factor means nothing at rest
         np.testing.assert_allclose(
-            displacement(response, frequency), exact, atol=1e-4 * abs(exact).max()
+            displacement_at(response, frequency), exact, atol=1e-4 * abs(exact).max()
         )
 
 
@@ -109,9 +109,9 @@ def test_resonance_of_a_single_mode():
     quarter.
     """
     one = bodies(order=2)
-    response = forced(one)
+    response = linear_response(one)
     vector = excitation_load(one) / one.scene.excitation.force
-    f, amplitude = peak(response, vector)
+    f, amplitude = find_linear_peak(response, vector)
     alone = (
         abs(response.modal_load[0]) ** 2
         / one.scene.excitation.force
@@ -119,10 +119,10 @@ def test_resonance_of_a_single_mode():
     )
     assert amplitude == pytest.approx(alone, rel=0.01)
     assert f == pytest.approx(response.omega[0] / (2 * np.pi), rel=1e-4)
-    at = probe(response, vector, np.array([f, 0.5 * f]))
+    at = probe_response(response, vector, np.array([f, 0.5 * f]))
     assert abs(np.angle(at[0]) + np.pi / 2) < 0.05 and abs(np.angle(at[1])) < 0.05
     assert abs(at[0]) == pytest.approx(amplitude)
-    stress = von_mises(nodal_stress(one.blade, displacement(response, f)))
+    stress = von_mises(nodal_stress(one.blade, displacement_at(response, f)))
     assert stress.max() > 0 and np.isfinite(stress).all()
 
 
@@ -151,9 +151,9 @@ def test_wrong_loads_and_modes():
     one = bodies(count=COUNT, divisions=SMALL)
     for load in (np.zeros(3), np.zeros(3 * len(one.mesh.points))):
         with pytest.raises(InputError, match="load of shape"):
-            forced(one, load)
+            linear_response(one, load)
     with pytest.raises(InputError, match="mode is 30"):
-        peak(forced(one, modes=5), excitation_load(one), 30)
+        find_linear_peak(linear_response(one, modes=5), excitation_load(one), 30)
 
 
 def test_preload_is_chosen_by_the_scene():
@@ -174,17 +174,17 @@ def test_curve_holds_every_resonance_and_its_half_power_points():
     modal damping ratio.
     """
     one = bodies(order=2)
-    found = answer(one, [("excitation", 0.0)], Damping(structural=0.004), count=2)
+    found = forced_response_answer(one, [("excitation", 0.0)], Damping(structural=0.004), count=2)
     assert half_widths(found.response) == pytest.approx(0.002)
     points, row = found.points, found.resonances.iloc[0]
     below = points["frequency"] < 1.2 * row["natural"]
     assert row["amplitude"] == pytest.approx(points["amplitude"][below].max(), rel=1e-3)
     vector = excitation_load(one) / one.scene.excitation.force
-    sides = abs(probe(found.response, vector, row["natural"] * np.array([0.998, 1.002])))
+    sides = abs(probe_response(found.response, vector, row["natural"] * np.array([0.998, 1.002])))
     assert sides / row["amplitude"] == pytest.approx(np.sqrt(0.5), rel=0.01)
     assert np.linalg.norm(found.shapes[0], axis=1).max() == pytest.approx(row["largest"])
     assert row["peaked"]
-    doubled = answer(
+    doubled = forced_response_answer(
         one, [("excitation", 0.0), ("excitation", 0.0)], Damping(structural=0.004), count=2
     )
     assert doubled.points["amplitude"].to_numpy() == pytest.approx(
@@ -209,9 +209,9 @@ def test_words_for_loads_and_damping():
             read(text)
     one = bodies(count=COUNT, divisions=SMALL)
     with pytest.raises(InputError, match="tip"):
-        answer(one, [("tpi", 1.0)])
+        forced_response_answer(one, [("tpi", 1.0)])
     with pytest.raises(InputError, match="some damping"):
-        answer(one, (), Damping())
+        forced_response_answer(one, (), Damping())
 
 
 def test_table_of_stresses_has_the_extremes_of_every_state():

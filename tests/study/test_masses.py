@@ -10,7 +10,7 @@ from bladefem.study.pipeline.stages import (
     build_mesh,
     contact_patches,
     reduce_sector,
-    weighted,
+    with_damper_mass,
 )
 
 
@@ -25,9 +25,9 @@ def test_weighted_damper_is_the_one_with_that_density():
         scene = load_scene("scenes/plane.toml", ["mesh.size=6 mm", f"plane.damper_mass={mass}"])
         bodies = Bodies(scene, build_mesh(scene))
         found[mass] = reduce_sector(bodies, contact_patches(bodies.mesh), [0], 4)
-    scaled, meshed = weighted(found["20 g"], 0.07), found["70 g"]
+    scaled, meshed = with_damper_mass(found["20 g"], 0.07), found["70 g"]
     assert np.isclose(scaled.mass, 0.07) and np.isclose(meshed.mass, 0.07, rtol=1e-9)
     for omega in (300.0, 2 * np.pi * 5000.0):
         a, b = receptance(scaled.damper, omega), receptance(meshed.damper, omega)
         assert abs(a - b).max() < 1e-7 * abs(b).max()
-    assert weighted(meshed, None) is meshed
+    assert with_damper_mass(meshed, None) is meshed

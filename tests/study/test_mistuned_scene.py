@@ -17,7 +17,7 @@ from bladefem.scene.tables import Fatigue
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
 from bladefem.study.adaptive.settings import first_settings
-from bladefem.study.fatigue import haigh_diagram, utilisation
+from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram
 from bladefem.study.mistuning.blade_stress import (
     WheelShapes,
     all_modes,
@@ -119,10 +119,10 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes):
     blade = blade_nodes(run.mesh)
     place = run.mesh.points[blade]
     mean = run.strength.mean[blade]
-    tuned = utilisation(diagram, place, stress.field[blade], mean)
+    tuned = fatigue_utilisation(diagram, place, stress.field[blade], mean)
     for number in (0, 17):
         own = blade_stress(shapes, wheel, pattern, case, found, number, points)
-        used = utilisation(diagram, place, own.field[blade], mean)
+        used = fatigue_utilisation(diagram, place, own.field[blade], mean)
         np.testing.assert_allclose(used.used, tuned.used, rtol=0, atol=1e-9 * tuned.used.max())
         assert used.worst == tuned.worst
 

@@ -12,10 +12,15 @@ from bladefem.study.modes.comparison import (
     family_table,
     mac,
     mac_of,
-    participation,
+    participation_factors,
     pure_shapes,
 )
-from bladefem.study.modes.mesh_transfer import MID_SIDE_EDGES, nodal_volumes, simplices, transfer
+from bladefem.study.modes.mesh_transfer import (
+    MID_SIDE_EDGES,
+    nodal_volumes,
+    simplices,
+    transfer_fields,
+)
 from bladefem.study.modes.survey import clamped_blade
 from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
 from geometry.mesh import Mesh
@@ -160,7 +165,9 @@ def test_transfer_is_exact_for_quadratics_on_second_order_cells():
     inside = np.einsum("kc,kci->ki", rng.dirichlet(np.ones(4), 200), block.points[cells])
     x, y, z = inside.T
     assert np.allclose(
-        transfer(block, field, inside)[0], np.stack([x * y, y**2 - z, 1 + x * z], 1), atol=1e-12
+        transfer_fields(block, field, inside)[0],
+        np.stack([x * y, y**2 - z, 1 + x * z], 1),
+        atol=1e-12,
     )
 
 
@@ -196,7 +203,7 @@ def test_effective_masses_of_a_chain_add_up_to_its_mass():
     values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
     shapes = (vectors / root[:, None]).T.reshape(-1, n, 3)
     points = rng.normal(size=(n, 3))
-    table = participation(
+    table = participation_factors(
         ModeSet(np.sqrt(values), shapes, None, values * 0), mass, points, ("x", "z", "rx")
     )
     assert np.allclose(table.groupby("direction")["share"].sum(), 1.0)
@@ -214,7 +221,7 @@ def test_first_bending_mode_carries_0_613_of_a_beams_mass():
     shape = np.zeros((1, 400, 3))
     shape[0, :, 1] = beam_function(0, s)
     points = np.stack([s, 0 * s, 0 * s], 1)
-    table = participation(
+    table = participation_factors(
         ModeSet(np.ones(1), shape, None, np.zeros(1)), np.eye(1200) / 400, points, ("y",)
     )
     assert np.isclose(table["share"].iloc[0], 0.6131, atol=2e-4)

@@ -10,7 +10,7 @@ import pytest
 from bladefem.contact.interface_elements import friction_elements
 from bladefem.errors import InputError
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import dump, load_scene, vary
+from bladefem.scene.toml import dump_scene, load_scene, vary
 from bladefem.study.pipeline.history import history_sentence, refuse_jamming
 from bladefem.study.pipeline.pipeline import run
 from bladefem.study.pipeline.stages import build_mesh, contact_patches
@@ -26,7 +26,7 @@ def test_histories_are_words_or_speeds_and_survive_writing(tmp_path):
     )
     for one in (scene, vary(Scene(), "contact.history", "spin-up")):
         file = tmp_path / "scene.toml"
-        file.write_text(dump(one))
+        file.write_text(dump_scene(one))
         assert load_scene(file).contact.history == one.contact.history
 
 

@@ -15,7 +15,7 @@ from bladefem.hbm.continuation import follow
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
-from bladefem.report.tables import readable, units_of
+from bladefem.report.tables import readable_texts, units_of
 from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.stability import (
     in_one_body,
@@ -98,7 +98,7 @@ def test_tables_and_pictures_show_it():
             "multiplier": [1.0, 1.2, np.nan],
         }
     )
-    assert "largest Floquet multiplier" in " ".join(readable(points).columns)
+    assert "largest Floquet multiplier" in " ".join(readable_texts(points).columns)
     assert "multiplier" not in units_of(points)
     axes = draw_responses(points).axes[0]
     marks = [line for line in axes.get_lines() if line.get_label() == "unstable (1)"]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bladefem.scene.tables import Excitation, Material, Materials, Operation, Scene
-from bladefem.study.modes.stress import strength
+from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.stages import Bodies, excited_modes, find_modes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))
@@ -31,7 +31,7 @@ def test_slender_blade_without_contraction():
         excitation=Excitation(at="x1", direction=(0.0, 1.0, 0.0), mode=1),
     )
     bodies = Bodies(scene, mesh)
-    found = strength(bodies, excited_modes(scene, mesh, find_modes(bodies, count=2)))
+    found = mode_strength(bodies, excited_modes(scene, mesh, find_modes(bodies, count=2)))
     outermost = 1 - 2 * abs(found.alternating_at[1] / T - 0.5)  # 0 at the surface
     bending = E * T / 2 * 1.875104**2 / L**2 * (1 - outermost) * (1 - found.alternating_at[0] / L)
     assert found.alternating == pytest.approx(bending, rel=0.02)

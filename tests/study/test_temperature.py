@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from bladefem.scene.toml import load_scene
-from bladefem.study.modes.stress import strength
+from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline import stages
 from bladefem.study.pipeline.stage_inputs import stage_key
 
@@ -61,11 +61,11 @@ def test_heat_at_rest_makes_mean_stress(mesh):
         SCENES / "plane.toml", [*HOT, "operation.speed=0 rpm", "temperature.uniform=120 degC"]
     )
     bodies = stages.Bodies(hot, mesh)
-    steady = strength(bodies, stages.find_modes(bodies)[0]).steady
+    steady = mode_strength(bodies, stages.find_modes(bodies)[0]).steady
     assert 0.3 < steady / (hot.material.blade.E * 1.2e-5 * 100) < 3
     cold = replace(hot, temperature=replace(hot.temperature, uniform=None))
     bodies = stages.Bodies(cold, mesh)
-    assert strength(bodies, stages.find_modes(bodies)[0]).steady == 0
+    assert mode_strength(bodies, stages.find_modes(bodies)[0]).steady == 0
 
 
 def test_softer_when_hot(mesh):

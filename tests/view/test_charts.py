@@ -9,7 +9,7 @@ from test_pictures import ink
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
-from bladefem.study.modes.crossings import campbell_crossings, fold
+from bladefem.study.modes.crossings import campbell_crossings, fold_order
 from bladefem.view.convergence import draw_convergence
 from bladefem.view.maps import draw_map
 from bladefem.view.speed import (
@@ -63,7 +63,7 @@ def test_interference_rings_what_is_too_close(folder):
 def test_folding_is_that_of_the_tables():
     orders = np.arange(60)
     for sectors in (7, 12):
-        assert folded(orders, sectors).tolist() == [fold(int(k), sectors) for k in orders]
+        assert folded(orders, sectors).tolist() == [fold_order(int(k), sectors) for k in orders]
 
 
 def test_maps_name_methods_and_cross_failures(folder):

@@ -5,7 +5,7 @@ import numpy as np
 
 from bladefem.data import Elements, RigidBody
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.reduction.assemble import join
+from bladefem.reduction.assemble import join_bodies
 from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.wheel.model import engine_order, tuned_wheel
 
@@ -86,7 +86,7 @@ def dense_ring(own, damper, excitation, damping=DAMPING, C=None, dK=None, dM=Non
     if isinstance(damper, RigidBody):
         damper = RigidBody(np.kron(np.eye(N), damper.mass), np.kron(np.eye(N), damper.B))
     elif damper is not None:
-        damper = (join((damper,) * N),)
+        damper = (join_bodies((damper,) * N),)
     whole = {h: amplitudes[:, 0] for h, amplitudes in excitation.items()}
     return ReducedModel((body,), tiled(own), whole, damping, damper)
 

@@ -19,7 +19,7 @@ from bladefem.damper.loops import count_loops
 from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
 from bladefem.study.kinds.punch import (
-    indent,
+    indent_punch,
     johnson_approach,
     johnson_pressure,
     ring_stiffness,
@@ -146,7 +146,7 @@ def contact(folder: Path) -> Iterator[Claim]:
     scene = load_scene(SCENES / "punch.toml")
     a = scene.punch.radius
     block = scene.material.blade
-    found = indent(scene)
+    found = indent_punch(scene)
     edges = np.linspace(0, 1, 11)
     r = np.linspace(0, 0.995, 200)
     springs = ring_stiffness(edges * a, a, block.E, block.nu)

@@ -11,11 +11,11 @@ import numpy as np
 from bladefem.damper.loops import Drive, Steady, ratio_table, spectrum, steady
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.data import PressureMap
-from bladefem.friction.equivalent_linear import force_of, from_series
+from bladefem.friction.equivalent_linear import from_series, linear_force
 from bladefem.report.zmass import draw_motions
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
-from bladefem.study.kinds.zmass import mass_on_foundation, motions, press
+from bladefem.study.kinds.zmass import mass_on_foundation, press_mass, steady_motions
 from bladefem.view.mesh import draw_mesh
 from bladefem.view.paper import draw_footprint
 
@@ -34,14 +34,14 @@ MILLI = 1e3
 def mass(folder: Path) -> Iterator[Claim]:
     """All of Sect. 4."""
     scene = load_scene(SCENE)
-    pressed = press(scene)
+    pressed = press_mass(scene)
     body = mass_on_foundation(scene, pressed.seat)
     draw_mesh(pressed.mesh, folder / "fig_7.png", title="Z-shaped mass on an elastic block")
     draw_footprint(pressed.seat, body.footprint, folder / "fig_8.png")
     yield _table_1(scene, body)
     yield _proportional(scene, pressed.seat)
     yield from _undisturbed(scene, pressed.seat)
-    found = list(motions(scene, body, 4000))
+    found = list(steady_motions(scene, body, 4000))
     draw_motions(found, folder / "fig_10.png", folder / "fig_11.png")
     results = {str(drive.ratio): result for drive, result in found}
     counts = [result.loops for result in results.values()]
@@ -89,7 +89,7 @@ def _table_1(scene: Scene, body: MassOnFoundation) -> Claim:
 
 
 def _proportional(scene: Scene, seat: PressureMap) -> Claim:
-    more = press(vary(scene, study__loads=(80.0,))).seat
+    more = press_mass(vary(scene, study__loads=(80.0,))).seat
     mean = seat.force.sum() / seat.patch.area.sum()
     change = np.abs(more.force / 80 - seat.force / 50).max() * len(seat.force)
     return Claim(
@@ -220,7 +220,7 @@ def _beside_ellipse(result: Steady) -> float:
     """
     motion = result.relative[:, 0] + result.drift[0] * result.time
     force = result.motion.force[:, 0]
-    left = force - force_of(from_series(motion, force, 1.0), motion, 1.0)
+    left = force - linear_force(from_series(motion, force, 1.0), motion, 1.0)
     return float(np.linalg.norm(left) / np.linalg.norm(force))
 
 
@@ -248,7 +248,8 @@ def _coupled(scene: Scene) -> Claim:
         foundation__ratios=(0.0, 0.5),
     )
     turned = [
-        result for _, result in motions(bent, mass_on_foundation(bent, press(bent).seat), 1000)
+        result
+        for _, result in steady_motions(bent, mass_on_foundation(bent, press_mass(bent).seat), 1000)
     ]
     spin = max(np.abs(r.motion.velocity[:, 2]).max() for r in turned)
     return Claim(

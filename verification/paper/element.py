@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import trapezoid
 
-from bladefem.friction.equivalent_linear import Approximation, force_of, from_series
+from bladefem.friction.equivalent_linear import Approximation, from_series, linear_force
 
 from .printed_laws import corrected, differential
 
@@ -106,7 +106,7 @@ def linear_fit(loop: Loop) -> tuple[Approximation, np.ndarray]:
     [N].
     """
     fit = from_series(loop.motion[1:], loop.force[1:], 1.0)
-    force = force_of(fit, loop.motion[1:], 1.0)
+    force = linear_force(fit, loop.motion[1:], 1.0)
     return fit, np.r_[force[-1], force]
 
 

@@ -20,8 +20,8 @@ from bladefem.contact.seating import ContactProblem, solve_seating
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
 from bladefem.hbm.model import ReducedModel
-from bladefem.io.stage_cache import stage
-from bladefem.reduction.assemble import recombine
+from bladefem.io.stage_cache import cached_stage
+from bladefem.reduction.assemble import recombine_contact
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
@@ -67,7 +67,7 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
             condense_contact(bodies, patches), reduce_sector(bodies, patches, [0], modes), mesh
         )
 
-    return stage(folder, "row", stage_key("contact", scene, modes), compute, comm)[0]
+    return cached_stage(folder, "row", stage_key("contact", scene, modes), compute, comm)[0]
 
 
 def paper_model(
@@ -87,7 +87,7 @@ def paper_model(
     tangents = np.kron(np.eye(nodes), [[0.0, 1.0]])
     sides = tuple(
         replace(side, residual=0 * side.residual)
-        for side in (recombine(s, tangents) for s in model.sides)
+        for side in (recombine_contact(s, tangents) for s in model.sides)
     )
     mass = row.reduced.mass if mass is None else mass
     return replace(

@@ -22,7 +22,7 @@ from ..solver.newton_compiled import Condensed, motion_scale
 from .bodies import modal_flexibility
 from .condensation_compiled import linear_part, unsprung_flexibility
 from .contact_flexibility import form_matrices
-from .mean_motion import rigid_motions
+from .mean_motion import unheld_mean_motions
 from .packed_bodies import Bodies, prepared_bodies
 
 
@@ -82,7 +82,7 @@ def condense(
     """
     springs = model.springs.ravel()
     bodies = prepared_bodies(model, harmonics)
-    B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
+    B, g, rigid = model.once("rigid motions", lambda: unheld_mean_motions(model, springs))
     # the mean displacements have no part in the balance
     if not model.coupled:
         B = B[:, :0]

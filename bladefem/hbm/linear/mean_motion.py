@@ -17,7 +17,7 @@ UNRESISTED_SHARE = 1e-12
 REGULARISATION = 5e-8
 
 
-def rigid_motions(
+def unheld_mean_motions(
     model: ReducedModel, springs: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """B (m, r), g (r,) and rigid (r0, r) of `Linear`, which do not depend on the frequency."""

@@ -17,7 +17,7 @@ from .. import policy
 from ..model import ReducedModel
 from ..solver.deflation import common_motions
 from .bodies import Stack
-from .mean_motion import rigid_motions, with_springs
+from .mean_motion import unheld_mean_motions, with_springs
 from .woodbury import bodies_of, frequency_independent_parts
 
 
@@ -114,7 +114,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
         *fixed,
         *_excited_modes(fixed, springs, push, direct),
     ]
-    B, g, rigid = model.once("rigid motions", lambda: rigid_motions(model, springs))
+    B, g, rigid = model.once("rigid motions", lambda: unheld_mean_motions(model, springs))
     still = np.flatnonzero(blades.omega[0] == 0)
     mean = _mean_flexibility(
         (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g)

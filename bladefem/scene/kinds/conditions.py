@@ -21,7 +21,7 @@ BLADE_FACES = (
 )
 
 
-def below(
+def below_limit(
     name: str,
     value: float,
     limit: float,

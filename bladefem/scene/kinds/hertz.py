@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import at_most, below, one_of
+from .conditions import at_most, below_limit, one_of
 from .record import COMMON_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
     hertz = scene.hertz
     yield from one_of("hertz.interference", hertz.interference, scene)
-    yield from below(
+    yield from below_limit(
         "hertz.contact_radius", hertz.contact_radius, hertz.half_width, "hertz.half_width"
     )
     yield from at_most("hertz.half_width", hertz.half_width, hertz.radius, "hertz.radius")
     if scene.mesh.contact_size is not None:
-        yield from below(
+        yield from below_limit(
             "mesh.contact_size",
             scene.mesh.contact_size,
             hertz.contact_radius,

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import BLADE_FACES, at_most, below
+from .conditions import BLADE_FACES, at_most, below_limit
 from .record import ENGINE_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
     plane = scene.plane
-    yield from below("plane.platform_width", plane.platform_width, plane.pitch, "plane.pitch")
-    yield from below(
+    yield from below_limit("plane.platform_width", plane.platform_width, plane.pitch, "plane.pitch")
+    yield from below_limit(
         "plane.thickness", plane.thickness, plane.platform_width, "plane.platform_width"
     )
     yield from at_most(
@@ -21,13 +21,13 @@ def conditions(scene: Scene) -> Iterator[str]:
         (plane.platform_width - plane.thickness) / 2,
         "the overhang of the platform next to the blade",
     )
-    yield from below(
+    yield from below_limit(
         "plane.platform_height",
         plane.platform_height,
         plane.length - plane.platform_thickness,
         "plane.length minus plane.platform_thickness",
     )
-    yield from below(
+    yield from below_limit(
         "plane.damper_height", plane.damper_height, plane.platform_height, "plane.platform_height"
     )
 

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import below, one_of
+from .conditions import below_limit, one_of
 from .record import COMMON_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
     yield from one_of("punch.interference", scene.punch.interference, scene)
-    yield from below("punch.radius", scene.punch.radius, scene.punch.half_width, "punch.half_width")
+    yield from below_limit(
+        "punch.radius", scene.punch.radius, scene.punch.half_width, "punch.half_width"
+    )
     if scene.mesh.contact_size is not None:
-        yield from below(
+        yield from below_limit(
             "mesh.contact_size", scene.mesh.contact_size, scene.punch.radius, "punch.radius"
         )
 

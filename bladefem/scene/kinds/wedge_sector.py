@@ -7,7 +7,7 @@ from math import cos, pi, sin, tan
 
 from ..tables import Scene
 from ..units import show
-from .conditions import BLADE_FACES, at_most, below, known_diameters
+from .conditions import BLADE_FACES, at_most, below_limit, known_diameters
 from .record import ENGINE_TABLES, Kind, SceneCall, load_function
 
 SHAPE = ("aerofoil", "platform", "shank", "disc", "damper")
@@ -22,8 +22,8 @@ def conditions(scene: Scene) -> Iterator[str]:
     damper = scene.damper
     aerofoil = scene.aerofoil
     half = pi / disc.sectors
-    yield from below("disc.bore_radius", disc.bore_radius, disc.rim_radius, "disc.rim_radius")
-    yield from below(
+    yield from below_limit("disc.bore_radius", disc.bore_radius, disc.rim_radius, "disc.rim_radius")
+    yield from below_limit(
         "shank.width", shank.width, 2 * disc.rim_radius * tan(half), "the pitch at disc.rim_radius"
     )
     yield from at_most("shank.length", shank.length, disc.width, "disc.width, on which it is built")
@@ -32,7 +32,7 @@ def conditions(scene: Scene) -> Iterator[str]:
     )
     reach = (disc.rim_radius + shank.height) * tan(half) - platform.gap / 2
     overhang = reach - shank.width / 2
-    yield from below(
+    yield from below_limit(
         "platform.gap",
         platform.gap,
         2 * (disc.rim_radius + shank.height) * tan(half),

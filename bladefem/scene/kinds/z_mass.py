@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import below
+from .conditions import below_limit
 from .record import COMMON_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
     z = scene.z_mass
-    yield from below("z_mass.bar", z.bar, z.height / 2, "half of z_mass.height")
-    yield from below("z_mass.bar", z.bar, z.width, "z_mass.width")
+    yield from below_limit("z_mass.bar", z.bar, z.height / 2, "half of z_mass.height")
+    yield from below_limit("z_mass.bar", z.bar, z.width, "z_mass.width")
     skew = scene.foundation.skew
     if abs(skew[0]) + abs(skew[1]) > 1:
         yield f"foundation.skew = {skew[0]:g}, {skew[1]:g}: expected a sum of sizes of at most 1"

@@ -17,8 +17,8 @@ import numpy as np
 from ...data import Elements, PortModel, RigidBody
 from ...friction.law_table import merged_laws
 from ...hbm.model import ReducedModel
-from ...reduction.assemble import recombine
-from ...reduction.truncate import truncated
+from ...reduction.assemble import recombine_contact
+from ...reduction.truncate import truncate_modes
 from .settings import Settings
 
 SHARED_HARMONICS = (1, 7, 15, 31, 63)
@@ -116,14 +116,14 @@ def coarsened_elements(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
     if isinstance(damper, RigidBody):
         damper = replace(damper, B=dofs @ damper.B)
     elif damper is not None:
-        damper = tuple(recombine(body, dofs) for body in damper)
+        damper = tuple(recombine_contact(body, dofs) for body in damper)
     normal = {
         h: np.bincount(groups, f.real, m) + 1j * np.bincount(groups, f.imag, m)
         for h, f in model.normal.items()
     }
     return replace(
         model,
-        sides=tuple(recombine(body, dofs) for body in model.sides),
+        sides=tuple(recombine_contact(body, dofs) for body in model.sides),
         elements=elements,
         damper=damper,
         normal=normal,
@@ -181,7 +181,7 @@ def family_of(rich: ReducedModel, patches: Sequence[int] | None = None) -> Famil
 
     @cache
     def side(h: int, modes: int) -> PortModel:
-        return truncated(rich.sides[h], min(modes, len(rich.sides[h].omega)))
+        return truncate_modes(rich.sides[h], min(modes, len(rich.sides[h].omega)))
 
     @lru_cache(maxsize=8)
     def thinned(

@@ -245,7 +245,7 @@ def choose_at_peak(
     known: dict[str, tuple[float, float]] = {}
     before: tuple[Settings, Peak, PeakErrors] | None = None
     for _ in range(MAX_ENRICHMENTS):
-        if rattles(settings, peak.solution):
+        if lifts_off_widely(settings, peak.solution):
             richer = enriched_settings(settings, "harmonics")
             if richer is not None:
                 peak = peak_from(family, settings, peak.solution, richer, accuracy)
@@ -280,7 +280,7 @@ def _lift_off(peak: Peak, errors: PeakErrors) -> bool:
     return any(p.solution.states["lift"] > 0 for p in (peak, *errors.better.values()))
 
 
-def rattles(settings: Settings, top: Solution) -> bool:
+def lifts_off_widely(settings: Settings, top: Solution) -> bool:
     """At least half of the contacts lift off at the resonance, and there is one harmonic, which
     knows nothing of that: on the shipped wedge under 18 N it finds 0.67 mm where three find 1.3 mm
     and integration in time 1.5 mm.

@@ -29,8 +29,8 @@ from .resonance_choice import (
     choose_at_peak,
     compared_settings,
     judge_settings,
+    lifts_off_widely,
     peak_from,
-    rattles,
 )
 from .settings import Settings, enriched_settings
 
@@ -61,7 +61,7 @@ def resonance_curve(
     settings = with_excited_harmonics(family, replace(settings, error=None))
     widen = band is None
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
-    if rattles(settings, peak_of(points)):
+    if lifts_off_widely(settings, peak_of(points)):
         settings = enriched_settings(settings, "harmonics") or settings
         points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
@@ -70,7 +70,7 @@ def resonance_curve(
     for _ in range(MAX_SWEEPS):
         used, peak, errors = _chosen(family, used, peak_of(points), accuracy)
         span = band or (points[0].frequency, points[-1].frequency)
-        paths = not unfollowed(family, used)
+        paths = not too_large_to_follow(family, used)
         # paths are followed anew
         again = any(p.branch for p in points) or not _same_points(swept, (used, accuracy))
         known = [] if again else points
@@ -108,7 +108,7 @@ def _same_points(one: tuple[Settings, float], other: tuple[Settings, float]) -> 
     return same and solver_options(one[1]) == solver_options(other[1])
 
 
-def unfollowed(family: Family, settings: Settings) -> bool:
+def too_large_to_follow(family: Family, settings: Settings) -> bool:
     """The balance has too many unknowns for following its motions round folds in a curve of many
     points.
     """

@@ -150,7 +150,7 @@ def enriched_settings(
     return _enough_samples(replace(settings, **{name: more})) if more > value else None
 
 
-def restarted(settings: Settings) -> Settings:
+def restarted_settings(settings: Settings) -> Settings:
     """Back to the start in what is cheap to choose again; modes and damper model are kept for the
     next load case.
     """

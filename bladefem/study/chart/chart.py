@@ -22,9 +22,9 @@ from ...hbm.sweep import size
 from ..adaptive.choice import adapted_settings, covered_band
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import DAMPER_MODELS, Settings
-from .cpu_clock import Clock, running
-from .methods import applicable, balance, methods, tangential
-from .rows import Bench, Job, errors, resonance, rows, timed
+from .cpu_clock import Clock, running_clock
+from .methods import chart_methods, obstacle_in_time, sampled_balance, tangential_model
+from .rows import Bench, Job, chart_rows, parabola_resonance, relative_errors, timed_sweep
 
 # frequencies, in half widths of the resonance
 FREQUENCIES_IN_HALF_WIDTHS = (-6, -3, -1.5, -0.75, -0.3, 0, 0.3, 0.75, 1.5, 3, 6)
@@ -51,7 +51,7 @@ class Chart:
     meshes: pd.DataFrame | None = None
 
 
-def chart(
+def method_chart(
     family: Family,
     settings: Settings,
     mode: int,
@@ -79,17 +79,17 @@ def chart(
         NotSolvedError: not even the poorest reference converged.
     """
     check_budget(budget)
-    with running() as clock:
+    with running_clock() as clock:
         begun = clock.now()
         curve = adapted_settings(family, settings, band, mode, accuracy)
         chosen = curve.settings
         found = clock.now()
         remarks = [f"automatic choice: {chosen.sentence()}, found in {found - begun:.2g} s"]
-        omegas = frequencies([(p.omega, size(p)) for p in curve.points if p.converged])
+        omegas = chart_frequencies([(p.omega, size(p)) for p in curve.points if p.converged])
         course = _Course(family, chosen, omegas, found + budget, clock, remarks)
         models = list(_models(course, poorer or {}))
         jobs = [*models, *_methods(course, mode, models[0].bench)]
-        table = pd.DataFrame(rows(jobs, course.end, clock))
+        table = pd.DataFrame(chart_rows(jobs, course.end, clock))
     remarks += [f"{row['name']}: {row['reason']}" for _, row in table.iterrows() if row["reason"]]
     if clock.compiled > REPORTED_COMPILE_SECONDS:
         remarks.append(
@@ -132,7 +132,7 @@ class _Course:
         )
 
 
-def frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
+def chart_frequencies(curve: Iterable[tuple[float, float]]) -> np.ndarray:
     """(k,) circular frequencies on both sides of the highest point of (omega, height), spaced by
     its half width.
     """
@@ -166,19 +166,23 @@ def _bench(
         if rung >= least and used * 6 > budget - (clock.now() - start):
             break
         begun = clock.now()
-        points = timed(
-            model(H), balance(H, samples), omegas, (np.inf if rung < least else budget,) * 2, clock
+        points = timed_sweep(
+            model(H),
+            sampled_balance(H, samples),
+            omegas,
+            (np.inf if rung < least else budget,) * 2,
+            clock,
         ).points
         used = clock.now() - begun
         if len(points) < len(omegas) or not all(p.converged for p in points):
             break
         before = best
-        best = (rung, resonance(omegas, np.array([p.first for p in points])))
+        best = (rung, parabola_resonance(omegas, np.array([p.first for p in points])))
     if best is None:
         raise NotSolvedError(f"the reference of the {name} did not converge: {points[-1].reason}")
     rung, truth = best
     doubt = (
-        errors(before[1], truth)
+        relative_errors(before[1], truth)
         if before
         else {f"error{end}": np.nan for end in ("", "_frequency", "_phasor")}
     )
@@ -198,13 +202,13 @@ def _methods(
 ) -> Iterator[Job]:
     """All methods that apply, on one model."""
     chosen, (model, bench, reason) = course.chosen, _simplified(course, mode, shared)
-    for m in methods(not reason):
+    for m in chart_methods(not reason):
         yield Job(m.name, m.family, model, m.run, bench, ordered=True)
     yield Job(
         f"automatic: H {chosen.harmonics}, {chosen.samples} samples",
         "automatic choice",
         model,
-        balance(chosen.harmonics, chosen.samples),
+        sampled_balance(chosen.harmonics, chosen.samples),
         bench,
         needed=True,
         chosen=True,
@@ -225,14 +229,18 @@ def _simplified(
     model = family_member(
         family, replace(few, damper="mass") if "mass" in family.dampers else few
     ).model
-    reason = applicable(model) if model.directions != 1 else applicable(tangential(model))
+    reason = (
+        obstacle_in_time(model)
+        if model.directions != 1
+        else obstacle_in_time(tangential_model(model))
+    )
     if reason:
         course.remarks.append(
             "paper's iteration, exact events, direct integration and shooting do not apply: "
             + reason
         )
         return family_member(family, most).model, shared, reason
-    model = tangential(model)
+    model = tangential_model(model)
     omegas = course.omegas
     if family.dampers:
         course.remarks.append(
@@ -264,7 +272,7 @@ def _models(course: _Course, poorer: Mapping[str, Family]) -> Iterator[Job]:
             name,
             kind,
             family_member(whose, s).model,
-            balance(s.harmonics, s.samples),
+            sampled_balance(s.harmonics, s.samples),
             bench,
             needed=kind == "rich model",
         )
@@ -272,7 +280,7 @@ def _models(course: _Course, poorer: Mapping[str, Family]) -> Iterator[Job]:
         "automatic",
         "automatic choice",
         family_member(family, chosen).model,
-        balance(chosen.harmonics, chosen.samples),
+        sampled_balance(chosen.harmonics, chosen.samples),
         bench,
         needed=True,
         chosen=True,
@@ -306,4 +314,4 @@ def _own_frequencies(
     """Frequencies round the resonance of the tangential model, which may lie elsewhere."""
     swept = covered_band(model, Settings(1, 3, 128, "mass"), None, mode, 0.05)
     good = [(p.omega, size(p)) for p in swept if p.converged]
-    return frequencies(good) if good else omegas
+    return chart_frequencies(good) if good else omegas

@@ -11,7 +11,7 @@ from numba.core.event import Event, Listener, install_listener
 
 class Clock(Listener):
     """CPU seconds of this process, those of compilation apart; it hears of compilation from
-    ``running``.
+    ``running_clock``.
     """
 
     def __init__(self) -> None:
@@ -39,7 +39,7 @@ class Clock(Listener):
 
 
 @contextmanager
-def running() -> Iterator[Clock]:
+def running_clock() -> Iterator[Clock]:
     """A clock that takes no notice of compilation while the block runs."""
     clock = Clock()
     with install_listener("numba:compiler_lock", clock):

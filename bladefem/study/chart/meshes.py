@@ -42,7 +42,7 @@ from ..pipeline.stages import (
     reduce_sector,
     seat_damper,
 )
-from .cpu_clock import running
+from .cpu_clock import running_clock
 
 # of the scene's own element sizes, when none are given
 SIZE_RATIOS = (1.7, 1.3, 1.0)
@@ -53,7 +53,7 @@ SEARCH_ACCURACY = 0.01
 
 
 @dataclass(frozen=True)
-class Resonance:
+class MeshResonance:
     """What one mesh gives."""
 
     # [Hz]
@@ -148,13 +148,13 @@ def on_mesh(
     settings: Settings,
     load: float,
     comm: Communicator | None = None,
-) -> Resonance:
+) -> MeshResonance:
     """The resonance under one load on the scene's own mesh, with given settings of the balance.
 
     Raises:
         InputError: the scene cannot be meshed; NotSolvedError: no point was solved.
     """
-    with running() as clock:
+    with running_clock() as clock:
         start = clock.now()
         found = _resonance(scene, settings, load, comm)
         return replace(found, seconds=clock.now() - start)
@@ -165,7 +165,7 @@ def _resonance(
     settings: Settings,
     load: float,
     comm: Communicator | None,
-) -> Resonance:
+) -> MeshResonance:
     """On one mesh, its time left open."""
     mesh = build_mesh(scene, comm)
     bodies = Bodies(scene, mesh, comm)
@@ -183,7 +183,7 @@ def _resonance(
     model = family_member(family_of_case(scene, mesh, reduced, patches, case), settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, SEARCH_ACCURACY)
     top = peak_of(points)
-    return Resonance(top.frequency, height(top), mesh.dimension * len(mesh.points), np.nan)
+    return MeshResonance(top.frequency, height(top), mesh.dimension * len(mesh.points), np.nan)
 
 
 def mesh_table(
@@ -278,7 +278,7 @@ def _tried(
 
 def _told(
     row: dict[str, Any],
-    truth: Resonance,
+    truth: MeshResonance,
     doubt: float,
 ) -> dict[str, object]:
     found = row["found"]

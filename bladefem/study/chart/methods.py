@@ -21,7 +21,7 @@ from ...data import PortModel, RigidBody
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel, require_rigid_damper
 from ...hbm.solve import solve
-from ...reduction.truncate import truncated
+from ...reduction.truncate import truncate_modes
 from ...time.event_integrator import stuck_start
 from ...time.shooting import periodic_solution, probe_harmonics
 from ...time.system import System, blade_ring
@@ -56,27 +56,27 @@ class Method:
     run: Callable[[ReducedModel, float, object], Point]
 
 
-def methods(one_dimensional: bool) -> Iterator[Method]:
+def chart_methods(one_dimensional: bool) -> Iterator[Method]:
     """All methods of the chart, from cheap to expensive within each family."""
     for H in HARMONICS:
-        yield Method(f"H {H}", "balance, harmonics", balance(H, max(512, 32 * (H + 1))))
+        yield Method(f"H {H}", "balance, harmonics", sampled_balance(H, max(512, 32 * (H + 1))))
     for samples in (64, 128, 256, 1024, 4096):
-        yield Method(f"H 7, {samples} samples", "balance, samples", balance(7, samples))
+        yield Method(f"H 7, {samples} samples", "balance, samples", sampled_balance(7, samples))
     if not one_dimensional:
         return
     for H in (1, 3, 7, 15):
-        yield Method(f"H {H} exact", "balance, exact events", exact(H))
+        yield Method(f"H {H} exact", "balance, exact events", exact_balance(H))
     for H, averaged in ((1, True), (3, True), (3, False), (5, True), (5, False)):
         kind = "" if H == 1 else ", averaged" if averaged else ", each harmonic"
-        yield Method(f"paper H {H}{kind}", "paper's iteration", paper(H, averaged))
+        yield Method(f"paper H {H}{kind}", "paper's iteration", paper_iteration(H, averaged))
     for steps in (32, 64, 256):
-        yield Method(f"Newmark {steps}", "integration, Newmark", integrated(steps, explicit=False))
+        yield Method(f"Newmark {steps}", "integration, Newmark", time_steps(steps, explicit=False))
     for steps in (512, 2048):
-        yield Method(f"explicit {steps}", "integration, explicit", integrated(steps, explicit=True))
-    yield Method("shooting", "shooting", shooting)
+        yield Method(f"explicit {steps}", "integration, explicit", time_steps(steps, explicit=True))
+    yield Method("shooting", "shooting", exact_shooting)
 
 
-def applicable(model: ReducedModel) -> str:
+def obstacle_in_time(model: ReducedModel) -> str:
     """Why the methods in time and the paper's iteration do not take a model; empty where they
     do.
     """
@@ -95,7 +95,7 @@ def applicable(model: ReducedModel) -> str:
     return ""
 
 
-def tangential(model: ReducedModel) -> ReducedModel:
+def tangential_model(model: ReducedModel) -> ReducedModel:
     """The same model without the normal dofs of its ports, and the damper's freedom scaled to
     contact displacement.
     """
@@ -110,7 +110,7 @@ def tangential(model: ReducedModel) -> ReducedModel:
     return replace(model, sides=sides, damper=damper)
 
 
-def balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Point]:
+def sampled_balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Point]:
     """Full balance with sampled forces."""
 
     def run(
@@ -124,12 +124,12 @@ def balance(H: int, samples: int) -> Callable[[ReducedModel, float, object], Poi
     return run
 
 
-def exact(H: int) -> Callable[[ReducedModel, float, object], Point]:
+def exact_balance(H: int) -> Callable[[ReducedModel, float, object], Point]:
     """Full balance with forces exact to rounding, for elements of one direction."""
-    return balance(H, 0)
+    return sampled_balance(H, 0)
 
 
-def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Point]:
+def paper_iteration(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Point]:
     """The paper's loop, Eq. 34 in amplitude form with its stopping rule; the damper solved for its
     periodic motion.
     """
@@ -149,7 +149,7 @@ def paper(H: int, averaged: bool) -> Callable[[ReducedModel, float, object], Poi
     return run
 
 
-def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, object], Point]:
+def time_steps(steps: int, explicit: bool) -> Callable[[ReducedModel, float, object], Point]:
     """Time steps until the motion repeats; the next frequency starts from the last one's end.
 
     A stuck damper without damping may ring for ever: after MAX_PERIODS the last one counts, and the
@@ -182,7 +182,7 @@ def integrated(steps: int, explicit: bool) -> Callable[[ReducedModel, float, obj
     return run
 
 
-def shooting(
+def exact_shooting(
     model: ReducedModel,
     omega: float,
     start: Any,
@@ -216,7 +216,7 @@ def in_time(model: ReducedModel, omega: float) -> System:
 
 
 def _with_stiff_modes(body: PortModel, at: float) -> PortModel:
-    body = truncated(body, max(1, int((body.omega < at).sum())))
+    body = truncate_modes(body, max(1, int((body.omega < at).sum())))
     values, vectors = np.linalg.eigh(body.residual)
     kept = values > 1e-6 * values[-1] if values[-1] > 0 else np.zeros(len(values), dtype=bool)
     more = vectors[:, kept] * np.sqrt(values[kept]) * at

@@ -34,7 +34,7 @@ Solve = Callable[[ReducedModel, float, object], Point]
 
 
 @dataclass(frozen=True)
-class Peak:
+class ChartPeak:
     """Responses on the common frequencies and the resonance that they show."""
 
     # (k,) complex [m]
@@ -53,7 +53,7 @@ class Bench:
 
     # (k,) [rad/s]
     omegas: np.ndarray
-    truth: Peak
+    truth: ChartPeak
     # the reference's own error
     doubt: dict[str, float]
 
@@ -105,7 +105,7 @@ class _Known:
         return self.own.get(number, cheaper)
 
 
-def timed(
+def timed_sweep(
     model: ReducedModel,
     run: Solve,
     omegas: np.ndarray,
@@ -142,7 +142,7 @@ def timed(
     return Timing(points, best)
 
 
-def rows(
+def chart_rows(
     jobs: Sequence[Job],
     end: float,
     clock: Clock,
@@ -174,7 +174,7 @@ def rows(
             else UNKNOWN_COST_SHARE * left
         )
         allowed = share, min(left, FIRST_CALL_FACTOR * share) if not job.needed else np.inf
-        timing = timed(job.model, job.run, job.bench.omegas, allowed, clock)
+        timing = timed_sweep(job.model, job.run, job.bench.omegas, allowed, clock)
         if len(timing.points) < len(job.bench.omegas) and k not in known.own:
             known.own[k] = timing.seconds
             continue
@@ -225,12 +225,16 @@ def _row(job: Job, timing: Timing) -> dict[str, object]:
         )
     if lost:
         return _lost(job, timing.seconds, f"{len(lost)} of {len(points)} frequencies: {lost[0]}")
-    peak = resonance(bench.omegas, np.array([p.first for p in points]))
+    peak = parabola_resonance(bench.omegas, np.array([p.first for p in points]))
     reasons = [p.reason for p in points if "false" in p.reason or "not periodic" in p.reason]
     reason = f"{len(reasons)} of {len(points)} frequencies: {reasons[0]}" if reasons else ""
     if not peak.inside:
         reason = "its resonance lies outside the compared frequencies"
-    return _lost(job, timing.seconds, reason) | errors(peak, bench.truth) | {"converged": True}
+    return (
+        _lost(job, timing.seconds, reason)
+        | relative_errors(peak, bench.truth)
+        | {"converged": True}
+    )
 
 
 def _lost(
@@ -254,24 +258,24 @@ def _lost(
     }
 
 
-def resonance(omegas: np.ndarray, first: np.ndarray) -> Peak:
+def parabola_resonance(omegas: np.ndarray, first: np.ndarray) -> ChartPeak:
     """The resonance by a parabola in 1/amplitude^2 over omega^2 through the highest point and its
     neighbours.
     """
     height = np.where(np.isfinite(first), abs(first), 0.0)
     top = int(height.argmax())
     if not 0 < top < len(omegas) - 1 or min(height[top - 1 : top + 2]) == 0:
-        return Peak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), False)
+        return ChartPeak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), False)
     x = omegas[top - 1 : top + 2] ** 2
     vertex = parabola_minimum(x, 1 / height[top - 1 : top + 2] ** 2)
     if vertex is None:
-        return Peak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), True)
+        return ChartPeak(first, float(height[top]), float(omegas[top] / (2 * np.pi)), True)
     place, low = vertex
     amplitude = low**-0.5 if low > 0 else height[top]
-    return Peak(first, float(amplitude), float(np.sqrt(place) / (2 * np.pi)), True)
+    return ChartPeak(first, float(amplitude), float(np.sqrt(place) / (2 * np.pi)), True)
 
 
-def errors(peak: Peak, truth: Peak) -> dict[str, float]:
+def relative_errors(peak: ChartPeak, truth: ChartPeak) -> dict[str, float]:
     """Relative errors of resonance amplitude and frequency, and of the worst phasor over the
     highest one.
     """

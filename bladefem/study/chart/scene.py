@@ -1,5 +1,5 @@
 """Charts of a whole scene and of the built-in reference blade: from geometry to
-:func:`bladefem.study.chart.chart.chart`.
+:func:`bladefem.study.chart.chart.method_chart`.
 """
 
 from __future__ import annotations
@@ -9,16 +9,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...hbm.reference_blade import reference_model
-from ...io.stage_cache import on_root, stage
+from ...io.stage_cache import cached_stage, on_root
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_of
-from ..adaptive.settings import first_for, restarted
+from ..adaptive.settings import first_for, restarted_settings
 from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
 from ..pipeline.pipeline import run
 from ..pipeline.stages import Bodies, Reduced
-from .chart import Chart, chart, check_budget
+from .chart import Chart, check_budget, method_chart
 from .meshes import mesh_table, mesh_variants
 
 REFERENCE_LOAD = 3.0
@@ -53,7 +53,7 @@ def scene_chart(
         bodies,
         case,
         patches,
-        lambda name, key, make: stage(folder, name, key, make, comm)[0],
+        lambda name, key, make: cached_stage(folder, name, key, make, comm)[0],
     )
 
     def family(known: Reduced) -> Family:
@@ -61,9 +61,9 @@ def scene_chart(
 
     made = on_root(
         comm,
-        lambda: chart(
+        lambda: method_chart(
             family(reduced),
-            restarted(settings),
+            restarted_settings(settings),
             scene.excitation.mode,
             scene.accuracy,
             budget,
@@ -103,4 +103,4 @@ def reference_chart(accuracy: float = 0.02, budget: float = 120.0) -> Chart:
     side, in phase.
     """
     family = family_of(reference_model(load=REFERENCE_LOAD, points=REFERENCE_POINTS, harmonics=63))
-    return chart(family, first_for(family.modes), 2, accuracy, budget, REFERENCE_BAND)
+    return method_chart(family, first_for(family.modes), 2, accuracy, budget, REFERENCE_BAND)

@@ -14,12 +14,12 @@ from geometry.mesh import Mesh
 
 from ...data import PressureMap
 from ...errors import InputError
-from ...io.stage_cache import stage
+from ...io.stage_cache import cached_stage
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ..pipeline.stage_inputs import stage_key
 from .hertz import hertz_pressure, hertz_radius, press_pair, second_moment_radius
-from .punch import Indented, indent, johnson_approach, johnson_pressure
+from .punch import Indented, indent_punch, johnson_approach, johnson_pressure
 
 # of the punch's radius: further out its pressure grows without bound
 COMPARED_RADIUS_SHARE = 0.8
@@ -60,7 +60,7 @@ def solve_pair(
     }
     if scene.kind not in kinds:
         raise InputError(f"kind = '{scene.kind}': expected {' or '.join(kinds)}")
-    return stage(
+    return cached_stage(
         folder,
         "pressure",
         stage_key("pair pressure", scene),
@@ -69,7 +69,7 @@ def solve_pair(
     )[0]
 
 
-def radii(seat: PressureMap, dimension: int) -> np.ndarray:
+def node_radii(seat: PressureMap, dimension: int) -> np.ndarray:
     """(n,) distance of the nodes from the axis [m]."""
     return np.linalg.norm(seat.patch.points[:, : dimension - 1], axis=1)
 
@@ -78,7 +78,7 @@ def _hertz(scene: Scene, comm: Communicator | None) -> tuple[Mesh, list[PairStat
     found = press_pair(scene, comm)
     states = []
     for load, seat in found.maps.items():
-        exact = hertz_pressure(scene, load, radii(seat, found.mesh.dimension))
+        exact = hertz_pressure(scene, load, node_radii(seat, found.mesh.dimension))
         a = hertz_radius(scene, load)
         spaces = a**2 / scene.hertz.radius if found.mesh.dimension == 3 else None
         states.append(
@@ -95,7 +95,7 @@ def _hertz(scene: Scene, comm: Communicator | None) -> tuple[Mesh, list[PairStat
 
 
 def _punch(scene: Scene, comm: Communicator | None) -> tuple[Mesh, list[PairState]]:
-    found = indent(scene, comm)
+    found = indent_punch(scene, comm)
     loads = scene.study.loads or (found.total,)
     given = scene.punch.interference
     if given is not None:

@@ -28,7 +28,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...util.communicator import Communicator
 from ..pipeline.stages import build_mesh
-from .punch import flexibility
+from .punch import held_port_flexibility
 
 # contact radius over the expected one, at most
 MAX_RADIUS_RATIO = 0.9 * SEAT_RATIO
@@ -68,7 +68,7 @@ def press_pair(scene: Scene, comm: Communicator | None = None) -> Pressed:
         ("damper", scene.material.damper, "load"),
     ):
         body = assemble(mesh, name, material, comm, plane="strain")
-        parts.append(flexibility(body, port_matrix([patch], mesh, name)[:, ports], held))
+        parts.append(held_port_flexibility(body, port_matrix([patch], mesh, name)[:, ports], held))
     C = parts[0] + parts[1]
     gap = initial_gap(patch, mesh)
     part = 4 if mesh.dimension == 3 else 2

@@ -78,7 +78,7 @@ class Indented:
         return 4 * float(self.arm @ np.linalg.solve(self.tilted, self.arm))
 
 
-def indent(scene: Scene, comm: Communicator | None = None) -> Indented:
+def indent_punch(scene: Scene, comm: Communicator | None = None) -> Indented:
     """Press the punch of a scene of kind "punch" with its first load.
 
     Raises:
@@ -94,7 +94,7 @@ def indent(scene: Scene, comm: Communicator | None = None) -> Indented:
     patch = make_patch(mesh, "this")
     ports = port_matrix([patch], mesh)[:, normal_ports([patch], mesh)]
     solid = mesh.dimension == 3
-    even = flexibility(body, ports)
+    even = held_port_flexibility(body, ports)
     part = 4 if solid else 2
     found = solve_lcp(
         even, np.zeros(len(even)), -np.ones((len(even), 1)), np.array([-total / part])
@@ -110,7 +110,7 @@ def indent(scene: Scene, comm: Communicator | None = None) -> Indented:
         float(found.rigid[0]),
         total,
         even,
-        flexibility(_odd(body), ports) if solid else None,
+        held_port_flexibility(_odd(body), ports) if solid else None,
         patch_means(patch, mesh).T @ mesh.points[:, 0],
         found.residual,
     )
@@ -161,7 +161,7 @@ def spring_tilt(
     return float(np.diff(E / (1 - nu**2) * (s**3 / 3 - a**2 * s)).sum())
 
 
-def flexibility(
+def held_port_flexibility(
     body: Body,
     ports: sp.spmatrix,
     held: str = "clamp",

@@ -27,7 +27,7 @@ from ...damper.loops import Drive, Steady, steady
 from ...damper.zmass import Footprint, MassOnFoundation
 from ...data import PressureMap
 from ...errors import InputError
-from ...io.stage_cache import stage
+from ...io.stage_cache import cached_stage
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ..pipeline.stage_inputs import stage_key
@@ -45,7 +45,7 @@ class Pressed:
     seat: PressureMap
 
 
-def press(
+def press_mass(
     scene: Scene,
     folder: str | Path | None = None,
     comm: Communicator | None = None,
@@ -57,7 +57,7 @@ def press(
     """
     if scene.kind != "z mass":
         raise InputError(f"kind = '{scene.kind}': expected 'z mass'")
-    return stage(
+    return cached_stage(
         folder, "pressure", stage_key("mass pressure", scene), lambda: _press(scene, comm), comm
     )[0]
 
@@ -68,7 +68,7 @@ def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:
     """
     area, polar = z_section(scene.z_mass)
     line = scene.material.damper.rho * scene.z_mass.thickness
-    label = clusters(seat.patch.points[:, :2], seat.patch.area, scene.contact.points)
+    label = cluster_nodes(seat.patch.points[:, :2], seat.patch.area, scene.contact.points)
     size = np.bincount(label, seat.patch.area)
     share = np.bincount(label, seat.force) / seat.force.sum()
     ratio = pair_ratio(scene.material.blade, scene.material.damper)
@@ -84,7 +84,7 @@ def mass_on_foundation(scene: Scene, seat: PressureMap) -> MassOnFoundation:
     )
 
 
-def clusters(
+def cluster_nodes(
     points: np.ndarray,
     area: np.ndarray,
     count: int | None,
@@ -108,7 +108,7 @@ def clusters(
     return label
 
 
-def drives(scene: Scene) -> list[Drive]:
+def foundation_drives(scene: Scene) -> list[Drive]:
     """One for each frequency ratio of the scene."""
     base = scene.foundation
     load = mean_load(scene)
@@ -119,7 +119,7 @@ def drives(scene: Scene) -> list[Drive]:
     ]
 
 
-def motions(
+def steady_motions(
     scene: Scene,
     body: MassOnFoundation,
     steps: int = 2000,
@@ -130,7 +130,7 @@ def motions(
     Args:
         steps: time steps in one cycle of the foundation.
     """
-    for drive in drives(scene):
+    for drive in foundation_drives(scene):
         yield drive, steady(body, drive, steps, tolerance=1e-6)
 
 

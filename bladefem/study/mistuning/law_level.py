@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...util.communicator import Communicator
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from ...wheel.damper_law import Family, damper_law, family_of_modes, scaled_elements
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
 from ...wheel.model import Pattern, Wheel
@@ -91,7 +91,7 @@ def with_checks(
     whole_peak: Callable[[Pattern], float],
     checks: int,
     comm: Communicator | None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Amplification:
     """Statistics of one load with some wheels solved whole, from the lowest to the highest.
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...wheel.statistics import Amplification, Quantile, quantile
+from ...wheel.statistics import Amplification, Quantile, quantile_interval
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.utilisation import highest_use, run_utilisation
 
@@ -50,7 +50,7 @@ def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
         tuned = float(used.used[used.worst])
         places = [i for i, one in enumerate(found.loads) if one == load]
         for i in places:
-            factor = quantile(found.factor[i], SHARE)
+            factor = quantile_interval(found.factor[i], SHARE)
             share = Quantile(*(tuned * one for one in (factor.value, factor.low, factor.high)))
             highest = highest_use(run, number, used) * factor.high
             rows.append(ScatteredUse(load, tuned, share, highest))

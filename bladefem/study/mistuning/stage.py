@@ -10,10 +10,10 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import InputError
-from ...io.stage_cache import found_remark, on_root, stage
+from ...io.stage_cache import cached_stage, found_remark, on_root
 from ...util.communicator import Communicator
 from ...util.message import warning
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import find_wheel_peak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
@@ -49,7 +49,7 @@ from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
 def with_whole_wheel(
     run: SolvedRun,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> SolvedRun:
     """The run with the whole wheel under the load whose tuned resonance is lowest."""
     start = time.perf_counter()
@@ -58,7 +58,7 @@ def with_whole_wheel(
     sector, remarks = _kept_sector(run, [best], bodies, comm)
     deviation = scene_deviations(run.scene, sector.reduced.sectors, len(sector.families))
     key = stage_key("whole wheel", run.scene, best.load, best.mass, best.peak.omega, deviation)
-    found, seconds = stage(
+    found, seconds = cached_stage(
         run.folder,
         "whole_wheel",
         key,
@@ -106,7 +106,7 @@ def _best_response(
 def scatter_of_run(
     run: SolvedRun,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Amplification:
     """Statistics under all loads of a run; wheels are dealt out over the ranks.
 
@@ -184,7 +184,7 @@ def _kept_statistics(
         )
 
     key = stage_key("scatter", scene, curve.load, curve.peak.omega)
-    found, _ = stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)
+    found, _ = cached_stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)
     return found
 
 
@@ -208,7 +208,7 @@ def _kept_sector(
         return reduce_wheel(bodies, patches, modes, run.clamped, families)
 
     key = stage_key("wheel", scene, modes)
-    sector, seconds = stage(run.folder, "wheel_sector", key, compute, comm)
+    sector, seconds = cached_stage(run.folder, "wheel_sector", key, compute, comm)
     return sector, [] if seconds is None else [found_remark("wheel_sector", seconds)]
 
 

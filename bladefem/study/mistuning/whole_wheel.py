@@ -14,14 +14,14 @@ from geometry.mesh import Mesh, sector_of
 from ...data import ModeSet, Patch
 from ...errors import InputError
 from ...reduction.assemble import pair_model
-from ...reduction.truncate import truncated
+from ...reduction.truncate import truncate_modes
 from ...scene.tables import Scene
 from ...wheel.model import Wheel, engine_order
 from ..adaptive.family import coarsened_elements
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
-from ..pipeline.contact_cycle import labels
-from ..pipeline.stages import Bodies, Reduced, reduce_sector, weighted
+from ..pipeline.contact_cycle import element_labels
+from ..pipeline.stages import Bodies, Reduced, reduce_sector, with_damper_mass
 from .validate import read_orders
 
 
@@ -95,11 +95,11 @@ def whole_wheel(
     Mean displacements are held in the preload state: dampers that slip throughout drift each to a
     place of its own on nearly no force, which takes long to find and moves the vibration little.
     """
-    reduced = weighted(sector.reduced, case.mass)
+    reduced = with_damper_mass(sector.reduced, case.mass)
     count = reduced.sectors
     sides = tuple(
         pair_model(
-            truncated(reduced.sector[d], settings.modes), reduced.following, 2 * pi * d / count
+            truncate_modes(reduced.sector[d], settings.modes), reduced.following, 2 * pi * d / count
         )
         for d in range(count // 2 + 1)
     )
@@ -107,7 +107,9 @@ def whole_wheel(
         scene, mesh, reduced, patches, case, settings.harmonics, settings.damper, sides
     )
     nodes = len(case.elements.kt)
-    groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
+    groups = (
+        np.arange(nodes) if settings.points is None else element_labels(patches, settings.points)
+    )
     model = coarsened_elements(model, groups)
     damper = model.damper[0] if isinstance(model.damper, tuple) else model.damper
     return Wheel(

@@ -24,7 +24,13 @@ from ...errors import InputError
 from ...scene.fields import split_values
 from ...scene.units import is_plain, parse
 from ..pipeline.stages import Bodies, is_wheel
-from .crossings import campbell_crossings, fold, interference_table, margins, wave
+from .crossings import (
+    campbell_crossings,
+    crossing_margins,
+    fold_order,
+    interference_table,
+    wave_sense,
+)
 
 if TYPE_CHECKING:
     from ...fem.body import Body
@@ -51,7 +57,7 @@ class Campbell:
     speed: float
 
 
-def campbell(
+def campbell_tables(
     bodies: Bodies,
     speeds: Sequence[float],
     orders: Sequence[int],
@@ -72,7 +78,7 @@ def campbell(
     sectors = sector_of(bodies.mesh).count if is_wheel(bodies.mesh) else 0
     operating = bodies.scene.operation.speed
     if sectors and diameters is None:
-        diameters = sorted({fold(order, sectors) for order in orders})
+        diameters = sorted({fold_order(order, sectors) for order in orders})
     table = campbell_table(bodies, sorted({*speeds, operating}), diameters, count)
     at_speed = table[table["speed"] == operating]
     crossed = [
@@ -283,10 +289,10 @@ def _excited_waves(
     A pattern at rest in space runs against the rotation for a rider on the wheel; orders
     beyond half the number of blades are seen by the blades as a wave in the other sense.
     """
-    if not sectors or wave(order, sectors) == "standing":
+    if not sectors or wave_sense(order, sectors) == "standing":
         return table
     return table.assign(
-        frequency=table["backward" if wave(order, sectors) == "with" else "forward"]
+        frequency=table["backward" if wave_sense(order, sectors) == "with" else "forward"]
     )
 
 
@@ -299,13 +305,13 @@ def _order_interference(
     """SAFE rows and the closest mode of one order; single blades take every order."""
     rows = _excited_waves(table, order, sectors)
     if sectors:
-        return interference_table(rows, sectors, speed, [order]), margins(
+        return interference_table(rows, sectors, speed, [order]), crossing_margins(
             rows, sectors, speed, [order]
         )
     rows = rows.assign(nodal_diameter=0)
     return tuple(
         found(rows, 1, speed, [order]).drop(columns=["nodal_diameter", "wave"])
-        for found in (interference_table, margins)
+        for found in (interference_table, crossing_margins)
     )
 
 

@@ -14,7 +14,7 @@ from bladefem.data import ModeSet
 from geometry.mesh import Mesh
 
 from ...errors import InputError
-from .mesh_transfer import nodal_volumes, transfer
+from .mesh_transfer import nodal_volumes, transfer_fields
 
 ORDINALS = ("first", "second", "third", "fourth", "fifth")
 # Roots of cos(b) cosh(b) = -1, the clamped-free beam (Blevins, Formulas for Natural Frequency,
@@ -50,7 +50,7 @@ def mac(
     if other is not None:
         if mesh is None:
             raise InputError("mac: expected the meshes of both mode sets, only one was given")
-        shapes = transfer(other, shapes, mesh.points)
+        shapes = transfer_fields(other, shapes, mesh.points)
     weight = np.ones(a.shapes.shape[1]) if mesh is None else nodal_volumes(mesh)
     return mac_of(a.shapes, shapes, weight)
 
@@ -191,14 +191,14 @@ def family_table(
         {
             "mode": np.arange(1, len(match) + 1),
             "frequency": modes.frequencies,
-            "family": families(match, names, share, below),
+            "family": family_names(match, names, share, below),
             "mac": match.max(axis=1),
             "aerofoil_share": share,
         }
     )
 
 
-def families(
+def family_names(
     match: np.ndarray,
     names: Sequence[str],
     share: np.ndarray,
@@ -223,7 +223,7 @@ def families(
     ]
 
 
-def participation(
+def participation_factors(
     modes: ModeSet,
     mass: Any,
     points: np.ndarray,

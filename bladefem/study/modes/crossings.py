@@ -14,13 +14,13 @@ import numpy as np
 import pandas as pd
 
 
-def fold(order: int, sectors: int) -> int:
+def fold_order(order: int, sectors: int) -> int:
     """The nodal diameter, 0..N/2, that an engine order excites on a wheel of N sectors."""
     rest = order % sectors
     return min(rest, sectors - rest)
 
 
-def wave(order: int, sectors: int) -> str:
+def wave_sense(order: int, sectors: int) -> str:
     """Sense of the excited wave relative to the engine order's own turning."""
     rest = order % sectors
     if rest in (0, sectors / 2):
@@ -55,7 +55,7 @@ def campbell_crossings(
             if (
                 sectors
                 and "nodal_diameter" in named
-                and fold(order, sectors) != named["nodal_diameter"]
+                and fold_order(order, sectors) != named["nodal_diameter"]
             ):
                 continue
             rows += [
@@ -109,12 +109,12 @@ def interference_table(
     rows = []
     for order in orders:
         excitation = order * speed / (2 * np.pi)
-        for _, mode in table[table["nodal_diameter"] == fold(order, sectors)].iterrows():
+        for _, mode in table[table["nodal_diameter"] == fold_order(order, sectors)].iterrows():
             rows.append(
                 {
                     "engine_order": order,
                     "nodal_diameter": int(mode["nodal_diameter"]),
-                    "wave": wave(order, sectors),
+                    "wave": wave_sense(order, sectors),
                     "mode": mode["mode"],
                     **{c: mode[c] for c in extra},
                     "frequency": mode["frequency"],
@@ -139,7 +139,7 @@ def interference_table(
     return pd.DataFrame(rows, columns=columns)
 
 
-def margins(
+def crossing_margins(
     table: pd.DataFrame,
     sectors: int,
     speed: float,

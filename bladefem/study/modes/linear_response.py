@@ -71,7 +71,7 @@ def pressure_load(
     return amplitude * unit if np.imag(amplitude) else np.real(amplitude) * unit
 
 
-def forced(
+def linear_response(
     bodies: Bodies,
     load: np.ndarray | None = None,
     damping: Damping | None = None,
@@ -126,14 +126,14 @@ def forced(
     )
 
 
-def displacement(response: Forced, frequency: float) -> np.ndarray:
+def displacement_at(response: Forced, frequency: float) -> np.ndarray:
     """(n_points, 3) complex amplitudes [m] of this blade at a frequency [Hz]; stresses come from
     fem.stress.
     """
     return np.tensordot(_modal_amplitudes(response, frequency), response.shapes, 1) + response.rest
 
 
-def probe(
+def probe_response(
     response: Forced,
     vector: np.ndarray,
     frequencies: np.ndarray,
@@ -153,7 +153,7 @@ def probe(
     return np.array([_modal_amplitudes(response, f) @ seen + rest for f in frequencies])
 
 
-def peak(
+def find_linear_peak(
     response: Forced,
     vector: np.ndarray,
     mode: int = 1,
@@ -172,7 +172,7 @@ def peak(
     width = np.clip(6 * half_widths(response)[mode - 1], 1e-6, 0.05)
     f = w / (2 * np.pi)
     best = minimize_scalar(
-        lambda x: -abs(probe(response, vector, np.array([x * f]))[0]),
+        lambda x: -abs(probe_response(response, vector, np.array([x * f]))[0]),
         bounds=(1 - width, 1 + width),
         method="bounded",
         options={"xatol": 1e-10},

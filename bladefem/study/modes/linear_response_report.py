@@ -19,13 +19,13 @@ from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies
 from .linear_response import (
     Forced,
-    displacement,
+    displacement_at,
     excitation_load,
-    forced,
+    find_linear_peak,
     half_widths,
-    peak,
+    linear_response,
     pressure_load,
-    probe,
+    probe_response,
     static_offset,
 )
 
@@ -44,7 +44,7 @@ Fields = dict[str, dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
-class Answer:
+class ForcedResponseAnswer:
     """SI columns; complex amplitudes e^{j w t}."""
 
     response: Forced
@@ -57,12 +57,12 @@ class Answer:
     shapes: np.ndarray = field(repr=False)
 
 
-def answer(
+def forced_response_answer(
     bodies: Bodies,
     loads: Sequence[tuple[str, float]] = (),
     damping: Damping | None = None,
     count: int = MAX_RESONANCES,
-) -> Answer:
+) -> ForcedResponseAnswer:
     """Response to the engine order over the band of the first modes; collective.
 
     Args:
@@ -82,16 +82,16 @@ def answer(
     damping = damping or Damping(ratio=bodies.scene.operation.damping)
     if not any(getattr(damping, f.name) for f in fields(damping)):
         raise InputError("operation.damping = 0: expected some damping for a forced response")
-    found = forced(bodies, np.sum(parts, axis=0), damping)
+    found = linear_response(bodies, np.sum(parts, axis=0), damping)
     ports = blade_ports(bodies.mesh, [], excitation)
     vector = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     count = min(count, len(found.omega))
     natural = found.omega[:count] / (2 * np.pi)
-    best = np.array([peak(found, vector, mode)[0] for mode in range(1, count + 1)])
+    best = np.array([find_linear_peak(found, vector, mode)[0] for mode in range(1, count + 1)])
     peaked = abs(best / natural - 1) < np.maximum(4 * half_widths(found)[:count], 1e-6)
     best = np.where(peaked, best, natural)
-    seen = probe(found, vector, best)
-    shapes = np.stack([displacement(found, f) for f in best]).astype(complex)
+    seen = probe_response(found, vector, best)
+    shapes = np.stack([displacement_at(found, f) for f in best]).astype(complex)
     resonances = pd.DataFrame(
         {
             "mode": np.arange(1, count + 1),
@@ -103,7 +103,7 @@ def answer(
             "peaked": peaked,
         }
     )
-    return Answer(found, _response_curve(found, vector, count), resonances, shapes)
+    return ForcedResponseAnswer(found, _response_curve(found, vector, count), resonances, shapes)
 
 
 def read_loads(text: str) -> list[tuple[str, float]]:
@@ -152,7 +152,7 @@ def stress_states(
     bodies: Bodies,
     modes: ModeSet,
     count: int,
-    found: Answer | None = None,
+    found: ForcedResponseAnswer | None = None,
 ) -> dict[str, np.ndarray]:
     """Displacements (n_points, 3) [m] by name: of rotation and heat, of modes scaled to 1 mm, of
     resonances.
@@ -242,5 +242,5 @@ def _response_curve(
     band = 0.6 * f[0], 1.15 * f[-1]
     every = np.unique(np.concatenate([np.geomspace(*band, POINTS_OVER_BAND), near]))
     every = every[(every >= band[0]) & (every <= band[1])]
-    seen = probe(found, vector, every)
+    seen = probe_response(found, vector, every)
     return pd.DataFrame({"frequency": every, "amplitude": abs(seen), "phase": np.angle(seen)})

@@ -29,10 +29,10 @@ from ...errors import InputError
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
 from ...util.communicator import Communicator
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from ..pipeline.stages import Bodies, build_mesh, find_modes
 from .comparison import mac_of
-from .mesh_transfer import nodal_volumes, transfer
+from .mesh_transfer import nodal_volumes, transfer_fields
 
 # of the scene's own element sizes
 SIZE_RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
@@ -64,13 +64,13 @@ class Convergence:
     summary: pd.DataFrame
 
 
-def converge(
+def mesh_convergence(
     scene: Scene,
     sizes: Sequence[float],
     diameters: Sequence[int] | None = None,
     count: int = 5,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Convergence:
     """The same scene on several meshes.
 
@@ -120,7 +120,7 @@ def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Con
     return Convergence(points, _convergence_summary(points))
 
 
-def paired(
+def paired_modes(
     mesh: Mesh,
     modes: ModeSet,
     finest: Mesh,
@@ -136,7 +136,7 @@ def paired(
     theirs = (
         modes.shapes[:, nodes]
         if mesh is finest
-        else transfer(blade, modes.shapes, finest.points[nodes])
+        else transfer_fields(blade, modes.shapes, finest.points[nodes])
     )
     match = mac_of(reference.shapes[:count, nodes], theirs, nodal_volumes(finest)[nodes])
     rows, columns = linear_sum_assignment(-match)
@@ -151,7 +151,7 @@ def _mesh_rows(
     count: int,
 ) -> pd.DataFrame:
     """One mesh and nodal diameter."""
-    numbers, match = paired(mesh, modes, finest, reference, count)
+    numbers, match = paired_modes(mesh, modes, finest, reference, count)
     diameter = {} if modes.nodal_diameter is None else {"nodal_diameter": modes.nodal_diameter}
     return pd.DataFrame(
         {
@@ -203,7 +203,7 @@ def richardson(h: np.ndarray, f: np.ndarray) -> tuple[float, float]:
     return float(f[2] - second * h[2] ** p / (h[1] ** p - h[2] ** p)), float(p)
 
 
-def fitted(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
+def fitted_order(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
     """Limit, order and scatter (standard deviation) of f + C h^p by least squares.
 
     Returns:
@@ -236,7 +236,7 @@ def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
     for _, line in points.groupby(keys):
         line = line.sort_values("size", ascending=False)
         f = line["frequency"].to_numpy()
-        limit, order, scatter = fitted(line["size"].to_numpy() / line["size"].iloc[-1], f)
+        limit, order, scatter = fitted_order(line["size"].to_numpy() / line["size"].iloc[-1], f)
         reason = _order_doubt(order, line["mac"].min())
         change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
         error = (

@@ -46,7 +46,7 @@ def nodal_volumes(mesh: Mesh) -> np.ndarray:
     return volumes
 
 
-def transfer(
+def transfer_fields(
     mesh: Mesh,
     fields: np.ndarray,
     points: np.ndarray,
@@ -67,7 +67,7 @@ def transfer(
     pieces = simplices(mesh, cells)
     owner = np.repeat(np.arange(len(cells)), pieces.shape[1])
     pieces = pieces.reshape(-1, pieces.shape[2])
-    piece, weights = locate(
+    piece, weights = locate_points(
         mesh.points[pieces][..., : mesh.dimension], points[:, : mesh.dimension], candidates
     )
     if mesh.cell_type in MID_SIDE_EDGES:
@@ -78,7 +78,7 @@ def transfer(
     return np.einsum("kc,mkci->mki", weights, fields[:, nodes])
 
 
-def locate(
+def locate_points(
     corners: np.ndarray,
     points: np.ndarray,
     candidates: int,

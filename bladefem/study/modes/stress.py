@@ -35,7 +35,7 @@ class Strength:
     mean: RealArray
 
 
-def strength(bodies: Bodies, modes: ModeSet) -> Strength:
+def mode_strength(bodies: Bodies, modes: ModeSet) -> Strength:
     """Stresses of the mode that the scene studies; the other modes and the damper's forces are left
     out.
 

@@ -17,22 +17,22 @@ from geometry.mesh import Mesh
 from ...data import ModeSet
 from ...errors import InputError
 from ...hbm.model import Damping
-from ...io.stage_cache import found_remark, on_root, stage
+from ...io.stage_cache import cached_stage, found_remark, on_root
 from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from ..pipeline import pipeline
 from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
 from ..pipeline.validate_mesh import check_blade, refuse_loads
-from .campbell import Campbell, campbell
+from .campbell import Campbell, campbell_tables
 from .clamped_aerofoil import clamped_blade
 from .comparison import mac
 from .effective_mass import effective_masses
-from .linear_response_report import Answer, answer
-from .mesh_convergence import Convergence, converge, default_sizes
+from .linear_response_report import ForcedResponseAnswer, forced_response_answer
+from .mesh_convergence import Convergence, default_sizes, mesh_convergence
 
 # engine orders above and below the scene's own, in Campbell and SAFE diagrams
 NEIGHBOURING_ORDERS = 3
@@ -67,7 +67,7 @@ class Survey:
     campbell: Campbell | None = None
     convergence: Convergence | None = None
     # linear forced response
-    answer: Answer | None = None
+    answer: ForcedResponseAnswer | None = None
     # (modes, modes of the other run) in the excited nodal diameter
     mac: np.ndarray | None = None
     # the other run's
@@ -76,12 +76,12 @@ class Survey:
     clamped: ModeSet | None = field(default=None, repr=False)
 
 
-def survey(
+def survey_modes(
     scene: Scene,
     folder: str | Path,
     wanted: Wanted,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Survey:
     """Modes of every nodal diameter, and what is asked for in addition; collective.
 
@@ -96,7 +96,9 @@ def survey(
     bodies = Bodies(scene, start.mesh, comm, progress)
     clock = time.perf_counter()
     key = stage_key("survey", scene, wanted.direct)
-    sets, before = stage(folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm)
+    sets, before = cached_stage(
+        folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm
+    )
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
     run = ModalRun(**{**vars(start), "messages": messages}, modes=sets)
     clock = _stage_seconds(run, "modes", clock)
@@ -105,20 +107,24 @@ def survey(
     )
     clock = _stage_seconds(run, "effective masses, clamped blade", clock)
     if wanted.speeds is not None:
-        result = replace(result, campbell=campbell(bodies, wanted.speeds, _engine_orders(scene)))
+        result = replace(
+            result, campbell=campbell_tables(bodies, wanted.speeds, _engine_orders(scene))
+        )
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
         sizes = list(wanted.sizes) or default_sizes(scene)
         n = excited_set(run).nodal_diameter
         result = replace(
             result,
-            convergence=converge(
+            convergence=mesh_convergence(
                 scene, sizes, None if n is None else [n], comm=comm, progress=progress
             ),
         )
         clock = _stage_seconds(run, "mesh refinement", clock)
     if wanted.loads is not None:
-        result = replace(result, answer=answer(bodies, wanted.loads, wanted.damping))
+        result = replace(
+            result, answer=forced_response_answer(bodies, wanted.loads, wanted.damping)
+        )
         clock = _stage_seconds(run, "forced response", clock)
     return result if other is None else _compare_modes(result, *other)
 

@@ -16,7 +16,7 @@ from geometry.mesh import Mesh, sector_of
 from ...data import Elements, Patch, PortModel, RigidBody
 from ...errors import InputError
 from ...hbm.model import Damping, ReducedModel, in_series
-from ...reduction.assemble import pair_models, recombine, wheel_models
+from ...reduction.assemble import pair_models, recombine_contact, wheel_models
 from ...scene.tables import Scene
 from .stages import Reduced
 
@@ -71,7 +71,7 @@ def joint_model(
         sides = _sides(scene, reduced, harmonics)
     elements = case.elements
     if not whole:
-        sides = tuple(recombine(side, pick) for side in sides)
+        sides = tuple(recombine_contact(side, pick) for side in sides)
     if damper == "mass" or scene.contact.normal == "prescribed":
         elements = replace(elements, kn=np.zeros_like(elements.kn))
     series = case.series
@@ -81,7 +81,7 @@ def joint_model(
     other: RigidBody | tuple[PortModel, ...]
     if damper == "elastic":
         free = _with_stop(scene, mesh, reduced, patches).damper
-        other = (free if whole else recombine(free, pick),)
+        other = (free if whole else recombine_contact(free, pick),)
     else:
         other = rigid_body(scene, mesh, reduced, patches, damper)
         if not whole:

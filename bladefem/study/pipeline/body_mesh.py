@@ -69,7 +69,7 @@ def mode_errors(
     return ModeErrors(modes.nodal_diameter or 0, np.asarray(seen), energies)
 
 
-def softened(reduced: Reduced, errors: ModeErrors) -> Reduced | None:
+def softened_sector(reduced: Reduced, errors: ModeErrors) -> Reduced | None:
     """The sector less the error of its stiffness; None where the reduction has other modes, or the
     error is as large as the stiffness.
     """

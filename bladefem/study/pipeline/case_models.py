@@ -13,7 +13,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...data import Patch
-from ...reduction.truncate import truncated
+from ...reduction.truncate import truncate_modes
 from ...scene.tables import Scene
 from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
@@ -22,13 +22,13 @@ from ..adaptive.family import Family, Member, coarsened_elements, family_member,
 from ..adaptive.resonance_choice import choose_at_peak, peak_from
 from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
 from .assemble_model import LoadCase, joint_model
-from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened
+from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
 from .changed_cases import seated_case
-from .contact_cycle import labels
-from .liftoff import named
+from .contact_cycle import element_labels
+from .liftoff import naming_the_load
 from .run_records import Seating
 from .stage_inputs import stage_key
-from .stages import Bodies, Reduced, harmonic_diameters, reduce_sector, weighted
+from .stages import Bodies, Reduced, harmonic_diameters, reduce_sector, with_damper_mass
 
 # higher ones borrow the nodal diameter next to their own
 EXACT_HARMONICS = 3
@@ -59,7 +59,7 @@ def family_of_case(
 ) -> Family:
     """All models of a load case that the reduced sector allows."""
     nodes = len(case.elements.kt)
-    reduced = weighted(reduced, case.mass)
+    reduced = with_damper_mass(reduced, case.mass)
     most = affordable_harmonics(case)
 
     def shared(settings: Settings) -> Member:
@@ -69,7 +69,7 @@ def family_of_case(
     # a point's own model and those of its five indicators
     @lru_cache(maxsize=6)
     def build(settings: Settings) -> Member:
-        few = {n: truncated(body, settings.modes) for n, body in reduced.sector.items()}
+        few = {n: truncate_modes(body, settings.modes) for n, body in reduced.sector.items()}
         model = joint_model(
             scene,
             mesh,
@@ -79,7 +79,11 @@ def family_of_case(
             settings.harmonics,
             settings.damper,
         )
-        groups = np.arange(nodes) if settings.points is None else labels(patches, settings.points)
+        groups = (
+            np.arange(nodes)
+            if settings.points is None
+            else element_labels(patches, settings.points)
+        )
         return Member(coarsened_elements(model, groups), groups)
 
     return Family(
@@ -98,7 +102,7 @@ def softer_body(
     errors: ModeErrors,
 ) -> SofterBody | None:
     """All models of each load case on the blade less the error of its stiffness."""
-    softer = softened(reduced, errors)
+    softer = softened_sector(reduced, errors)
     if softer is None:
         return None
     ratio = frequency_ratio(reduced, softer, errors, scene.excitation.mode)
@@ -141,7 +145,7 @@ def reduced_sector(
         family = family_of_case(scene, bodies.mesh, reduced, patches, case)
         model = family_member(family, settings).model
         mode = scene.excitation.mode
-        with named(case, model, mode, scene.excitation.force):
+        with naming_the_load(case, model, mode, scene.excitation.force):
             rough = covered_band(model, settings, scene.study.band, mode, 1.0)
             peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
         enough = choose_at_peak(family, settings, peak, scene.accuracy, fixed=("modes",))

@@ -18,7 +18,12 @@ from ...contact.numerical_stiffness import physical_stiffness
 from ...data import Elements, Patch
 from ...friction.aft import Forces, evaluate
 from ...friction.energy import free_static_force
-from ...friction.equivalent_linear import Approximation, by_harmonic, from_harmonics, work_of
+from ...friction.equivalent_linear import (
+    Approximation,
+    from_harmonics,
+    matrices_by_harmonic,
+    work_of,
+)
 from ...friction.fourier import synthesis
 from ...friction.law_table import select_elements
 from ...util.arrays import IntegerArray, RealArray
@@ -102,10 +107,10 @@ def contact_cycle(
     area = np.concatenate([patch.area for patch in patches])
     elements = case.elements
     layer = physical_stiffness(elements, case.series)
-    groups = labels(patches, points)
+    groups = element_labels(patches, points)
     # of all nodes; the choice may have joined some
     if len(elements.kt) == len(area):
-        groups = labels(patches, curve.settings.points)
+        groups = element_labels(patches, curve.settings.points)
         elements = joined_elements(elements, groups)
         layer = joined_elements(layer, groups)
     series = 1.0 / layer.kt - 1.0 / elements.kt
@@ -168,7 +173,7 @@ def _linear(
     apart = np.abs(work_of(averaged, u, omega).sum(1) - spent).max() / max(spent.max(), 1e-300)
     return (
         averaged,
-        by_harmonic(u, f, omega),
+        matrices_by_harmonic(u, f, omega),
         float(apart) if (forces.shares[:, 1] > 0).any() else 0.0,
     )
 
@@ -215,7 +220,7 @@ def _loop(
     return Loop(T @ (direction @ mean), T @ (direction @ force))
 
 
-def labels(patches: Sequence[Patch], points: int | None) -> np.ndarray:
+def element_labels(patches: Sequence[Patch], points: int | None) -> np.ndarray:
     """(nodes of all patches,) number of the element that each belongs to, ``points`` elements on
     each patch.
     """

@@ -25,7 +25,7 @@ from ...scene.support import area_springs, held_letters
 from ...util.arrays import ComplexArray, RealArray
 from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
-from .contact_cycle import labels
+from .contact_cycle import element_labels
 from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
@@ -269,7 +269,7 @@ def node_forces(
     """
     elements = case.elements
     if len(f) != len(elements.kt):
-        f = _shared_forces(elements, f, labels(list(patches), points))
+        f = _shared_forces(elements, f, element_labels(list(patches), points))
     missing = 1 + elements.tangents - f.shape[1]
     f = np.concatenate([np.zeros((len(f), missing, f.shape[2])), f], axis=1)
     n, d, K = f.shape

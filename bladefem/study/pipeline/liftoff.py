@@ -21,7 +21,7 @@ LIFTED_TRAVEL = 10.0
 
 
 @contextmanager
-def named(
+def naming_the_load(
     case: LoadCase,
     model: ReducedModel,
     mode: int,

@@ -18,17 +18,17 @@ from ...hbm.sweep import size
 from ...scene.tables import Scene
 from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import Checked, checked_points, estimated_errors
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
-from ..adaptive.resonance_curve import resonance_curve, unfollowed
-from ..adaptive.settings import Settings, restarted
+from ..adaptive.resonance_curve import resonance_curve, too_large_to_follow
+from ..adaptive.settings import Settings, restarted_settings
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
 from .kept_band import KeptBand, kept_of_family
-from .liftoff import named
+from .liftoff import naming_the_load
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
 from .stability import UNSTABLE, Stability, model_in_time, stability_of
@@ -36,7 +36,7 @@ from .stability import UNSTABLE, Stability, model_in_time, stability_of
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
 
-def forgotten(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
+def compute_without_keeping(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
     """The keeper that keeps nothing."""
     return compute()
 
@@ -138,8 +138,8 @@ def study_loads(
     family: Callable[[LoadCase], Family],
     settings: Settings,
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
-    keep: Keep = forgotten,
+    progress: Progress = without_progress,
+    keep: Keep = compute_without_keeping,
     softer: SofterBody | None = None,
 ) -> list[Curve]:
     """One response curve a load case, shared over the ranks; every rank returns all of them.
@@ -160,7 +160,7 @@ def study_loads(
     ranks = 1 if comm is None else comm.size
     curves = {
         i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings, softer))
-        for i in progress(dealt(len(cases), rank, ranks), "forced responses", delay=0.0)
+        for i in progress(dealt_to_rank(len(cases), rank, ranks), "forced responses", delay=0.0)
     }
     if comm is not None and ranks > 1:
         for part in comm.allgather(curves):
@@ -168,7 +168,7 @@ def study_loads(
     return [curves[i] for i in range(len(cases))]
 
 
-def dealt(
+def dealt_to_rank(
     count: int,
     rank: int,
     ranks: int,
@@ -198,8 +198,8 @@ def curve_of(
     """
     models = family(case)
     mode = scene.excitation.mode
-    with named(case, family_member(models, settings).model, mode, scene.excitation.force):
-        start = restarted(settings)
+    with naming_the_load(case, family_member(models, settings).model, mode, scene.excitation.force):
+        start = restarted_settings(settings)
         curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
@@ -233,7 +233,7 @@ def curve_of(
         unstable_peak=None if kept is None else peak_of(curve.points),
         kept=kept,
         interval=interval,
-        unfollowed=lifts and unfollowed(models, curve.settings),
+        unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,
         body_mesh=body_mesh,
     )
@@ -281,7 +281,7 @@ def _record(p: Solution) -> dict[str, Any]:
     }
 
 
-def summary(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.ndarray]:
+def design_table(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.ndarray]:
     """The design table: one row a load, from no damper (load 0) to full stick (load inf)."""
     free, stuck = (_linear_row(limit) for limit in limits)
     rows = [free, *map(_row, curves), stuck]

@@ -12,14 +12,14 @@ from ...data import Patch
 from ...errors import InputError, suggestion
 from ...scene.tables import Scene
 from ...scene.validate import refuse_response
-from ...scene.warnings import doubts
+from ...scene.warnings import implausible_values
 from ...util.communicator import Communicator
 from ...util.message import warning
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from ..adaptive.contact_mesh import coarse_sentence
 from ..adaptive.settings import first_settings
 from ..modes.clamped_aerofoil import clamped_blade
-from ..modes.stress import strength
+from ..modes.stress import mode_strength
 from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
 from .history import refuse_jamming
@@ -89,7 +89,7 @@ def run(
     folder: Folder,
     until: str = "response",
     comm: Communicator | None = None,
-    progress: Progress = unwatched,
+    progress: Progress = without_progress,
 ) -> Run:
     """Run a scene as far as a stage, on all ranks of a communicator.
 
@@ -109,7 +109,9 @@ def run(
     responds = until in STAGES[3:]
     if responds:
         refuse_response(scene)
-    keep = StageRunner(folder, comm, StageClock({}, [*map(warning, doubts(scene))], progress))
+    keep = StageRunner(
+        folder, comm, StageClock({}, [*map(warning, implausible_values(scene))], progress)
+    )
     meshed = _run_mesh(scene, keep)
     if until == "mesh":
         return meshed
@@ -193,7 +195,7 @@ def _run_reduction(
         stressed = keep(
             "strength",
             stage_key("stress", scene),
-            lambda: on_one_rank(bodies, lambda some: strength(some, excited)),
+            lambda: on_one_rank(bodies, lambda some: mode_strength(some, excited)),
         )
     cases = load_cases(scene, mesh, before.contact)
     middle = cases[len(cases) // 2]

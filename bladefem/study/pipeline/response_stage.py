@@ -31,7 +31,7 @@ from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
-from .stages import Bodies, weighted
+from .stages import Bodies, with_damper_mass
 from .utilisation import utilisation_message
 
 
@@ -104,7 +104,7 @@ def _stresses(
         found = {}
         for k in sorted(wanted):
             settings = curves[k].settings
-            reduced = weighted(before.reduced, cases[k].mass)
+            reduced = with_damper_mass(before.reduced, cases[k].mass)
             damper = rigid_body(before.scene, before.mesh, reduced, patches, settings.damper)
             found[k] = damped_stress(
                 alone,

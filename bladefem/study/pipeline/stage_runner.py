@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias, TypeVar
 
-from ...io.stage_cache import found_remark, stage
+from ...io.stage_cache import cached_stage, found_remark
 from ...util.communicator import Communicator
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 
 Folder: TypeAlias = str | Path | None
 Result = TypeVar("Result")
@@ -24,7 +24,7 @@ class StageClock:
     # wall-clock time of each stage so far [s]
     seconds: dict[str, float]
     messages: list[str]
-    progress: Progress = unwatched
+    progress: Progress = without_progress
 
     @contextmanager
     def __call__(self, name: str) -> Iterator[None]:
@@ -51,7 +51,7 @@ class StageRunner:
         key: str,
         compute: Callable[[], Result],
     ) -> Result:
-        return self._reported(name, *stage(self.folder, name, key, compute, self.comm))
+        return self._reported(name, *cached_stage(self.folder, name, key, compute, self.comm))
 
     def alone(
         self,
@@ -60,7 +60,7 @@ class StageRunner:
         compute: Callable[[], Result],
     ) -> Result:
         """The same for a stage that this rank runs by itself."""
-        return self._reported(name, *stage(self.folder, name, key, compute))
+        return self._reported(name, *cached_stage(self.folder, name, key, compute))
 
     def _reported(
         self,

@@ -26,7 +26,7 @@ from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
 from ...scene.temperature_file import read_temperatures
 from ...util.communicator import Communicator
-from ...util.progress import Progress, unwatched
+from ...util.progress import Progress, without_progress
 from .ports import Ports, blade_ports, damper_ports
 
 # dolfinx is slow to load: the functions below import it when they run
@@ -62,7 +62,7 @@ class Bodies:
     scene: Scene
     mesh: Mesh
     comm: Communicator | None = None
-    progress: Progress = unwatched
+    progress: Progress = without_progress
 
     @cached_property
     def kept(self) -> dict[str, Any]:
@@ -229,7 +229,7 @@ class Reduced:
     mass: float
 
 
-def weighted(reduced: Reduced, mass: float | None) -> Reduced:
+def with_damper_mass(reduced: Reduced, mass: float | None) -> Reduced:
     """The same with a damper of another density: its mass [kg] scales, its flexibility stays."""
     if mass is None:
         return reduced

@@ -8,7 +8,7 @@ from geometry.mesh import Mesh
 
 from ...errors import InputError
 from ...util.message import warning
-from ..fatigue import Utilisation, haigh_diagram, utilisation
+from ..fatigue import Utilisation, fatigue_utilisation, haigh_diagram
 from .damped_motion import DampedStress
 from .run_records import SolvedRun
 
@@ -28,7 +28,7 @@ def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
     points = run.mesh.points[blade]
     mean = run.strength.mean[blade]
     return {
-        number: utilisation(diagram, points, found.field[blade], mean)
+        number: fatigue_utilisation(diagram, points, found.field[blade], mean)
         for number, found in run.damped.items()
     }
 
@@ -47,7 +47,7 @@ def wheel_utilisation(run: SolvedRun) -> list[Utilisation]:
     blade = blade_nodes(run.mesh)
     points = run.mesh.points[blade]
     mean = run.strength.mean[blade]
-    return [utilisation(diagram, points, r.stress.field[blade], mean) for r in run.wheel]
+    return [fatigue_utilisation(diagram, points, r.stress.field[blade], mean) for r in run.wheel]
 
 
 def blade_nodes(mesh: Mesh) -> np.ndarray:
