@@ -16,8 +16,8 @@ from .resonance_choice import (
     SHIFT_WEIGHT,
     SUFFICIENT_SHARE,
     PeakErrors,
+    lifts_off_widely,
     peak_from,
-    rattles,
 )
 from .settings import DAMPER_MODELS, FIRST_SETTINGS, Settings
 
@@ -58,7 +58,7 @@ def cheaper_settings(
             continue
         height = abs(found.height / peak.height - 1)
         shift = abs(found.omega / peak.omega - 1)
-        if max(height, SHIFT_WEIGHT * shift) > left or rattles(poorer, found.solution):
+        if max(height, SHIFT_WEIGHT * shift) > left or lifts_off_widely(poorer, found.solution):
             continue
         errors = _with_error(errors, name, height, shift)
         settings = replace(poorer, error=errors.total)
