@@ -47,7 +47,7 @@ from bladefem.fem.body import assemble  # noqa: E402
 from bladefem.fem.constraint import constrain, restrict_load  # noqa: E402
 from bladefem.fem.flexibility import compliance, flexible  # noqa: E402
 from bladefem.scene.tables import Material, Scene  # noqa: E402
-from geometry.isolated_process import build  # noqa: E402
+from geometry.isolated_process import build_isolated  # noqa: E402
 
 
 def best(call, repeats=5):
@@ -76,7 +76,7 @@ def lcp():
 
 
 def states():
-    mesh = build(Scene())
+    mesh = build_isolated(Scene())
     patches = [make_patch(mesh, name) for name in ("this", "next")]
     blade = flexible(constrain(assemble(mesh, "blade", Material()), "clamp", 0))
     damper = flexible(constrain(assemble(mesh, "damper", Material()), None))

@@ -168,13 +168,13 @@ def run_ours(
 
 def sector_mesh(dofs: float, curved: bool = True) -> Mesh:
     """The default sector with 24 blades and about this many degrees of freedom in the blade."""
-    from geometry.isolated_process import build
+    from geometry.isolated_process import build_isolated
 
     scene = Scene()
     scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))
     size = 0.0036
     for _ in range(4):
-        mesh = build(replace(scene, mesh=replace(scene.mesh, size=size, curved=curved)))
+        mesh = build_isolated(replace(scene, mesh=replace(scene.mesh, size=size, curved=curved)))
         found = 3 * len(np.unique(mesh.bodies["blade"]))
         if abs(found / dofs - 1) < 0.04:
             break

@@ -39,9 +39,9 @@ from types import SimpleNamespace
 import numpy as np
 
 from bladefem.errors import InputError
-from geometry.isolated_process import build
+from geometry.isolated_process import build_isolated
 from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
-from geometry.sampling import anywhere, around
+from geometry.sampling import sample_around, sample_in_range
 from geometry.sector_check import check_sector
 
 TABLES = {"aerofoil": Aerofoil, "platform": Platform, "shank": Shank, "disc": Disc, "damper": Wedge}
@@ -53,8 +53,10 @@ def parameters(number, seed):
     """Five tables; every fourth set comes from the whole ranges."""
     rng = np.random.default_rng((seed, number))
     if number % 4 == 0:
-        return level_plates({name: anywhere(table, rng) for name, table in TABLES.items()})
-    parts = level_plates({name: around(table(), rng, 0.25) for name, table in TABLES.items()})
+        return level_plates({name: sample_in_range(table, rng) for name, table in TABLES.items()})
+    parts = level_plates(
+        {name: sample_around(table(), rng, 0.25) for name, table in TABLES.items()}
+    )
     shank, longest = parts["shank"], min(parts["disc"].width, parts["platform"].length)
     return parts | {"shank": replace(shank, length=min(shank.length, longest))}
 
@@ -77,7 +79,7 @@ def attempt(number, seed):
     size = MeshSize(size=max(1.5 * thin, blade.span / 40))
     start = time.perf_counter()
     try:
-        outcome = build(SimpleNamespace(kind="wedge sector", mesh=size, **parts)).report
+        outcome = build_isolated(SimpleNamespace(kind="wedge sector", mesh=size, **parts)).report
     except InputError as error:
         outcome = str(error)
     return outcome, time.perf_counter() - start

@@ -8,7 +8,7 @@ from bladefem.scene.kinds import KINDS
 from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 from geometry import parameters
-from geometry.quantity import describe
+from geometry.quantity import describe_fields
 
 HERE = Path(__file__).parent
 TABLES = {
@@ -61,7 +61,7 @@ def rows(name: str) -> list[str]:
         "| field | default | accepted | meaning |",
         "| --- | ---: | --- | --- |",
     ]
-    for field in describe(getattr(parameters, name)):
+    for field in describe_fields(getattr(parameters, name)):
         limits = (
             "true or false"
             if isinstance(field["default"], bool)

@@ -16,13 +16,20 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import centres, imprint, polygon, prism, set_background, tie
+from .draw import (
+    boundary_centres,
+    draw_polygon,
+    draw_prism,
+    imprint_marks,
+    set_background,
+    tie_meshes,
+)
 from .extract_arrays import Groups
-from .finalise_mesh import complete, mesh_model
+from .finalise_mesh import complete_mesh, mesh_model
 from .mesh import Mesh
 from .parameters import HertzPair, MeshSize, Punch
-from .quality import report
-from .session import attempt, gmsh_session
+from .quality import quality_report
+from .session import gmsh_session, gmsh_step
 
 # seat of the Hertz pair over the expected contact radius
 SEAT_RATIO = 2.0
@@ -52,11 +59,11 @@ def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
     points = _bend_indenter(mesh, hertz.radius, hertz.half_width)
     bent = replace(mesh, points=points)
     notes = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
-    found = report(bent, mesh.report["straightened"], mesh.report["size"])
+    found = quality_report(bent, mesh.report["straightened"], mesh.report["size"])
     return replace(bent, report={**found, **notes})
 
 
-def punch(block: Punch, size: MeshSize) -> Mesh:
+def mesh_punch(block: Punch, size: MeshSize) -> Mesh:
     """Flat punch, as wide as high, on a block; the edge of the contact lies on element edges.
 
     Raises:
@@ -157,7 +164,7 @@ def _mesh_facing_bodies(
             (width, upper or seat),
             seat,
         )
-        tie(
+        tie_meshes(
             gmsh,
             dimension - 1,
             groups.faces["seat_right"],
@@ -171,9 +178,9 @@ def _mesh_facing_bodies(
             fine[0] / 2,
             MathEval=[{"F": f"Min({far}, {fine[0]} + 0.3 * Max(0, {distance} - {fine[1]}))"}],
         )
-        with attempt("mesh.contact_size", "mesh this geometry"):
+        with gmsh_step("mesh.contact_size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, dimension, size)
-    return complete(
+    return complete_mesh(
         mesh,
         {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3))},
         far,
@@ -192,15 +199,19 @@ def _draw_solids(
     upper: float | None,
 ) -> tuple[int, int]:
     """Quarter blocks with the seat imprinted, or a quarter round punch above."""
-    blade = imprint(
-        gmsh, prism(gmsh, _square_corners(width), -width, 0.0), [(2, _quarter_disc(gmsh, seat))]
+    blade = imprint_marks(
+        gmsh,
+        draw_prism(gmsh, _square_corners(width), -width, 0.0),
+        [(2, _quarter_disc(gmsh, seat))],
     )
     if upper is None:
         solid = gmsh.model.occ.extrude([(2, _quarter_disc(gmsh, seat))], 0, 0, seat)
         damper = next(tag for dim, tag in solid if dim == 3)
     else:
-        damper = imprint(
-            gmsh, prism(gmsh, _square_corners(upper), 0.0, upper), [(2, _quarter_disc(gmsh, seat))]
+        damper = imprint_marks(
+            gmsh,
+            draw_prism(gmsh, _square_corners(upper), 0.0, upper),
+            [(2, _quarter_disc(gmsh, seat))],
         )
     gmsh.model.occ.synchronize()
     return blade, damper
@@ -228,7 +239,9 @@ def _draw_plates(
         if upper
         else [[0, 0], [seat, 0], [seat, seat], [0, seat]]
     )
-    blade, damper = (polygon(gmsh, np.array(corners, dtype=float))[0] for corners in (low, high))
+    blade, damper = (
+        draw_polygon(gmsh, np.array(corners, dtype=float))[0] for corners in (low, high)
+    )
     gmsh.model.occ.synchronize()
     return blade, damper
 
@@ -248,7 +261,7 @@ def _name_faces(
     faces = {}
     ends = ((blade, -sizes[0], "seat_right", "clamp"), (damper, sizes[1], "damper_left", "load"))
     for body, end, contact, far in ends:
-        found = centres(gmsh, body, dimension)
+        found = boundary_centres(gmsh, body, dimension)
         level = [tag for tag, c in found.items() if abs(c[up]) < 1e-6 * seat]
         faces[contact] = [_nearest_axis({tag: found[tag] for tag in level})]
         faces[far] = [tag for tag, c in found.items() if abs(c[up] - end) < 1e-6 * seat]

@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 
-def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
+def draw_polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
     """Surface, lines and points of a plane polygon (n, 2 or 3) [m]; line i runs from corner i to i
     + 1.
     """
@@ -19,20 +19,20 @@ def polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list
     return occ.addPlaneSurface([occ.addCurveLoop(lines)]), lines, points
 
 
-def prism(
+def draw_prism(
     gmsh: ModuleType,
     corners: np.ndarray,
     low: float,
     high: float,
 ) -> int:
     """Volume over a polygon (n, 2) [m] from z = low to z = high."""
-    face, _, _ = polygon(gmsh, np.column_stack([corners, np.full(len(corners), low)]))
+    face, _, _ = draw_polygon(gmsh, np.column_stack([corners, np.full(len(corners), low)]))
     return next(
         tag for dim, tag in gmsh.model.occ.extrude([(2, face)], 0, 0, high - low) if dim == 3
     )
 
 
-def imprint(
+def imprint_marks(
     gmsh: ModuleType,
     volume: int,
     marks: list[tuple[int, int]],
@@ -51,7 +51,7 @@ def clear_leftovers(gmsh: ModuleType) -> None:
         gmsh.model.occ.remove(gmsh.model.occ.getEntities(dimension))
 
 
-def centres(
+def boundary_centres(
     gmsh: ModuleType,
     body: int,
     dimension: int = 3,
@@ -78,7 +78,7 @@ def face_at(
     return tags
 
 
-def tie(
+def tie_meshes(
     gmsh: ModuleType,
     dimension: int,
     master: list[int],

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
-from .profile import profile
+from .profile import sector_profile
 from .sector import blade_solid
 from .sector_check import check_sector
 from .session import gmsh_session
@@ -34,7 +34,7 @@ def write_blade_step(
     with gmsh_session() as gmsh:
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
         blade = blade_solid(
-            gmsh, aerofoil, platform, shank, disc, profile(platform, shank, disc, wedge)
+            gmsh, aerofoil, platform, shank, disc, sector_profile(platform, shank, disc, wedge)
         )
         gmsh.model.occ.dilate([(3, blade)], 0, 0, 0, 1e3, 1e3, 1e3)
         gmsh.model.occ.remove([e for e in gmsh.model.occ.getEntities(3) if e != (3, blade)])

@@ -10,7 +10,7 @@ from types import ModuleType
 import numpy as np
 
 from .mesh import Mesh
-from .topology import GMSH_TYPES, NODES, outward
+from .topology import GMSH_TYPES, NODES, outward_faces
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Groups:
     points: dict[str, list[int]] = field(default_factory=dict)
 
 
-def extract(
+def extract_mesh(
     gmsh: ModuleType,
     groups: Groups,
     dimension: int,
@@ -55,7 +55,7 @@ def extract(
         points,
         word,
         cells,
-        {name: outward(points, every, word, number[f]) for name, f in faces.items()},
+        {name: outward_faces(points, every, word, number[f]) for name, f in faces.items()},
         {name: number[_point_nodes(gmsh, p)] for name, p in groups.points.items()},
     )
 

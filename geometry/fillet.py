@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
-from .profile import Profile, profile
-from .section import outline
+from .profile import Profile, sector_profile
+from .section import section_outline
 
 # radius over the thickness of the root section
 OF_THICKNESS = 0.3
@@ -47,7 +47,9 @@ def with_fillet(
         HIGHEST * aerofoil.span,
         _highest_radius(),
     )
-    radius = _fitting_radius(aerofoil, platform, profile(platform, shank, disc, wedge), wanted)
+    radius = _fitting_radius(
+        aerofoil, platform, sector_profile(platform, shank, disc, wedge), wanted
+    )
     if radius < LEAST * wanted or (size.size or 0.0) > COARSEST * radius:
         radius = 0.0
     return replace(aerofoil, fillet=radius)
@@ -82,7 +84,7 @@ def platform_room(
     """Distances of the root section with its fillet from the edge of the platform, axially and
     circumferentially [m]; negative where it overhangs.
     """
-    root = np.abs(outline(blade, section.top, 0.0, blade.fillet_radius)).max(axis=0)
+    root = np.abs(section_outline(blade, section.top, 0.0, blade.fillet_radius)).max(axis=0)
     edge = EDGE * platform.thickness
     across = float(np.abs(section.corners[:, 1]).min())
     return platform.length / 2 - edge - root[2], across - edge - root[1]

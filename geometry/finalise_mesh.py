@@ -12,11 +12,11 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .curving import second_order
-from .extract_arrays import Groups, extract
-from .matching import match, snap
+from .extract_arrays import Groups, extract_mesh
+from .matching import match_faces, snap_slaves
 from .mesh import Mesh, Sector
 from .parameters import MeshSize
-from .quality import edge_of_middle, report, shape_quality, straighten
+from .quality import edge_of_middle, quality_report, shape_quality, straighten_cells
 
 # cells; far beyond what one machine solves
 MAX_CELLS = 3e6
@@ -51,7 +51,7 @@ def mesh_model(
         gmsh.option.setNumber("Mesh.MeshSizeFactor", factor * size.scale)
         gmsh.model.mesh.generate(2)
         if dimension == 3:
-            fill(gmsh, groups, size.algorithm)
+            fill_with_tetrahedra(gmsh, groups, size.algorithm)
         first_order = _first_order_mesh(gmsh, groups, dimension)
         if _worst_shape(first_order) > REFUSED_QUALITY or factor == smaller[-1]:
             break
@@ -59,7 +59,7 @@ def mesh_model(
     refuse_flat(first_order)
     if size.order == 2:
         second_order(gmsh, size.curved)
-    mesh = extract(gmsh, groups, dimension)
+    mesh = extract_mesh(gmsh, groups, dimension)
     if factor == 1.0:
         return mesh
     note = (
@@ -69,7 +69,7 @@ def mesh_model(
     return replace(mesh, report={**mesh.report, "notes": (note,)})
 
 
-def fill(
+def fill_with_tetrahedra(
     gmsh: ModuleType,
     groups: Groups,
     first: str,
@@ -84,7 +84,7 @@ def fill(
         gmsh.option.setNumber("Mesh.Algorithm3D", ALGORITHMS[algorithm])
         try:
             gmsh.model.mesh.generate(3)
-            if improve(gmsh, groups) > REFUSED_QUALITY:
+            if improve_tetrahedra(gmsh, groups) > REFUSED_QUALITY:
                 return
         except Exception:
             # gmsh raises the bare class
@@ -135,7 +135,7 @@ def check_count(
         )
 
 
-def improve(gmsh: ModuleType, groups: Groups) -> float:
+def improve_tetrahedra(gmsh: ModuleType, groups: Groups) -> float:
     """Let Netgen and then gmsh rework the tetrahedra when some are poor; the worst shape quality
     that is left.
 
@@ -154,7 +154,7 @@ def _first_order_mesh(
     dimension: int,
 ) -> Mesh:
     """The present first-order mesh, without its faces."""
-    return extract(gmsh, Groups(groups.bodies, {}), dimension)
+    return extract_mesh(gmsh, Groups(groups.bodies, {}), dimension)
 
 
 def _worst_shape(mesh: Mesh) -> float:
@@ -163,7 +163,7 @@ def _worst_shape(mesh: Mesh) -> float:
     )
 
 
-def complete(
+def complete_mesh(
     mesh: Mesh,
     motions: dict[str, Motion],
     size: float,
@@ -180,7 +180,7 @@ def complete(
     """
     mesh = replace(mesh, points=_flatten_faces(mesh, flat))
     pairs = {
-        name: match(
+        name: match_faces(
             mesh.points,
             mesh.faces,
             (m, s),
@@ -190,11 +190,11 @@ def complete(
         )
         for name, (m, s, r, t) in motions.items()
     }
-    mesh = replace(mesh, points=snap(mesh.points, pairs), pairs=pairs, sector=sector)
-    points, straightened = straighten(mesh)
-    mesh = replace(mesh, points=snap(points, pairs))
+    mesh = replace(mesh, points=snap_slaves(mesh.points, pairs), pairs=pairs, sector=sector)
+    points, straightened = straighten_cells(mesh)
+    mesh = replace(mesh, points=snap_slaves(points, pairs))
     notes = {name: mesh.report[name] for name in ("notes",) if name in mesh.report}
-    return replace(mesh, report={**report(mesh, straightened, size), **notes})
+    return replace(mesh, report={**quality_report(mesh, straightened, size), **notes})
 
 
 def _flatten_faces(mesh: Mesh, names: tuple[str, ...]) -> np.ndarray:

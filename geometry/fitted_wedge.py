@@ -15,9 +15,9 @@ import numpy as np
 from bladefem.errors import InputError, suggestion
 
 from .damper_shapes import SHAPES
-from .draw import centres, imprint, polygon
+from .draw import boundary_centres, draw_polygon, imprint_marks
 from .parameters import Wedge
-from .session import attempt
+from .session import gmsh_step
 
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
@@ -103,12 +103,12 @@ def fit_wedge(
     blade = _owning_solid(gmsh, right)
     before = _solid_faces(gmsh, blade)
     marks = [
-        (2, polygon(gmsh, flanks.rectangle(0))[0]),
-        (2, polygon(gmsh, flanks.rectangle(1) @ on)[0]),
+        (2, draw_polygon(gmsh, flanks.rectangle(0))[0]),
+        (2, draw_polygon(gmsh, flanks.rectangle(1) @ on)[0]),
     ]
-    with attempt("imported.seats", "cut the seats into the platforms"):
-        cut = imprint(gmsh, blade, marks)
-        base, _, _ = polygon(gmsh, flanks.section(wedge))
+    with gmsh_step("imported.seats", "cut the seats into the platforms"):
+        cut = imprint_marks(gmsh, blade, marks)
+        base, _, _ = draw_polygon(gmsh, flanks.section(wedge))
         drawn = gmsh.model.occ.extrude([(2, base)], *flanks.along)
     damper = next(tag for dim, tag in drawn if dim == 3)
     gmsh.model.occ.synchronize()
@@ -273,7 +273,7 @@ def _solid_faces(gmsh: ModuleType, volume: int) -> dict[int, tuple[np.ndarray, f
     """Centre and area of each face of a solid."""
     return {
         tag: (centre, float(gmsh.model.occ.getMass(2, tag)))
-        for tag, centre in centres(gmsh, volume).items()
+        for tag, centre in boundary_centres(gmsh, volume).items()
     }
 
 

@@ -26,17 +26,17 @@ from bladefem.util.arrays import IntegerArray
 from .finalise_mesh import Motion
 from .jacobian import straight_jacobian
 from .joined_files import joined_files
-from .matching import match, snap
+from .matching import match_faces, snap_slaves
 from .mesh import Mesh, Pair, Sector
 from .named_facets import named_facets
 from .numbered_faces import face_corners, numbered_faces
 from .parameters import MeshSize, Wedge
-from .profile import turn
-from .quality import report, straighten
+from .profile import turn_about_axis
+from .quality import quality_report, straighten_cells
 from .raw_mesh import RawMesh, read_raw
 from .renaming import read_names, renamed_raw
 from .solid_cells import SolidCells, solid_cells
-from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary, outward
+from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary_facets, outward_faces
 
 # files carry few digits; a match within this share of the face is a match, and is then snapped
 MATCH_TOLERANCE = 1e-4
@@ -178,10 +178,12 @@ def mesh_of_raw(
         )
     mesh = _with_faces(mesh, raw, wanted)
     mesh = _find_pairs(mesh, sectors, source, tolerance)
-    points, straightened = straighten(replace(mesh, points=snap(mesh.points, mesh.pairs)))
+    points, straightened = straighten_cells(
+        replace(mesh, points=snap_slaves(mesh.points, mesh.pairs))
+    )
     mesh = replace(mesh, points=points)
     words = {"source": source, "notes": (*raw.notes, *solids.notes)}
-    return replace(mesh, report={**report(mesh, straightened, _edge_length(mesh)), **words})
+    return replace(mesh, report={**quality_report(mesh, straightened, _edge_length(mesh)), **words})
 
 
 def _family_word(name: str) -> str:
@@ -278,7 +280,7 @@ def _with_faces(
         for name, nodes in raw.node_sets.items()
     }
     faces = named_facets(cells, mesh.cell_type, _corners_of_faces(raw, mesh.dimension, number))
-    skin = boundary(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
+    skin = boundary_facets(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
     joined = {_family_word(name) for name in wanted}
     for name, nodes in sets.items():
         inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
@@ -293,7 +295,7 @@ def _with_faces(
         points=points,
         bodies={n: number[c] for n, c in mesh.bodies.items()},
         nodes=sets,
-        faces={n: outward(points, cells, mesh.cell_type, f) for n, f in faces.items()},
+        faces={n: outward_faces(points, cells, mesh.cell_type, f) for n, f in faces.items()},
     )
 
 
@@ -338,7 +340,7 @@ def _find_pairs(
     tolerance: float,
 ) -> Mesh:
     """Cyclic and contact pairs, as far as the names are there."""
-    on = turn(2 * np.pi / sectors) if sectors else np.eye(3)
+    on = turn_about_axis(2 * np.pi / sectors) if sectors else np.eye(3)
     pairs: dict[str, Pair] = {}
     if sectors:
         for name in ("cyclic_low", "cyclic_high"):
@@ -383,7 +385,7 @@ def _matched_contact(
         InputError: neither; with a hint when the number of sectors was left out.
     """
     try:
-        return match(
+        return match_faces(
             mesh.points,
             mesh.faces,
             names,
@@ -444,7 +446,7 @@ def _cyclic_pair(
     """The cyclic pair; the names are swapped when the file has them the other way round."""
     names = ("cyclic_low", "cyclic_high")
     try:
-        return mesh, match(
+        return mesh, match_faces(
             mesh.points,
             mesh.faces,
             names,
@@ -459,7 +461,7 @@ def _cyclic_pair(
             faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]},
         )
         try:
-            return swapped, match(
+            return swapped, match_faces(
                 mesh.points,
                 swapped.faces,
                 names,
@@ -480,7 +482,7 @@ def _centre_sector(mesh: Mesh) -> np.ndarray:
     )
     middle = low / np.linalg.norm(low) + high / np.linalg.norm(high)
     angle = np.arctan2(middle[1], middle[0])
-    return mesh.points if abs(angle) < 1e-9 else mesh.points @ turn(-angle).T
+    return mesh.points if abs(angle) < 1e-9 else mesh.points @ turn_about_axis(-angle).T
 
 
 def _edge_length(mesh: Mesh) -> float:

@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
 
 
-def build(scene: Scene) -> Mesh:
+def build_isolated(scene: Scene) -> Mesh:
     """The mesh of a scene, made in a child process; after a crash with the other algorithm and
     smaller elements.
 
@@ -103,7 +103,7 @@ def _child_environment() -> dict[str, str]:
     return clean | {"PYTHONPATH": os.pathsep.join(path)}
 
 
-def main(job: str, answer: str) -> None:
+def run_child(job: str, answer: str) -> None:
     """The child."""
     scene = pickle.loads(Path(job).read_bytes())
     try:
@@ -115,4 +115,4 @@ def main(job: str, answer: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    run_child(*sys.argv[1:])

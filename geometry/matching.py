@@ -13,7 +13,7 @@ from .mesh import Pair
 from .topology import corner_count, face_word
 
 
-def match(
+def match_faces(
     points: np.ndarray,
     faces: dict[str, np.ndarray],
     names: tuple[str, str],
@@ -85,7 +85,7 @@ def _match_nodes(
     return np.vstack([master, slave[index]])
 
 
-def snap(points: np.ndarray, pairs: dict[str, Pair]) -> np.ndarray:
+def snap_slaves(points: np.ndarray, pairs: dict[str, Pair]) -> np.ndarray:
     """Points (n, 3) with every slave node moved onto its master's image, so that pairs match to
     rounding.
     """

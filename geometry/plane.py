@@ -11,12 +11,12 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import polygon, tie
+from .draw import draw_polygon, tie_meshes
 from .extract_arrays import Groups
-from .finalise_mesh import Motion, complete, mesh_model
+from .finalise_mesh import Motion, complete_mesh, mesh_model
 from .mesh import Mesh, Sector
 from .parameters import MeshSize, Plane
-from .session import attempt, gmsh_session
+from .session import gmsh_session, gmsh_step
 
 # on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
 SEAT_ELEMENTS = 40
@@ -41,7 +41,7 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     with gmsh_session() as gmsh:
         groups = _draw_plane(gmsh, plane)
         for master, slave, rotation, shift in motions.values():
-            tie(
+            tie_meshes(
                 gmsh,
                 1,
                 groups.faces[master],
@@ -50,10 +50,10 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
                 shift,
             )
         _set_sizes(gmsh, groups, base, contact)
-        with attempt("mesh.size", "mesh this geometry"):
+        with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)
     sector = Sector(0, np.eye(3), np.array([0.0, plane.pitch, 0.0]))
-    return replace(complete(mesh, motions, base, sector), depth=plane.depth)
+    return replace(complete_mesh(mesh, motions, base, sector), depth=plane.depth)
 
 
 def check_plane(plane: Plane) -> None:
@@ -138,8 +138,8 @@ def damper_corners(plane: Plane) -> np.ndarray:
 
 
 def _draw_plane(gmsh: ModuleType, plane: Plane) -> Groups:
-    blade, b, p = polygon(gmsh, blade_corners(plane))
-    damper, d, _ = polygon(gmsh, damper_corners(plane))
+    blade, b, p = draw_polygon(gmsh, blade_corners(plane))
+    damper, d, _ = draw_polygon(gmsh, damper_corners(plane))
     gmsh.model.occ.synchronize()
     faces = {
         "clamp": [b[14]],

@@ -36,14 +36,14 @@ class Profile:
     damper: RealArray
 
 
-def turn(angle: float) -> np.ndarray:
+def turn_about_axis(angle: float) -> np.ndarray:
     """Rotation matrix (3, 3) about the engine axis z."""
     c = cos(angle)
     s = sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
-def profile(
+def sector_profile(
     platform: Platform,
     shank: Shank,
     disc: Disc,

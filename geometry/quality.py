@@ -66,7 +66,7 @@ def edge_of_middle(mesh: Mesh) -> np.ndarray:
     return ends
 
 
-def straighten(mesh: Mesh, safe: float = MIN_JACOBIAN) -> tuple[np.ndarray, int]:
+def straighten_cells(mesh: Mesh, safe: float = MIN_JACOBIAN) -> tuple[np.ndarray, int]:
     """Points (n, 3) [m] where no second-order cell has a doubtful Jacobian, and how many cells were
     touched.
 
@@ -115,7 +115,7 @@ def _with_partners(
     return mask
 
 
-def report(
+def quality_report(
     mesh: Mesh,
     straightened: int,
     size: float,

@@ -35,7 +35,7 @@ def quantity(
     return dataclasses.field(default=default, metadata=meta)
 
 
-def describe(table: type) -> list[dict[str, Any]]:
+def describe_fields(table: type) -> list[dict[str, Any]]:
     """One row a field of a dataclass: name, unit, default, range, help, choices (for tables and
     help texts).
     """

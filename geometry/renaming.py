@@ -34,7 +34,7 @@ def read_names(texts: Iterable[str]) -> dict[str, list[str]]:
     return wanted
 
 
-def renamed(
+def rename_groups(
     groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]
 ) -> dict[str, list[Part]]:
     """Groups under their new names, several joined to one; the others keep theirs.

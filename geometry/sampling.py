@@ -15,14 +15,14 @@ if TYPE_CHECKING:
 Table = TypeVar("Table", bound="DataclassInstance")
 
 
-def anywhere(table: type[Table], rng: np.random.Generator) -> Table:
+def sample_in_range(table: type[Table], rng: np.random.Generator) -> Table:
     """Every number anywhere in its range (evenly in its logarithm where the range is positive),
     words at random.
     """
     return table(**{f.name: _draw_value(f, rng) for f in dataclasses.fields(table)})
 
 
-def around(
+def sample_around(
     table: Table,
     rng: np.random.Generator,
     spread: float,

@@ -41,7 +41,7 @@ def half_thickness(
     )
 
 
-def spread(
+def chord_places(
     family: str,
     thickness: float,
     points: int,
@@ -59,7 +59,7 @@ def spread(
     return np.interp(np.linspace(0, measure[-1], points), measure, x)
 
 
-def section(
+def closed_section(
     family: str,
     thickness: float,
     camber: float,
@@ -70,7 +70,7 @@ def section(
 
     Columns: along the chord (0 leading, 1 trailing edge) and across it (suction side positive).
     """
-    x = spread(family, thickness, points)
+    x = chord_places(family, thickness, points)
     half = half_thickness(family, x, thickness)
     line = 4 * camber * x * (1 - x)
     slope = 4 * camber * (1 - 2 * x)
@@ -89,7 +89,7 @@ def centroid(polygon: np.ndarray) -> np.ndarray:
     return ((a + b) * cross[:, None]).sum(axis=0) / (3 * cross.sum())
 
 
-def placement(
+def section_frame(
     blade: Aerofoil,
     radius: float,
     t: float,
@@ -108,7 +108,7 @@ def placement(
     return origin, along, across, chord
 
 
-def place(
+def place_section(
     blade: Aerofoil,
     radius: float,
     t: float,
@@ -117,19 +117,19 @@ def place(
     """Points (n, 3) [m] of chord coordinates (n, 2) in the section at share t, stacked on the
     centres of area.
     """
-    origin, along, across, chord = placement(blade, radius, t)
-    local = chord * (plane - centroid(shape(blade, t)))
+    origin, along, across, chord = section_frame(blade, radius, t)
+    local = chord * (plane - centroid(section_shape(blade, t)))
     return origin + local[:, :1] * along + local[:, 1:] * across
 
 
-def shape(blade: Aerofoil, t: float) -> np.ndarray:
+def section_shape(blade: Aerofoil, t: float) -> np.ndarray:
     """Section over chord at the share t of the span, (n, 2)."""
-    return section(
+    return closed_section(
         blade.section, (1 - t) * blade.thickness_root + t * blade.thickness_tip, blade.camber
     )
 
 
-def outline(
+def section_outline(
     blade: Aerofoil,
     radius: float,
     t: float,
@@ -139,10 +139,10 @@ def outline(
     ``grow`` [m].
     """
     chord = (1 - t) * blade.chord_root + t * blade.chord_tip
-    return place(blade, radius, t, grown(shape(blade, t), grow / chord))
+    return place_section(blade, radius, t, grown_outline(section_shape(blade, t), grow / chord))
 
 
-def grown(polygon: np.ndarray, distance: float) -> np.ndarray:
+def grown_outline(polygon: np.ndarray, distance: float) -> np.ndarray:
     """Open outline (n, 2), anticlockwise from the trailing edge, moved outwards; its ends keep the
     corner.
     """

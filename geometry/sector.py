@@ -12,27 +12,27 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import clear_leftovers, imprint, polygon, prism
+from .draw import clear_leftovers, draw_polygon, draw_prism, imprint_marks
 from .extract_arrays import Groups
 from .fillet import with_fillet
-from .finalise_mesh import complete, mesh_model
+from .finalise_mesh import complete_mesh, mesh_model
 from .mesh import Mesh
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
-from .profile import Profile, profile
+from .profile import Profile, sector_profile
 from .root import root_slots
-from .section import FILLET_ANGLE, outline
+from .section import FILLET_ANGLE, section_outline
 from .sector_check import check_sector
 from .sector_names import (
+    damper_moved_inwards,
     edge_curves,
-    link,
+    face_motions,
+    link_faces,
     mark_tip,
-    motions,
-    moved,
     name_faces,
-    seat,
-    sector,
+    next_sector_motion,
+    seat_face_corners,
 )
-from .session import attempt, gmsh_session
+from .session import gmsh_session, gmsh_step
 from .shroud import Block, shroud_block
 from .sizing import (
     Refined,
@@ -69,7 +69,7 @@ def wedge_sector(
     """
     check_sector(aerofoil, platform, shank, disc, wedge, root, shroud)
     aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, size)
-    shape = profile(platform, shank, disc, wedge)
+    shape = sector_profile(platform, shank, disc, wedge)
     block = shroud_block(shroud, aerofoil, disc, shape.top)
     sizes = sector_sizes(
         aerofoil,
@@ -90,10 +90,13 @@ def wedge_sector(
             block,
             root_slots(root, shank, disc),
         )
-        marks = [(2, polygon(gmsh, seat(shape, wedge.length, side))[0]) for side in (-1, 1)]
-        with attempt("damper.length", "imprint the seats on the platform"):
-            blade = imprint(gmsh, blade, marks)
-        damper = prism(gmsh, shape.damper, -wedge.length / 2, wedge.length / 2)
+        marks = [
+            (2, draw_polygon(gmsh, seat_face_corners(shape, wedge.length, side))[0])
+            for side in (-1, 1)
+        ]
+        with gmsh_step("damper.length", "imprint the seats on the platform"):
+            blade = imprint_marks(gmsh, blade, marks)
+        damper = draw_prism(gmsh, shape.damper, -wedge.length / 2, wedge.length / 2)
         clear_leftovers(gmsh)
         gmsh.model.occ.synchronize()
         groups = name_faces(
@@ -107,13 +110,15 @@ def wedge_sector(
             block,
         )
         groups = mark_tip(gmsh, groups, aerofoil, shape)
-        link(gmsh, groups, shape)
+        link_faces(gmsh, groups, shape)
         details = refined_parts(gmsh, groups, shape, sizes, (root, shank, disc), block)
         _prescribe_sizes(gmsh, groups, (shape, wedge), sizes, size, details)
-        with attempt("mesh.size", "mesh this geometry"):
+        with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
-    mesh = complete(mesh, motions(shape), sizes.base, sector(disc.sectors), flat=SEATS)
-    return moved(mesh, wedge, shape) if wedge.clearance else mesh
+    mesh = complete_mesh(
+        mesh, face_motions(shape), sizes.base, next_sector_motion(disc.sectors), flat=SEATS
+    )
+    return damper_moved_inwards(mesh, wedge, shape) if wedge.clearance else mesh
 
 
 def _prescribe_sizes(
@@ -128,7 +133,7 @@ def _prescribe_sizes(
     fillet = groups.faces.get("fillet", [])
     shape, wedge = section
     set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), details)
-    with attempt("aerofoil.fillet", "mesh the fillet in a grid"):
+    with gmsh_step("aerofoil.fillet", "mesh the fillet in a grid"):
         set_fillet_grid(gmsh, fillet, sizes, size)
     # an element size on the seats without a number across asks for free triangles
     if size.seat_elements or size.contact_size is None:
@@ -170,15 +175,15 @@ def _draw_aerofoil(
     occ = gmsh.model.occ
     foot = blade.fillet_radius / blade.span
     stations = np.linspace(foot, end, 3 + int(np.ceil(abs(blade.twist) / (12 * pi / 180))))
-    with attempt("aerofoil.twist", "loft the sections of the aerofoil"):
-        rings = [_profile_wire(gmsh, outline(blade, top, t)) for t in stations]
+    with gmsh_step("aerofoil.twist", "loft the sections of the aerofoil"):
+        rings = [_profile_wire(gmsh, section_outline(blade, top, t)) for t in stations]
         if not foot:
             return next(tag for dim, tag in occ.addThruSections(rings, makeSolid=True) if dim == 3)
-    with attempt("aerofoil.fillet", "round the root of the aerofoil"):
+    with gmsh_step("aerofoil.fillet", "round the root of the aerofoil"):
         # from the platform's plane to the blade's skin
         arc = np.linspace(FILLET_ANGLE, pi / 2, 6)[:-1]
         flare = [
-            _profile_wire(gmsh, outline(blade, top, t, grow))
+            _profile_wire(gmsh, section_outline(blade, top, t, grow))
             for t, grow in zip(
                 foot * (1 - np.cos(arc) / np.cos(FILLET_ANGLE)),
                 blade.fillet_radius * (1 - np.sin(arc)),
@@ -232,8 +237,8 @@ def blade_solid(
         [[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]
     )
     parts = [
-        prism(gmsh, neck, -shank.length / 2, shank.length / 2),
-        prism(
+        draw_prism(gmsh, neck, -shank.length / 2, shank.length / 2),
+        draw_prism(
             gmsh,
             np.vstack([right, left[::-1]]),
             -platform.length / 2,
@@ -243,11 +248,11 @@ def blade_solid(
     ]
     if block is not None:
         parts.append(occ.addBox(*block.low, *(block.high - block.low)))
-    with attempt("aerofoil", "join aerofoil, platform, shank and disc"):
+    with gmsh_step("aerofoil", "join aerofoil, platform, shank and disc"):
         solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])
     if slots:
-        with attempt("root", "cut the slots of the root"):
-            cut = [(3, prism(gmsh, slot, -disc.width, disc.width)) for slot in slots]
+        with gmsh_step("root", "cut the slots of the root"):
+            cut = [(3, draw_prism(gmsh, slot, -disc.width, disc.width)) for slot in slots]
             solid, _ = occ.cut(solid, cut)
     volumes = [tag for dim, tag in solid if dim == 3]
     if len(volumes) != 1:

@@ -12,9 +12,9 @@ from bladefem.errors import InputError
 
 from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
-from .profile import Profile, profile
+from .profile import Profile, sector_profile
 from .root import check_root
-from .section import shape
+from .section import section_shape
 from .sector_names import clearing_shift
 from .shroud import shroud_block
 
@@ -51,7 +51,7 @@ def check_sector(
             "85 deg minus half the sector angle",
             "rad",
         )
-    section = profile(platform, shank, disc, wedge)
+    section = sector_profile(platform, shank, disc, wedge)
     check_platform(section, platform, shank, wedge)
     check_pocket(section, shank, disc, wedge)
     check_aerofoil(aerofoil, platform, section)
@@ -165,7 +165,7 @@ def check_aerofoil(
 ) -> None:
     """Sections that do not cross themselves, and a root that lies on the platform."""
     for t, name in ((0.0, "thickness_root"), (1.0, "thickness_tip")):
-        if crosses_itself(shape(blade, t)):
+        if crosses_itself(section_shape(blade, t)):
             raise InputError(
                 f"aerofoil.{name}: the section crosses itself, expected less thickness or less "
                 "aerofoil.camber"

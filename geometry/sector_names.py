@@ -10,17 +10,17 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import centres, face_at, tie
+from .draw import boundary_centres, face_at, tie_meshes
 from .extract_arrays import Groups
 from .finalise_mesh import Motion
 from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
-from .profile import Profile, turn
-from .section import outline, place, placement
+from .profile import Profile, turn_about_axis
+from .section import place_section, section_frame, section_outline
 from .shroud import Block
 
 
-def seat(
+def seat_face_corners(
     profile: Profile,
     length: float,
     side: int,
@@ -46,8 +46,8 @@ def name_faces(
     tolerance = 1e-6 * profile.top
     middle = (disc.bore_radius + disc.rim_radius) / 2
     cut = np.array([middle * np.cos(theta), middle * np.sin(theta), 0])
-    low, high = (seat(profile, wedge.length, side).mean(axis=0) for side in (-1, 1))
-    on_blade = centres(gmsh, blade)
+    low, high = (seat_face_corners(profile, wedge.length, side).mean(axis=0) for side in (-1, 1))
+    on_blade = boundary_centres(gmsh, blade)
     faces = {
         name: face_at(on_blade, where, tolerance, name)
         for name, where in {
@@ -58,9 +58,11 @@ def name_faces(
             "clamp": np.array([disc.bore_radius * sin(theta) / theta, 0, 0]),
         }.items()
     }
-    on_damper = centres(gmsh, damper)
+    on_damper = boundary_centres(gmsh, damper)
     faces["damper_left"] = face_at(on_damper, high, tolerance, "damper_left")
-    faces["damper_right"] = face_at(on_damper, turn(2 * theta) @ low, tolerance, "damper_right")
+    faces["damper_right"] = face_at(
+        on_damper, turn_about_axis(2 * theta) @ low, tolerance, "damper_right"
+    )
     faces["tip"] = [
         t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance
     ]
@@ -124,7 +126,7 @@ def _aerofoil_faces(
             "change aerofoil.lean, aerofoil.sweep or aerofoil.fillet"
         )
     trailing, *both = sorted(sides, key=lambda tag: gmsh.model.occ.getMass(2, tag))
-    across = placement(aerofoil, 0.0, 0.5)[2]
+    across = section_frame(aerofoil, 0.0, 0.5)[2]
     pressure, suction = sorted(
         both, key=lambda tag: across @ np.array(gmsh.model.occ.getCenterOfMass(2, tag))
     )
@@ -177,14 +179,14 @@ def slot_curves(
     return found
 
 
-def sector(count: int) -> Sector:
+def next_sector_motion(count: int) -> Sector:
     """The way to the next blade of a wheel."""
-    return Sector(count, turn(2 * np.pi / count), np.zeros(3))
+    return Sector(count, turn_about_axis(2 * np.pi / count), np.zeros(3))
 
 
-def motions(profile: Profile) -> dict[str, Motion]:
+def face_motions(profile: Profile) -> dict[str, Motion]:
     """Faces that match, with the motion from master to slave."""
-    on = turn(2 * profile.theta)
+    on = turn_about_axis(2 * profile.theta)
     stay = np.eye(3)
     still = np.zeros(3)
     return {
@@ -194,14 +196,14 @@ def motions(profile: Profile) -> dict[str, Motion]:
     }
 
 
-def link(
+def link_faces(
     gmsh: ModuleType,
     groups: Groups,
     profile: Profile,
 ) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
-    for master, slave, rotation, shift in motions(profile).values():
-        tie(
+    for master, slave, rotation, shift in face_motions(profile).values():
+        tie_meshes(
             gmsh,
             2,
             groups.faces[master],
@@ -228,8 +230,8 @@ def mark_tip(
         tag: np.array(gmsh.model.getValue(0, tag, []))
         for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)
     }
-    edge = outline(aerofoil, profile.top, 1)
-    middle = place(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
+    edge = section_outline(aerofoil, profile.top, 1)
+    middle = place_section(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
     wanted = {"tip_leading": edge[len(edge) // 2], "tip_mid": middle, "tip_trailing": edge[0]}
     tags = {}
     added = []
@@ -249,7 +251,7 @@ def _nearest_tag(places: dict[int, np.ndarray], point: np.ndarray) -> int:
     return min(places, key=lambda tag: float(np.linalg.norm(places[tag] - point)))
 
 
-def moved(
+def damper_moved_inwards(
     mesh: Mesh,
     wedge: Wedge,
     profile: Profile,

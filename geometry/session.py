@@ -52,7 +52,7 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 @contextmanager
-def attempt(parameter: str, action: str) -> Iterator[None]:
+def gmsh_step(parameter: str, action: str) -> Iterator[None]:
     """Turn a failure of gmsh into one sentence that names the parameter to change.
 
     Raises:

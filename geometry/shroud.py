@@ -11,7 +11,7 @@ from bladefem.errors import InputError
 from bladefem.util.arrays import RealArray
 
 from .parameters import Aerofoil, Disc, Shroud
-from .section import outline, placement
+from .section import section_frame, section_outline
 
 # of the shroud's thickness: between the aerofoil's skin and an edge of the block
 MARGIN = 0.3
@@ -51,9 +51,9 @@ def shroud_block(
     middle = aerofoil.span - half if at_tip else shroud.at * aerofoil.span
     _check_height(shroud, aerofoil, middle)
     shares = (middle + half * np.linspace(-1, 1, SECTIONS)) / aerofoil.span
-    sections = np.array([outline(aerofoil, top, t) for t in shares])[:, :, 1:]
+    sections = np.array([section_outline(aerofoil, top, t) for t in shares])[:, :, 1:]
     rings = sections.reshape(-1, 2)
-    centre = placement(aerofoil, top, middle / aerofoil.span)[0][1:]
+    centre = section_frame(aerofoil, top, middle / aerofoil.span)[0][1:]
     reach = np.abs(rings - centre).max(axis=0)
     margin = MARGIN * shroud.thickness
     length = shroud.length

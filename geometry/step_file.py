@@ -22,15 +22,15 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .curving import second_order
-from .draw import centres, tie
+from .draw import boundary_centres, tie_meshes
 from .finalise_mesh import check_count
 from .fitted_wedge import fit_wedge
 from .imported import mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize, Wedge
 from .raw_mesh import RawMesh, from_gmsh_model
-from .renaming import read_names, renamed
-from .session import attempt, gmsh_session
+from .renaming import read_names, rename_groups
+from .session import gmsh_session, gmsh_step
 
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
@@ -86,11 +86,11 @@ def read_step(
     unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     text = path.read_text(errors="replace")
     with gmsh_session() as gmsh:
-        with attempt("imported.file", f"import '{file}'"):
+        with gmsh_step("imported.file", f"import '{file}'"):
             _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
         named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
-            on = rotation(unit, 2 * np.pi / sectors)
+            on = axis_rotation(unit, 2 * np.pi / sectors)
             named = fit_wedge(
                 gmsh,
                 named,
@@ -108,7 +108,7 @@ def read_step(
             if dim == 2 and name.lower() in CONTACT_FACES
             for tag in tags
         ]
-        with attempt("mesh.size", f"mesh '{file}'"):
+        with gmsh_step("mesh.size", f"mesh '{file}'"):
             _generate_mesh(gmsh, size, contact)
         for (dimension, name), tags in named.items():
             gmsh.model.setPhysicalName(
@@ -128,7 +128,7 @@ def coarse_step(file: str | Path) -> RawMesh:
     if not path.is_file():
         raise InputError(f"'{file}': there is no such file")
     with gmsh_session() as gmsh:
-        with attempt("imported.file", f"import '{file}'"):
+        with gmsh_step("imported.file", f"import '{file}'"):
             _import_shapes(gmsh, path, 1.0)
         for (dimension, name), tags in _named_entities(
             gmsh, path.read_text(errors="replace")
@@ -139,7 +139,7 @@ def coarse_step(file: str | Path) -> RawMesh:
             "Mesh.MeshSizeMax", float(np.linalg.norm(high - low)) / PREVIEW_ELEMENTS
         )
         gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", 6)
-        with attempt("imported.file", f"mesh '{file}'"):
+        with gmsh_step("imported.file", f"mesh '{file}'"):
             gmsh.model.mesh.generate(3)
         return from_gmsh_model(gmsh)
 
@@ -205,7 +205,7 @@ def _apply_names(named: Named, wanted: dict[str, list[str]]) -> Named:
         here = {
             new: olds for new, olds in wanted.items() if (olds[0].lower() in solids) == (dim == 3)
         }
-        result |= {(dim, name): tags for name, tags in renamed(groups, here).items()}
+        result |= {(dim, name): tags for name, tags in rename_groups(groups, here).items()}
     return result
 
 
@@ -249,10 +249,10 @@ def _find_faces(
         if dim == 3 and name.lower() != "damper"
         for tag in tags
     ]
-    middle = {tag: c for volume in body for tag, c in centres(gmsh, volume).items()}
+    middle = {tag: c for volume in body for tag, c in boundary_centres(gmsh, volume).items()}
     found: dict[tuple[int, str], list[int]] = {}
     if sectors and not {"cyclic_low", "cyclic_high"} & words:
-        low, high = _turned_faces(gmsh, middle, rotation(axis, 2 * np.pi / sectors))
+        low, high = _turned_faces(gmsh, middle, axis_rotation(axis, 2 * np.pi / sectors))
         found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high} if low else {}
     if sectors and "clamp" not in words:
         radius = {
@@ -283,7 +283,7 @@ def _turned_faces(
     return [a for a, _ in pairs], [b for _, b in pairs]
 
 
-def rotation(axis: np.ndarray, angle: float) -> np.ndarray:
+def axis_rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rotation (3, 3) about a unit axis (Rodrigues)."""
     cross = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
@@ -297,7 +297,7 @@ def _tie_faces(
 ) -> None:
     """Tie cyclic faces and contact faces where both sides are named and the motion fits."""
     tags = {name.lower(): t for (dim, name), t in named.items() if dim == 2}
-    on = rotation(axis, 2 * np.pi / sectors) if sectors else np.eye(3)
+    on = axis_rotation(axis, 2 * np.pi / sectors) if sectors else np.eye(3)
     for master, slave, motions in (
         ("cyclic_low", "cyclic_high", (on, on.T)),
         ("seat_right", "damper_left", (np.eye(3),)),
@@ -310,8 +310,8 @@ def _tie_faces(
             for n in (master, slave)
         )
         best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
-        with attempt("imported.file", f"match the faces {master} and {slave}"):
-            tie(
+        with gmsh_step("imported.file", f"match the faces {master} and {slave}"):
+            tie_meshes(
                 gmsh,
                 2,
                 tags[master],

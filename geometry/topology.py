@@ -146,7 +146,7 @@ def face_word(nodes: int, dimension: int) -> str:
     return FACE_WORDS[dimension - 1][nodes]
 
 
-def owners(
+def facet_owners(
     cells: np.ndarray,
     cell_type: str,
     faces: np.ndarray,
@@ -164,13 +164,13 @@ def owners(
     return cell_of[inverse[len(facets) :]]
 
 
-def normals(
+def face_normals(
     points: np.ndarray,
     faces: np.ndarray,
     dimension: int,
 ) -> np.ndarray:
     """Normals (nf, 3) of faces by their corners, length = area (3-D) or edge length (2-D); outward
-    after `outward`.
+    after `outward_faces`.
     """
     kc = corner_count(face_word(faces.shape[1], dimension))
     x = points[faces[:, :kc]]
@@ -182,7 +182,7 @@ def normals(
     return np.cross(x[:, 2] - x[:, 0], x[:, 3] - x[:, 1]) / 2
 
 
-def outward(
+def outward_faces(
     points: np.ndarray,
     cells: np.ndarray,
     cell_type: str,
@@ -197,12 +197,12 @@ def outward(
     dimension = DIMENSION[FAMILY[cell_type]]
     word = face_word(faces.shape[1], dimension)
     kc = corner_count(word)
-    owner = owners(cells[:, : corner_count(cell_type)], cell_type, faces[:, :kc])
+    owner = facet_owners(cells[:, : corner_count(cell_type)], cell_type, faces[:, :kc])
     if np.any(owner < 0):
         raise ValueError(f"{np.count_nonzero(owner < 0)} faces are not facets of a cell")
     inside = points[cells[owner][:, : corner_count(cell_type)]].mean(axis=1)
     away = points[faces[:, :kc]].mean(axis=1) - inside
-    wrong = np.einsum("ij,ij->i", normals(points, faces, dimension), away) < 0
+    wrong = np.einsum("ij,ij->i", face_normals(points, faces, dimension), away) < 0
     result = faces.copy()
     result[wrong] = faces[wrong][:, REVERSED[word]]
     return result
@@ -238,7 +238,7 @@ def facet_nodes(cell_type: str) -> list[list[int]]:
     return table
 
 
-def boundary(cells: np.ndarray, cell_type: str) -> np.ndarray:
+def boundary_facets(cells: np.ndarray, cell_type: str) -> np.ndarray:
     """Outer facets (nf, k) of the cells with all their nodes: facets that one cell has for
     itself.
     """

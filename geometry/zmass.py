@@ -10,12 +10,19 @@ import numpy as np
 
 from bladefem.errors import InputError
 
-from .draw import centres, imprint, polygon, prism, set_background, tie
+from .draw import (
+    boundary_centres,
+    draw_polygon,
+    draw_prism,
+    imprint_marks,
+    set_background,
+    tie_meshes,
+)
 from .extract_arrays import Groups
-from .finalise_mesh import complete, mesh_model
+from .finalise_mesh import complete_mesh, mesh_model
 from .mesh import Mesh
 from .parameters import MeshSize, ZMass
-from .session import attempt, gmsh_session
+from .session import gmsh_session, gmsh_step
 
 # side of the foundation block over the larger side of the Z
 FOUNDATION_RATIO = 2.0
@@ -60,12 +67,12 @@ def z_mass(
     base = size.size or min(z.thickness / 2, z.bar / 3)
     contact = size.contact_size or base
     with gmsh_session() as gmsh:
-        body = prism(gmsh, z_corners(z), 0.0, z.thickness)
+        body = draw_prism(gmsh, z_corners(z), 0.0, z.thickness)
         block = _draw_foundation(gmsh, z, depth) if depth else None
         gmsh.model.occ.synchronize()
         groups = _name_faces(gmsh, z, depth, body, block)
         if block is not None:
-            tie(
+            tie_meshes(
                 gmsh,
                 2,
                 groups.faces["seat"],
@@ -80,10 +87,10 @@ def z_mass(
                 {"F": f"{contact} + {base - contact} * Max(0, z) / {z.thickness} - 0.6 * Min(0, z)"}
             ],
         )
-        with attempt("mesh.size", "mesh this geometry"):
+        with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     pairs = {"this": ("seat", "footprint", np.eye(3), np.zeros(3))} if depth else {}
-    return complete(mesh, pairs, base, flat=("seat", "footprint") if depth else ())
+    return complete_mesh(mesh, pairs, base, flat=("seat", "footprint") if depth else ())
 
 
 def check_z_mass(z: ZMass) -> None:
@@ -108,8 +115,8 @@ def _draw_foundation(
     """The foundation with the Z cut into its top."""
     w = FOUNDATION_RATIO / 2 * max(z.width, z.height)
     square = np.array([[-w, -w], [w, -w], [w, w], [-w, w]])
-    mark, _, _ = polygon(gmsh, z_corners(z))
-    return imprint(gmsh, prism(gmsh, square, -depth, 0.0), [(2, mark)])
+    mark, _, _ = draw_polygon(gmsh, z_corners(z))
+    return imprint_marks(gmsh, draw_prism(gmsh, square, -depth, 0.0), [(2, mark)])
 
 
 def _name_faces(
@@ -122,14 +129,14 @@ def _name_faces(
     """Faces by the heights of their centres; the seat is the inner one of the two faces on top of
     the block.
     """
-    found = {tag: centre[2] for tag, centre in centres(gmsh, body).items()}
+    found = {tag: centre[2] for tag, centre in boundary_centres(gmsh, body).items()}
     faces = {
         "footprint": [min(found, key=lambda tag: found[tag])],
         "top": [max(found, key=lambda tag: found[tag])],
     }
     if block is None:
         return Groups({"damper": [body]}, faces)
-    found = {tag: centre[2] for tag, centre in centres(gmsh, block).items()}
+    found = {tag: centre[2] for tag, centre in boundary_centres(gmsh, block).items()}
     area = z_section(z)[0]
     level = [tag for tag, height in found.items() if abs(height) < 1e-6 * depth]
     faces["seat"] = [min(level, key=lambda tag: abs(gmsh.model.occ.getMass(2, tag) - area))]

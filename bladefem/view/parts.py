@@ -13,9 +13,9 @@ import numpy as np
 from bladefem.scene.units import show
 from geometry.parameters import DEG, Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
 from geometry.plane import blade_corners, damper_corners
-from geometry.profile import profile
-from geometry.section import centroid, placement
-from geometry.section import shape as section_shape
+from geometry.profile import sector_profile
+from geometry.section import centroid, section_frame
+from geometry.section import section_shape
 from geometry.zmass import z_corners
 
 from .dimensions import draw_angle, draw_length, draw_note, draw_outline
@@ -90,7 +90,7 @@ def plane_section(blade: Aerofoil, t: float) -> tuple[np.ndarray, np.ndarray]:
     """Section (n, 2) and chord line (2, 2) as (axial, circumferential) [mm], seen from the tip
     towards the axis.
     """
-    origin, along, across, chord = placement(blade, 0.0, t)
+    origin, along, across, chord = section_frame(blade, 0.0, t)
     flat = section_shape(blade, t)
     local = chord * (np.vstack([flat, [[0, 0], [1, 0]]]) - centroid(flat))
     space = origin + local[:, :1] * along + local[:, 1:] * across
@@ -140,7 +140,7 @@ def draw_side(ax: Axes, blade: Aerofoil) -> None:
         "(turned)",
         (14, -14),
     )
-    axis = MM * np.array([placement(blade, 0.0, t)[0][2] for t in (0.0, 1.0)])
+    axis = MM * np.array([section_frame(blade, 0.0, t)[0][2] for t in (0.0, 1.0)])
     ax.plot(axis, [0, height[-1]], color=COLOURS[1], lw=1, ls="-.", zorder=3)
     draw_note(
         ax,
@@ -176,7 +176,7 @@ def draw_platform(
     """Two neighbouring platforms and the damper between them, seen along the engine axis; returns
     the figure.
     """
-    cut = profile(platform, shank, disc, wedge)
+    cut = sector_profile(platform, shank, disc, wedge)
     blade = about_seat_plane(cut.blade, cut.theta)
     damper = about_seat_plane(cut.damper, cut.theta)
     inner, outer = about_seat_plane(cut.seats[0], cut.theta)
@@ -285,7 +285,7 @@ def draw_damper_shapes(
     }
     with canvas(file, size=(11.4, 3.1), grid=(1, len(both)), sharey=True) as axes:
         for ax, (name, damper) in zip(axes, both.items(), strict=True):
-            cut = profile(platform, shank, disc, damper)
+            cut = sector_profile(platform, shank, disc, damper)
             # the next blade's side is this one's turned by a sector
             draw_outline(ax, about_seat_plane(cut.blade, cut.theta))
             draw_outline(ax, about_seat_plane(cut.blade, -cut.theta), NEIGHBOUR_COLOUR)
@@ -326,7 +326,7 @@ def draw_disc(
     file: str | Path | None = None,
 ) -> object:
     """The sector from bore to tip, along the engine axis and from the side; returns the figure."""
-    cut = profile(platform, shank, disc, wedge)
+    cut = sector_profile(platform, shank, disc, wedge)
     with canvas(file, size=(7.4, 6.8), grid=(1, 2), sharey=True) as axes:
         draw_front(axes[0], cut, aerofoil, disc)
         draw_meridian(axes[1], cut, aerofoil, platform, shank, disc)

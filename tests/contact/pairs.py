@@ -13,7 +13,7 @@ from bladefem.contact.patch import initial_gap, make_patch, normal_ports, port_m
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.ports import port_flexibility
-from geometry.contact_pairs import hertz_pair, punch
+from geometry.contact_pairs import hertz_pair, mesh_punch
 from geometry.parameters import HertzPair, MeshSize, Punch
 
 
@@ -74,7 +74,7 @@ def press(n, materials, dimension=3, **sizes):
 def indent(n, material, dimension=3):
     """A rigid flat punch, elements a/n: L2 error of the pressure for r < 0.8 a."""
     shape = Punch(dimension=dimension)
-    a, mesh = shape.radius, punch(shape, MeshSize(contact_size=shape.radius / n))
+    a, mesh = shape.radius, mesh_punch(shape, MeshSize(contact_size=shape.radius / n))
     patch = make_patch(mesh, "this")
     r, area = np.linalg.norm(patch.points[:, : dimension - 1], axis=1), patch.area
     C = pair_flexibility(mesh, patch, (material, None))

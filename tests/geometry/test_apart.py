@@ -12,7 +12,7 @@ from bladefem.errors import InputError
 from geometry import isolated_process as apart
 from geometry.builders import build_here
 from geometry.finalise_mesh import refuse_flat
-from geometry.isolated_process import build
+from geometry.isolated_process import build_isolated
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize, Punch
 
@@ -34,7 +34,7 @@ class Mistake:
 
 
 def test_the_mesh_is_the_one_of_this_process():
-    there, here = build(SCENE), build_here(SCENE)
+    there, here = build_isolated(SCENE), build_here(SCENE)
     np.testing.assert_array_equal(there.points, here.points)
     np.testing.assert_array_equal(there.bodies["blade"], here.bodies["blade"])
     assert there.report == here.report
@@ -42,7 +42,7 @@ def test_the_mesh_is_the_one_of_this_process():
 
 def test_a_refusal_keeps_its_words():
     with pytest.raises(InputError, match=r"punch\.radius = 0\.015 m: expected at most") as caught:
-        build(SimpleNamespace(**vars(SCENE) | {"punch": Punch(radius=0.015)}))
+        build_isolated(SimpleNamespace(**vars(SCENE) | {"punch": Punch(radius=0.015)}))
     assert "\n" not in str(caught.value)
 
 
@@ -50,7 +50,7 @@ def test_a_crash_is_tried_again_and_then_becomes_a_sentence():
     with pytest.raises(
         InputError, match=r"mesh\.size: gmsh crashed \(signal 6\).*change mesh\.size"
     ) as caught:
-        build(SimpleNamespace(**vars(SCENE) | {"punch": Abort()}))
+        build_isolated(SimpleNamespace(**vars(SCENE) | {"punch": Abort()}))
     assert "\n" not in str(caught.value)
 
 
@@ -62,7 +62,7 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
         return "crashed (signal 11)" if len(asked) == 1 else build_here(scene)
 
     monkeypatch.setattr(apart, "_ask_child", ask)
-    assert isinstance(build(SCENE), Mesh)
+    assert isinstance(build_isolated(SCENE), Mesh)
     assert [(m.algorithm, m.size) for m in asked] == [
         ("hxt", 6e-3),
         ("delaunay", pytest.approx(5.4e-3)),
@@ -71,7 +71,7 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
 
 def test_a_mistake_in_the_child_is_not_hidden():
     with pytest.raises(RuntimeError, match="no number"):
-        build(SimpleNamespace(**vars(SCENE) | {"punch": Mistake()}))
+        build_isolated(SimpleNamespace(**vars(SCENE) | {"punch": Mistake()}))
 
 
 def test_the_child_sees_nothing_of_the_ranks(monkeypatch):

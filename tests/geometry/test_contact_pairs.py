@@ -7,10 +7,10 @@ import pytest
 from measure import volume
 
 from bladefem.errors import InputError
-from geometry.contact_pairs import hertz_pair, punch
+from geometry.contact_pairs import hertz_pair, mesh_punch
 from geometry.jacobian import straight_jacobian
 from geometry.parameters import HertzPair, MeshSize, Punch, ZMass
-from geometry.topology import normals
+from geometry.topology import face_normals
 from geometry.zmass import z_mass
 
 COARSE = MeshSize(size=4e-3, contact_size=4e-4)
@@ -29,7 +29,7 @@ def test_hertz_gap_is_that_of_the_sphere(dimension):
         gap[:, dimension - 1], hertz.radius - np.sqrt(hertz.radius**2 - r2), atol=1e-12
     )
     assert r2.max() == pytest.approx((2 * hertz.contact_radius) ** 2)
-    up = normals(x, mesh.faces["seat_right"], dimension)
+    up = face_normals(x, mesh.faces["seat_right"], dimension)
     assert (up[:, dimension - 1] > 0).all() and np.abs(
         np.delete(up, dimension - 1, axis=1)
     ).max() < 1e-15
@@ -55,8 +55,10 @@ def test_hertz_volume_of_the_bent_block():
 @pytest.mark.parametrize("dimension", [2, 3])
 def test_punch(dimension):
     block = Punch(dimension=dimension)
-    mesh = punch(block, COARSE)
-    area = np.linalg.norm(normals(mesh.points, mesh.faces["seat_right"], dimension), axis=1).sum()
+    mesh = mesh_punch(block, COARSE)
+    area = np.linalg.norm(
+        face_normals(mesh.points, mesh.faces["seat_right"], dimension), axis=1
+    ).sum()
     assert area == pytest.approx(
         block.radius if dimension == 2 else np.pi * block.radius**2 / 4, rel=1e-2
     )
@@ -78,7 +80,7 @@ def test_z_mass():
     assert straight_jacobian(mesh.points, mesh.bodies["damper"], "tetra").min() > 0
     for name, height, sense in (("footprint", 0.0, -1), ("top", z.thickness, 1)):
         assert np.abs(mesh.points[np.unique(mesh.faces[name])][:, 2] - height).max() < 1e-15
-        assert normals(mesh.points, mesh.faces[name], 3).sum(axis=0)[2] == pytest.approx(
+        assert face_normals(mesh.points, mesh.faces[name], 3).sum(axis=0)[2] == pytest.approx(
             sense * area
         )
 
@@ -89,7 +91,7 @@ def test_z_mass():
         (z_mass, ZMass(bar=0.031), "z_mass.bar"),
         (hertz_pair, HertzPair(contact_radius=6e-3), "hertz.contact_radius"),
         (hertz_pair, HertzPair(radius=0.012), "hertz.half_width"),
-        (punch, Punch(radius=0.015), "punch.radius"),
+        (mesh_punch, Punch(radius=0.015), "punch.radius"),
     ],
 )
 def test_refusals(build, part, field):
@@ -99,4 +101,4 @@ def test_refusals(build, part, field):
 
 def test_contact_size_larger_than_the_contact():
     with pytest.raises(InputError, match=r"mesh\.contact_size"):
-        punch(Punch(), MeshSize(contact_size=3e-3))
+        mesh_punch(Punch(), MeshSize(contact_size=3e-3))

@@ -14,7 +14,7 @@ from measure import volume
 from bladefem.errors import InputError
 from geometry.damper_shapes import SHAPES
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
-from geometry.profile import profile
+from geometry.profile import sector_profile
 from geometry.sector import wedge_sector
 from geometry.sector_check import check_sector
 from geometry.sector_names import clearing_shift
@@ -31,7 +31,7 @@ def outline_area(corners: np.ndarray) -> float:
 
 def midway_axes(damper: Wedge) -> tuple[np.ndarray, np.ndarray]:
     """Ends (2, 2, 2) of both flanks as (radial, across) midway between the blades, and the outline."""
-    shape = profile(*PARTS[1:], damper)
+    shape = sector_profile(*PARTS[1:], damper)
     theta = pi / PARTS[3].sectors
     axes = np.array([[cos(theta), -sin(theta)], [sin(theta), cos(theta)]])
     turn = np.array([[cos(2 * theta), -sin(2 * theta)], [sin(2 * theta), cos(2 * theta)]])
@@ -46,11 +46,11 @@ def test_flanks_have_their_angles_and_lie_in_the_outline(name, angles):
     damper = Wedge(shape=name, angle=first, angle_next=second)
     if name == "round bar" and second is not None:
         with pytest.raises(InputError, match="no circle fits"):
-            profile(*PARTS[1:], damper)
+            sector_profile(*PARTS[1:], damper)
         return
     if name == "plate" and first != pi / 2:
         with pytest.raises(InputError, match="not in one plane, expected damper.angle = '90 deg'"):
-            profile(*PARTS[1:], damper)
+            sector_profile(*PARTS[1:], damper)
         return
     if name != "plate" and first == pi / 2:
         with pytest.raises(InputError, match=r"damper\.(angle|shape)"):
@@ -94,7 +94,7 @@ def test_round_bar_is_a_circle_with_two_flats():
 )
 def test_meshes_match_on_both_seats(damper):
     mesh = wedge_sector(*PARTS, damper, COARSE)
-    area = outline_area(profile(*PARTS[1:], damper).damper)
+    area = outline_area(sector_profile(*PARTS[1:], damper).damper)
     assert volume(mesh.points, mesh.bodies["damper"]) == pytest.approx(
         area * damper.length, rel=1e-9
     )
@@ -116,7 +116,7 @@ def test_a_plate_is_a_rectangle_pressed_radially():
     # the gap is measured across the radial line midway, where the edges of the platforms end
     assert width == pytest.approx(2 * platform.seat_width + platform.gap, rel=1e-9)
     assert outline_area(corners) == pytest.approx(width * damper.base, rel=1e-9)
-    shift = clearing_shift(damper, profile(*PARTS[1:], damper))
+    shift = clearing_shift(damper, sector_profile(*PARTS[1:], damper))
     assert shift == pytest.approx(-damper.clearance * np.array([cos(theta), sin(theta)]))
 
 
@@ -149,8 +149,8 @@ def test_shape_of_the_page_is_meshed(monkeypatch):
     monkeypatch.setattr("geometry.profile.SHAPES", names["SHAPES"])
     damper = Wedge(shape="chamfered wedge")
     mesh = wedge_sector(*PARTS, damper, COARSE)
-    plain = outline_area(profile(*PARTS[1:], Wedge()).damper)
-    area = outline_area(profile(*PARTS[1:], damper).damper)
+    plain = outline_area(sector_profile(*PARTS[1:], Wedge()).damper)
+    area = outline_area(sector_profile(*PARTS[1:], damper).damper)
     # each chamfer takes a triangle of base / 2 by base / 2
     assert area == pytest.approx(plain - (damper.base / 2) ** 2, rel=1e-9)
     assert volume(mesh.points, mesh.bodies["damper"]) == pytest.approx(area * damper.length)

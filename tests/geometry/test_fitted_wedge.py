@@ -16,9 +16,9 @@ from bladefem.scene.toml import scene_of
 from geometry.example_step import write_blade_step
 from geometry.fitted_wedge import flanks_between
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
-from geometry.profile import profile
+from geometry.profile import sector_profile
 from geometry.session import gmsh_session
-from geometry.step_file import FittedDamper, _import_shapes, read_step, rotation
+from geometry.step_file import FittedDamper, _import_shapes, axis_rotation, read_step
 
 AXIS = np.array([0.0, 0.0, 1.0])
 SIZE = MeshSize(size=0.02, order=1)
@@ -40,7 +40,7 @@ def mesh(step):
 
 def seat_corners(side: int) -> np.ndarray:
     """(4, 3) of the parametric sector's seat, +1 towards +y."""
-    shape = profile(BLADE[1], BLADE[2], BLADE[3], Wedge())
+    shape = sector_profile(BLADE[1], BLADE[2], BLADE[3], Wedge())
     (xi, yi), (xo, yo), z = *shape.seats[0], Wedge().length / 2
     rows = [[xi, side * yi, -z], [xo, side * yo, -z], [xo, side * yo, z], [xi, side * yi, z]]
     return np.array(rows)
@@ -52,7 +52,7 @@ def test_seats_and_damper_are_those_of_the_parametric_sector(mesh):
         corners = seat_corners(side)
         assert np.allclose(points.min(axis=0), corners.min(axis=0), atol=1e-9)
         assert np.allclose(points.max(axis=0), corners.max(axis=0), atol=1e-9)
-    wedge = profile(BLADE[1], BLADE[2], BLADE[3], Wedge()).damper
+    wedge = sector_profile(BLADE[1], BLADE[2], BLADE[3], Wedge()).damper
     x, y = wedge.T
     area = abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
     assert body_volume(mesh, "damper") == pytest.approx(area * Wedge().length, rel=1e-9)
@@ -87,8 +87,8 @@ def test_twenty_variations_are_fitted(tmp_path):
     for number, (platform, wedge, width) in enumerate(variations()):
         file = tmp_path / f"{number}.step"
         write_blade_step(file, BLADE[0], platform, BLADE[2], BLADE[3], wedge)
-        shape = profile(platform, BLADE[2], BLADE[3], wedge)
-        on = rotation(AXIS, 2 * pi / BLADE[3].sectors)
+        shape = sector_profile(platform, BLADE[2], BLADE[3], wedge)
+        on = axis_rotation(AXIS, 2 * pi / BLADE[3].sectors)
         with gmsh_session() as gmsh:
             _import_shapes(gmsh, file, 1.0)
             flanks = flanks_between(gmsh, 14, 11, wedge, width, on, AXIS)

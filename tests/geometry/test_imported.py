@@ -19,7 +19,7 @@ from geometry.export import write_msh
 from geometry.imported import read_mesh
 from geometry.parameters import Disc, MeshSize, Plane
 from geometry.plane import plane_blades
-from geometry.profile import turn
+from geometry.profile import turn_about_axis
 from geometry.session import gmsh_session
 from geometry.step_file import read_step
 
@@ -282,7 +282,9 @@ def turned_home(mesh):
     )
     return (
         mesh.points
-        @ turn(-np.arctan2(*(low / np.linalg.norm(low) + high / np.linalg.norm(high))[::-1])).T
+        @ turn_about_axis(
+            -np.arctan2(*(low / np.linalg.norm(low) + high / np.linalg.norm(high))[::-1])
+        ).T
     )
 
 

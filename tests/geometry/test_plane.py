@@ -9,7 +9,7 @@ from bladefem.errors import InputError
 from geometry.jacobian import straight_jacobian
 from geometry.parameters import MeshSize, Plane
 from geometry.plane import plane_blades
-from geometry.topology import normals
+from geometry.topology import face_normals
 
 PLANE = Plane()
 
@@ -55,7 +55,7 @@ def test_seats_match_to_rounding(mesh, name, shift):
     ],
 )
 def test_edges_look_out_of_their_body(mesh, face, outward):
-    total = normals(mesh.points, mesh.faces[face], 2).sum(axis=0)
+    total = face_normals(mesh.points, mesh.faces[face], 2).sum(axis=0)
     np.testing.assert_allclose(total[:2], outward, atol=1e-15)
 
 

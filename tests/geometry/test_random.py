@@ -13,7 +13,7 @@ import pytest
 from bladefem.errors import InputError
 from geometry.parameters import Aerofoil, Disc, MeshSize, Plane, Platform, Shank, Wedge
 from geometry.plane import check_plane, plane_blades
-from geometry.sampling import anywhere, around
+from geometry.sampling import sample_around, sample_in_range
 from geometry.sector import wedge_sector
 from geometry.sector_check import check_sector
 
@@ -51,7 +51,7 @@ def level(wedge):
 @pytest.mark.parametrize("number", range(8))
 def test_sectors_round_the_defaults(number):
     rng = np.random.default_rng((7, number))
-    aerofoil, platform, shank, disc, wedge = (around(t(), rng, 0.15) for t in TABLES)
+    aerofoil, platform, shank, disc, wedge = (sample_around(t(), rng, 0.15) for t in TABLES)
     shank = replace(shank, length=min(shank.length, disc.width, platform.length))
     parts = (aerofoil, platform, shank, disc, level(wedge))
     if not refused_by_a_rule(lambda: check_sector(*parts)):
@@ -61,7 +61,7 @@ def test_sectors_round_the_defaults(number):
 @pytest.mark.parametrize("number", range(6))
 def test_sectors_anywhere_in_the_ranges(number):
     rng = np.random.default_rng((8, number))
-    parts = [anywhere(t, rng) for t in TABLES]
+    parts = [sample_in_range(t, rng) for t in TABLES]
     parts[-1] = level(parts[-1])
     if not refused_by_a_rule(lambda: check_sector(*parts)):
         check_mesh(wedge_sector(*parts, MeshSize()))
@@ -72,7 +72,9 @@ def test_flat_cells_are_meshed_anew_with_smaller_elements(monkeypatch):
     from geometry import finalise_mesh
 
     parts = [t() for t in TABLES]
-    monkeypatch.setattr(finalise_mesh, "fill", lambda gmsh, *_: gmsh.model.mesh.generate(3))
+    monkeypatch.setattr(
+        finalise_mesh, "fill_with_tetrahedra", lambda gmsh, *_: gmsh.model.mesh.generate(3)
+    )
     plain = wedge_sector(*parts, MeshSize(size=1.2e-2))
     found = iter([0.001])
     true = finalise_mesh._worst_shape
@@ -87,7 +89,7 @@ def test_plane_blades():
     rng = np.random.default_rng(9)
     meshed = 0
     for _ in range(12):
-        shape = around(Plane(), rng, 0.2)
+        shape = sample_around(Plane(), rng, 0.2)
         if not refused_by_a_rule(partial(check_plane, shape)):
             check_mesh(plane_blades(shape, MeshSize()))
             meshed += 1

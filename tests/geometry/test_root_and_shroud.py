@@ -10,13 +10,13 @@ from scipy.integrate import simpson
 
 from bladefem.errors import InputError
 from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
-from geometry.profile import profile
+from geometry.profile import sector_profile
 from geometry.root import check_root, root_corners, root_slots
-from geometry.section import shape as section
+from geometry.section import section_shape as section
 from geometry.sector import wedge_sector
 from geometry.sector_check import check_sector
 from geometry.shroud import shroud_block
-from geometry.topology import normals
+from geometry.topology import face_normals
 
 PARTS = (Aerofoil(), Platform(), Shank(), Disc(), Wedge())
 COARSE = MeshSize(size=9e-3)
@@ -99,7 +99,7 @@ def test_impossible_roots_name_the_field(changes, said):
 
 
 def top():
-    return profile(*PARTS[1:]).top
+    return sector_profile(*PARTS[1:]).top
 
 
 def aerofoil_inside(low, high):
@@ -124,7 +124,7 @@ def test_a_tip_shroud_is_a_block_over_the_tip(plain):
     np.testing.assert_allclose(tip[:, 0], top() + span, rtol=1e-9)
     assert np.ptp(tip[:, 1]) == pytest.approx(40e-3)
     for side, name in ((-1, "shroud_left"), (1, "shroud_right")):
-        area = normals(mesh.points, mesh.faces[name], 3).sum(axis=0)
+        area = face_normals(mesh.points, mesh.faces[name], 3).sum(axis=0)
         np.testing.assert_allclose(area, [0, side * 4e-3 * 42e-3, 0], atol=1e-12)
     # the nodes of the tip are still those of the section
     for name in ("tip_leading", "tip_mid", "tip_trailing"):

@@ -12,11 +12,11 @@ from scipy.integrate import simpson
 
 from bladefem.errors import InputError
 from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
-from geometry.profile import profile, turn
-from geometry.section import POINTS_PER_SIDE, outline
-from geometry.section import shape as section
+from geometry.profile import sector_profile, turn_about_axis
+from geometry.section import POINTS_PER_SIDE, section_outline
+from geometry.section import section_shape as section
 from geometry.sector import wedge_sector
-from geometry.topology import EDGES, normals
+from geometry.topology import EDGES, face_normals
 
 PARTS = {
     "aerofoil": Aerofoil(),
@@ -52,7 +52,7 @@ def test_volume_of_the_blade_is_the_sum_of_its_parts(coarse_sector):
     splined skin.
     """
     d, s, p, a = Disc(), Shank(), Platform(), Aerofoil()
-    shape = profile(p, s, d, Wedge())
+    shape = sector_profile(p, s, d, Wedge())
     ring = pi / d.sectors * (d.rim_radius**2 - d.bore_radius**2) * d.width
     half = s.width / 2
     sag = d.rim_radius**2 * np.arcsin(half / d.rim_radius)
@@ -75,20 +75,20 @@ def test_seats_stand_at_the_angle_of_the_wedge(coarse_sector):
     """
     alpha, theta = Wedge().angle, pi / Disc().sectors
     radial, across = np.array([cos(theta), sin(theta), 0]), np.array([-sin(theta), cos(theta), 0])
-    seat = normals(coarse_sector.points, coarse_sector.faces["seat_right"], 3)
+    seat = face_normals(coarse_sector.points, coarse_sector.faces["seat_right"], 3)
     unit = seat / np.linalg.norm(seat, axis=1)[:, None]
     np.testing.assert_allclose(
         unit, np.tile(-sin(alpha) * radial + cos(alpha) * across, (len(unit), 1)), atol=1e-12
     )
     flanks = sum(
-        normals(coarse_sector.points, coarse_sector.faces[f], 3).sum(axis=0)
+        face_normals(coarse_sector.points, coarse_sector.faces[f], 3).sum(axis=0)
         for f in ("damper_left", "damper_right")
     )
     area = Platform().seat_width * Wedge().length
     np.testing.assert_allclose(
         flanks, 2 * sin(alpha) * area * radial, atol=1e-12
     )  # N = F / (2 sin alpha)
-    low = normals(coarse_sector.points, coarse_sector.faces["cyclic_low"], 3).sum(axis=0)
+    low = face_normals(coarse_sector.points, coarse_sector.faces["cyclic_low"], 3).sum(axis=0)
     assert low[1] < 0
 
 
@@ -96,7 +96,7 @@ def test_seats_stand_at_the_angle_of_the_wedge(coarse_sector):
     "name, angle", [("cyclic", 2 * pi / 36), ("this", 0.0), ("next", 2 * pi / 36)]
 )
 def test_pairs_match_to_rounding_with_their_middle_nodes(coarse_sector, name, angle):
-    motion = turn(angle)
+    motion = turn_about_axis(angle)
     pair, x = coarse_sector.pairs[name], coarse_sector.points
     np.testing.assert_allclose(pair.rotation, motion, atol=1e-15)
     np.testing.assert_allclose(
@@ -134,14 +134,17 @@ def test_the_leading_edge_is_a_line_of_nodes_on_a_smooth_nose(coarse_sector):
     """
     blade, top = (
         Aerofoil(),
-        profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top,
+        sector_profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top,
     )
     shared = np.intersect1d(
         coarse_sector.faces["suction_side"], coarse_sector.faces["pressure_side"]
     )
     edge = coarse_sector.points[shared[np.argsort(coarse_sector.points[shared, 0])]]
     noses = np.array(
-        [outline(blade, top, (x - top) / blade.span)[POINTS_PER_SIDE - 1] for x in edge[:, 0]]
+        [
+            section_outline(blade, top, (x - top) / blade.span)[POINTS_PER_SIDE - 1]
+            for x in edge[:, 0]
+        ]
     )
     np.testing.assert_allclose(edge, noses, atol=2e-5)  # the loft is a spline through 5 sections
     assert edge[0, 0] == pytest.approx(top) and edge[-1, 0] == pytest.approx(top + blade.span)
@@ -200,8 +203,8 @@ def test_seats_in_a_grid_have_equal_elements_across_and_along(given, across, alo
 
 def test_tip_nodes_stand_on_the_section_whatever_the_mesh(coarse_sector):
     x = {name: coarse_sector.points[nodes[0]] for name, nodes in coarse_sector.nodes.items()}
-    top = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
-    section_points = outline(Aerofoil(), top, 1)
+    top = sector_profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
+    section_points = section_outline(Aerofoil(), top, 1)
     np.testing.assert_allclose(x["tip_trailing"], section_points[0], atol=1e-9)
     np.testing.assert_allclose(
         x["tip_leading"], section_points[len(section_points) // 2], atol=1e-9
@@ -237,7 +240,7 @@ def test_clearance_moves_the_wedge_inwards():
     mesh = build(wedge={"clearance": gap})
     for name, seat in (("this", "seat_right"), ("next", "seat_left")):
         pair = mesh.pairs[name]
-        normal = normals(mesh.points, mesh.faces[seat], 3).sum(axis=0)
+        normal = face_normals(mesh.points, mesh.faces[seat], 3).sum(axis=0)
         normal = pair.rotation @ normal / np.linalg.norm(normal)
         opening = (
             mesh.points[pair.nodes[1]] - mesh.points[pair.nodes[0]] @ pair.rotation.T
@@ -271,11 +274,11 @@ def test_fillet_is_a_quarter_groove_round_the_root():
     """
     radius, blade = 2e-3, Aerofoil()
     mesh = build(MeshSize(size=5e-3), aerofoil={"fillet": radius})
-    top = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
+    top = sector_profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")]).top
     for point in mesh.points[np.unique(mesh.faces["fillet"][:, :3])]:
         height = (point[0] - top) * cos(pi / 12)
         out = radius * (1 - np.sqrt(max(0.0, 1 - (cos(pi / 12) - height / radius) ** 2)))
-        ring = outline(blade, top, (point[0] - top) / blade.span, out)
+        ring = section_outline(blade, top, (point[0] - top) / blade.span, out)
         fine = np.vstack(
             [np.linspace(a, b, 60) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)]
         )
@@ -319,7 +322,7 @@ def test_slope_of_the_platform_at_the_midplane():
     """The corner points of the profile: edge at half the gap from the radial plane between the
     blades.
     """
-    shape = profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")])
+    shape = sector_profile(*[PARTS[k] for k in ("platform", "shank", "disc", "wedge")])
     for x, y in (shape.seats[0, 1], shape.corners[0]):
         assert (x * tan(shape.theta) - y) * cos(shape.theta) == pytest.approx(Platform().gap / 2)
     assert np.linalg.norm(shape.seats[0, 1] - shape.seats[0, 0]) == pytest.approx(

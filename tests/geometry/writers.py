@@ -87,7 +87,7 @@ def write_step(file, kind, names):
 
 def draw_step(file, kind):
     """The process of write_step."""
-    from geometry.draw import prism
+    from geometry.draw import draw_prism
     from geometry.parameters import Disc
     from geometry.sector import disc_segment
     from geometry.session import gmsh_session
@@ -96,7 +96,9 @@ def draw_step(file, kind):
         if kind == "disc":
             disc_segment(gmsh, Disc(), np.pi / Disc().sectors)
         else:
-            prism(gmsh, np.array([[0.1, -0.01], [0.2, -0.01], [0.2, 0.01], [0.1, 0.01]]), 0.0, 0.03)
+            draw_prism(
+                gmsh, np.array([[0.1, -0.01], [0.2, -0.01], [0.2, 0.01], [0.1, 0.01]]), 0.0, 0.03
+            )
         gmsh.model.occ.dilate(gmsh.model.occ.getEntities(3), 0, 0, 0, 1e3, 1e3, 1e3)
         gmsh.model.occ.synchronize()
         gmsh.write(file)

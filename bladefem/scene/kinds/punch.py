@@ -28,7 +28,7 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 KIND = Kind(
     name="punch",
     tables=("punch", *COMMON_TABLES),
-    builder="geometry.contact_pairs:punch",
+    builder="geometry.contact_pairs:mesh_punch",
     shape=("punch", "mesh"),
     runner="bladefem.report.pair:report_pair",
     table="bladefem.cli.tables:pair_table",

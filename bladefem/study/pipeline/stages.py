@@ -253,9 +253,9 @@ def build_mesh(scene: Scene, comm: Communicator | None = None) -> Mesh:
     """
 
     def draw() -> Mesh:
-        from geometry.isolated_process import build
+        from geometry.isolated_process import build_isolated
 
-        return build(scene)
+        return build_isolated(scene)
 
     return on_root(comm, draw)
 
