@@ -14,8 +14,7 @@ from bladefem.scene.units import show
 from geometry.parameters import DEG, Aerofoil, Disc, Plane, Platform, Shank, Wedge, ZMass
 from geometry.plane import blade_corners, damper_corners
 from geometry.profile import sector_profile
-from geometry.section import centroid, section_frame
-from geometry.section import section_shape
+from geometry.section import centroid, section_frame, section_shape
 from geometry.zmass import z_corners
 
 from .dimensions import draw_angle, draw_length, draw_note, draw_outline
