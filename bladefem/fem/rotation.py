@@ -6,7 +6,7 @@ In the rotating frame a Saint Venant-Kirchhoff body has the potential
     F = 1 + grad u,
 
 P the projection across the axis. In a body that is not at reference temperature, E less the thermal
-strain stands in the place of E. Its first derivative is the balance of the preload, its second the
+strain takes the place of E. Its first derivative is the balance of the preload, its second the
 stiffness of small vibrations about it: stress stiffening and spin softening in one matrix.
 
 The linear preload, which other codes call a perturbation step, takes u0 from the linear balance K
@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from ..util.newton import Outcome, StepError, iterate_newton
 from . import shape_functions as shape
 from .body import Body, body_properties, cells_of, degrees
 from .compat import PETSc, assemble_matrix, assemble_vector, compile_form, dolfinx, ufl
@@ -39,7 +40,7 @@ from .temperature import (
 )
 
 AXIS = (0.0, 0.0, 1.0)
-# iterations of one load step
+# Newton steps of one load step
 MAX_NEWTON_STEPS = 25
 # of the load step before giving up
 MAX_LOAD_HALVINGS = 8
@@ -314,6 +315,19 @@ def _check_speed(speed: float) -> None:
         raise InputError(f"speed is {speed} rad/s, expected a number not below 0")
 
 
+@dataclass(frozen=True)
+class _Trial:
+    """A displacement on the way to equilibrium."""
+
+    # (n_points, dim) [m]
+    u: np.ndarray
+    # (n_own, 1) unbalanced force of the unknowns [N]
+    unbalanced: np.ndarray
+    # its length [N], and that of the trial before
+    error: float
+    before: float
+
+
 def _solve_newton(
     con: Constrained,
     clamp: str | None,
@@ -325,30 +339,33 @@ def _solve_newton(
     """Newton's method from ``u``: the state, the steps taken, and the error left or the reason of a
     failure.
     """
-    error = np.inf
-    for k in range(MAX_NEWTON_STEPS):
+
+    def trial(u: np.ndarray, before: float) -> _Trial:
         r = restrict_load(con, _unbalanced_force(con.body, forms, u, speed2))
-        before = error
-        error = _vector_length(con, r)
-        if error <= limit or (error < ROUNDING_OVER_TOLERANCE * limit and error > before / 2):
-            return u, k, "elements turn over" if _turned_over(con.body, u) else error
-        if not np.isfinite(error):
-            return u, k, "Newton's method diverges"
-        held = in_step(replace(con.body, K=_tangent_matrix(forms, u, speed2)), clamp)
+        return _Trial(u, r, _vector_length(con, r), before)
+
+    def error_beyond_rounding(state: _Trial) -> float:
+        near = state.error < ROUNDING_OVER_TOLERANCE * limit
+        return 0.0 if near and state.error > state.before / 2 else state.error
+
+    def advance(state: _Trial) -> _Trial:
+        held = in_step(replace(con.body, K=_tangent_matrix(forms, state.u, speed2)), clamp)
         try:
-            step = compliance(flexible(held), -r)
-        except NotSolvedError:
-            return (
-                u,
-                k,
+            step = compliance(flexible(held), -state.unbalanced)
+        except NotSolvedError as failure:
+            raise StepError(
+                Outcome.SINGULAR,
                 "the stiffness is no longer positive definite (buckling, or spin softening)",
-            )
-        u = u + expand_to_mesh(held, step)[:, :, 0].real
-    return (
-        u,
-        MAX_NEWTON_STEPS,
-        f"Newton's method has not converged in {MAX_NEWTON_STEPS} iterations",
-    )
+            ) from failure
+        return trial(state.u + expand_to_mesh(held, step)[:, :, 0].real, state.error)
+
+    run = iterate_newton(trial(u, np.inf), error_beyond_rounding, advance, limit, MAX_NEWTON_STEPS)
+    if run.outcome is Outcome.SINGULAR:
+        return run.state.u, run.iterations, run.reason
+    if not run.converged:
+        return run.state.u, run.iterations, f"Newton's method ends: {run.reason}"
+    turned_over = _turned_over(con.body, run.state.u)
+    return run.state.u, run.iterations, "elements turn over" if turned_over else run.state.error
 
 
 def _turned_over(body: Body, u: np.ndarray) -> bool:
