@@ -43,8 +43,8 @@ from blocks import clamped, compliances, facing_blocks, flexibility, graded, sti
 
 from bladefem.contact import mortar, surface
 from bladefem.contact.complementarity import solve_lcp
-from bladefem.contact.face_elements import LINEAR, traction_shape
 from bladefem.contact.patch import make_patch
+from bladefem.fem.face_elements import LINEAR, traction_shape
 
 ONE_BODY = ((2.1e11, None), (0.3, 0.0))
 ERRORS = ("peak", "L2", "radius", "edge")

@@ -22,9 +22,9 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
-from .face_elements import corner_count, face_quadrature, face_shape_functions
+from ..fem.face_elements import corner_count, face_quadrature, face_shape_functions
+from ..fem.surface import FaceRule, outward_signs, surface_quadrature, tangent_frames
 from .mortar import mortar_faces, mortar_patch
-from .surface import FaceRule, outward_signs, surface_quadrature, tangent_frames
 
 
 def make_patch(mesh: Mesh, pair: str) -> Patch:

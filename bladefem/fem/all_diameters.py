@@ -39,6 +39,7 @@ from .modes import (
     DIRECTION_TOLERANCE,
     GAP_SHARE,
     SLEPC,
+    highest_gap,
     lowest_pairs,
     mode_set,
     pairs_together,
@@ -404,7 +405,7 @@ def lost_modes(
     counts.
     """
     give_back()
-    shift = _widest_gap([some[:count] for some in lam.values()])
+    shift = _counting_shift([some[:count] for some in lam.values()])
     if not shift > 0:
         # rigid motions alone, which geometry counts
         return {}
@@ -412,7 +413,8 @@ def lost_modes(
     lost = {}
     for n, con in cons.items():
         exact = _count_below(con, shift, shared)
-        if exact != np.count_nonzero(lam[n] < shift):
+        # guards beyond the count have not converged, and may be anywhere
+        if exact != np.count_nonzero(lam[n][:count] < shift):
             lost[n] = Count(shift, exact)
     del shared
     give_back()
@@ -430,8 +432,9 @@ def found_again(
     Raises:
         NotSolvedError: the numbers differ even so.
     """
-    p = _solve_pairs(flex, max(count, truth.exact + 1), None, BLOCKS, tolerance)
-    found = np.count_nonzero(p.lam < truth.shift)
+    enough = max(count, truth.exact + 1)
+    p = _solve_pairs(flex, enough, None, BLOCKS, tolerance)
+    found = np.count_nonzero(p.lam[:enough] < truth.shift)
     if found != truth.exact:
         raise NotSolvedError(
             f"nodal diameter {flex.con.nodal_diameter}: {found} modes were found below "
@@ -463,15 +466,14 @@ def _count_below(
     return core.count_negative(shared, con.K.C)
 
 
-def _widest_gap(lists: list[np.ndarray]) -> float:
-    """A shift near the upper end of the widest relative gap of all eigenvalues, in the upper half
-    of what every diameter covers.
+def _counting_shift(lists: list[np.ndarray]) -> float:
+    """A shift near the upper end of the highest gap of all eigenvalues, in what every diameter
+    covers.
     """
     top = min(lam[-1] for lam in lists)
     below = np.unique(np.concatenate([lam[lam <= top] for lam in lists]))
     below = below[below > 0]
     if len(below) < 2:
         return float(top) * (1 - 1e-6)
-    upper = below[len(below) // 2 - 1 :]
-    i = int(np.argmax(np.diff(upper) / upper[1:]))
-    return float(upper[i] + GAP_SHARE * (upper[i + 1] - upper[i]))
+    i = highest_gap(below) - 1
+    return float(below[i] + GAP_SHARE * (below[i + 1] - below[i]))

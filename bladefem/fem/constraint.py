@@ -25,6 +25,7 @@ from ..errors import InputError, suggestion
 from . import cyclic_schur as core
 from .body import Body
 from .compat import PETSc
+from .cut_faces import repeated_motion, tie_cut_faces
 from .linalg import Doubled, Folded, Matrix, combined
 from .ordering import interior_first
 from .supports import held_directions, polar_elimination
@@ -278,7 +279,9 @@ def _checked_diameter(n: int, sectors: int) -> int:
 
 
 def _cyclic_pair(body: Body) -> Pair:
-    """The matched cut faces of this body, checked."""
+    """The cut faces of this body, checked where their nodes match; without nodes where they are to
+    be tied by a mortar.
+    """
     mesh = body.mesh
     if "cyclic" not in mesh.pairs:
         raise InputError(f"the mesh has no pair 'cyclic'{suggestion('cyclic', mesh.pairs)}")
@@ -287,6 +290,8 @@ def _cyclic_pair(body: Body) -> Pair:
             "the mesh has no number of sectors, expected at least 2 for cyclic symmetry"
         )
     pair = mesh.pairs["cyclic"]
+    if not pair.nodes.size:
+        return pair
     low, high = pair.nodes[:, body.rows[pair.nodes[0]] >= 0]
     for side, nodes in ((pair.master, low), (pair.slave, high)):
         face = np.unique(mesh.faces.get(side, nodes))
@@ -334,19 +339,19 @@ def _constraint_parts(
     d = body.dim
     free = body.rows >= 0
     free[clamped] = False
-    slaves = np.empty(0, int) if pair is None else pair.nodes[1]
+    _, slaves = _cut_nodes(body, pair)
     held = _plane_supports(body, pair)
     keep = np.repeat(free, d) & ~held
     keep[d * slaves[:, None] + np.arange(d)] = False
     low = sp.diags(keep.astype(float)).tocsr()
     high = None
     if pair is not None:
-        alive = free[slaves]
-        rows = pair.nodes[1][alive]
-        cols = pair.nodes[0][alive]
-        block = sp.coo_matrix((np.ones(len(rows)), (rows, cols)), shape=(n, n))
+        block = _repeated_nodes(body, pair, free)
         moving = sp.diags((~held).astype(float))
         high = (moving @ sp.kron(block, pair.rotation[:d, :d])).tocsr()
+        if not pair.nodes.size:
+            # what is held on the low face moves no node of the high one
+            high = (high @ sp.diags(keep.astype(float))).tocsr()
         high.eliminate_zeros()
     partner = np.arange(n)
     if pair is not None:
@@ -358,6 +363,25 @@ def _constraint_parts(
         tie = _tied_identity(n, d, np.asarray(ties))
         low, high = (A if A is None else (tie @ A @ tie).tocsr() for A in (low, high))
     return low, high
+
+
+def _cut_nodes(body: Body, pair: Pair | None) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of the low and of the high cut face; partners where they match."""
+    if pair is None:
+        return np.empty(0, int), np.empty(0, int)
+    if pair.nodes.size:
+        return pair.nodes[0], pair.nodes[1]
+    faces = body.mesh.faces
+    return np.unique(faces[pair.master]), np.unique(faces[pair.slave])
+
+
+def _repeated_nodes(body: Body, pair: Pair, free: np.ndarray) -> sp.csr_matrix:
+    """(n_points, n_points) free nodes of the high cut face from those of the low one."""
+    n = len(body.mesh.points)
+    if not pair.nodes.size:
+        return repeated_motion(tie_cut_faces(body.mesh), n, free)
+    low, high = pair.nodes[:, free[pair.nodes[1]]]
+    return sp.coo_matrix((np.ones(len(low)), (high, low)), shape=(n, n)).tocsr()
 
 
 def _plane_supports(body: Body, pair: Pair | None) -> np.ndarray:
@@ -382,7 +406,7 @@ def _direction_supports(body: Body, pair: Pair | None) -> np.ndarray:
     held = held_directions(body, body.directions)
     if pair is None or not held.any():
         return held
-    both = np.concatenate([pair.nodes[0], pair.nodes[1]])
+    both = np.concatenate(_cut_nodes(body, pair))
     turning = np.abs(np.diag(pair.rotation)[: body.dim] - 1) > 1e-12
     if held[np.ix_(both, turning)].any():
         raise InputError(

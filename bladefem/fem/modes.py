@@ -29,6 +29,8 @@ DIRECTION_TOLERANCE = 1e-8
 SHOWN_DIRECTION_TOLERANCE = 1e-6
 # of a gap between eigenvalues: where the inertia is counted
 GAP_SHARE = 0.9
+# relative gap of squared frequencies in which they can be counted
+MIN_GAP = 1e-4
 SLEPC = Eigensolver()
 BLOCKS = Eigensolver("lanczos")
 # bodies with fewer unknowns than this many times the basis are left to blocks, which end cleanly
@@ -78,7 +80,7 @@ def proven_pairs(
     if not lam[-1] > 0:
         # rigid motions alone, which geometry counts
         return lam, X
-    upper, expected = _widest_gap(lam)
+    upper, expected = _counting_shift(lam)
     exact = count_below(flex.con, upper)
     if exact == expected:
         return lam, X
@@ -256,15 +258,22 @@ def count_below(con: Constrained, lam: float) -> int:
     return inertia(combined(con.K, -lam, con.M))
 
 
-def _widest_gap(lam: np.ndarray) -> tuple[float, int]:
-    """A shift [rad^2/s^2] near the upper end of the widest gap of the upper half, and how many are
-    below it: a gap may be wide because of what is missing in it.
+def highest_gap(lam: np.ndarray) -> int:
+    """Number of the eigenvalue above the highest gap of ascending lam (m,) that is wide enough to
+    count below it: what is missing anywhere under the gap shows. The widest where none is.
+    """
+    gaps = np.diff(lam) / np.maximum(lam[1:], np.finfo(float).tiny)
+    wide = np.flatnonzero(gaps > MIN_GAP)
+    return 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
+
+
+def _counting_shift(lam: np.ndarray) -> tuple[float, int]:
+    """A shift [rad^2/s^2] near the upper end of the highest gap, and how many are below it: a gap
+    may be wide because of what is missing in it.
     """
     if len(lam) < 2:
         return lam[-1] * 1.0001, len(lam)
-    half = max(len(lam) // 2, 1)
-    scale = np.maximum(lam[half:], np.finfo(float).tiny)
-    gap = half + int(np.argmax(np.diff(lam[half - 1 :]) / scale))
+    gap = highest_gap(lam)
     return lam[gap - 1] + GAP_SHARE * (lam[gap] - lam[gap - 1]), gap
 
 

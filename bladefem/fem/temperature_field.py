@@ -85,7 +85,7 @@ def _nearest(
 
 def _check_cut(mesh: Mesh, temperature: RealArray) -> None:
     """Nodes of the two cut faces are the same places of neighbouring sectors."""
-    if "cyclic" not in mesh.pairs:
+    if "cyclic" not in mesh.pairs or not mesh.pairs["cyclic"].nodes.size:
         return
     low, high = mesh.pairs["cyclic"].nodes
     largest = np.abs(temperature[low] - temperature[high]).max()

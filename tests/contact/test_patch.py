@@ -11,12 +11,6 @@ from test_seat import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 from bladefem.contact.complementarity import solve_lcp
-from bladefem.contact.face_elements import (
-    corner_count,
-    face_quadrature,
-    face_shape_functions,
-    traction_shape,
-)
 from bladefem.contact.patch import (
     initial_gap,
     make_patch,
@@ -27,11 +21,17 @@ from bladefem.contact.patch import (
 )
 from bladefem.contact.resultants import resultant
 from bladefem.contact.seating import solve_seating
-from bladefem.contact.surface import outward_signs, surface_quadrature
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, expand_to_mesh, restrict_load
+from bladefem.fem.face_elements import (
+    corner_count,
+    face_quadrature,
+    face_shape_functions,
+    traction_shape,
+)
 from bladefem.fem.linalg import apply_block
+from bladefem.fem.surface import outward_signs, surface_quadrature
 from bladefem.scene.tables import Material
 
 STEEL, TITANIUM = (2.1e11, 0.3), (1.1e11, 0.34)

@@ -106,14 +106,18 @@ def sector(
     sense=1,
     bump=0.0,
     straight=False,
+    slide=0.0,
 ):
-    """One of ``count`` equal parts of a ring about an axis; ``bump`` makes the sector
-    asymmetric.
+    """One of ``count`` equal parts of a ring about an axis; ``bump`` makes the sector asymmetric,
+    ``slide`` moves the nodes of the high cut face in their plane so that they match no more.
     """
     theta = 2 * np.pi / count * sense
 
     def bend(x):
         r, a, z = x[:, 0], x[:, 1] * theta, x[:, 2]
+        along, across = (r - inner) / (outer - inner), z / width
+        r = r + slide * x[:, 1] * (outer - inner) * np.sin(np.pi * along) * (0.4 + across)
+        z = z + slide * x[:, 1] * width * np.sin(np.pi * across) * along
         z = z * (1 + bump * np.sin(7 * r / outer) * (0.3 + np.sin(np.pi * x[:, 1]) ** 2 * x[:, 1]))
         return np.roll(np.stack([r * np.cos(a), r * np.sin(a), z], 1), axis - 2, axis=1)
 
@@ -131,6 +135,8 @@ def sector(
     mesh = Mesh(mesh.points, cell_type, mesh.bodies, faces)
     rotation = turn(theta, axis)
     cyclic = pair(mesh, "cyclic_low", "cyclic_high", rotation)
+    if slide:
+        cyclic = Pair("cyclic_low", "cyclic_high", np.zeros((2, 0), int), rotation, np.zeros(3))
     return Mesh(
         mesh.points,
         cell_type,
