@@ -1,5 +1,5 @@
 """Is the automatic choice ever wrong, and does it pay? Against a fixed rich model on 68 cases;
-sweeps stand beside it.
+sweeps are in choice_sweeps.py.
 
     python benchmarks/choice_cases.py [every]
 

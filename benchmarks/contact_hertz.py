@@ -6,23 +6,25 @@ traction functions.
 Recorded results (relative errors; radius from the second moment of the pressure, edge from the
 pressed area):
 
-                                                   peak         L2     radius       edge
-    cylinder, two bodies, h = a/5                0.37 %     7.19 %     0.50 %    10.00 % cylinder,
-    two bodies, h = a/10               0.05 %     3.68 %     0.13 %     5.00 % cylinder, two bodies,
-    h = a/20               0.00 %     1.83 %     0.02 %     2.50 % cylinder, two bodies, h = a/40
-    0.01 %     0.90 %     0.01 %     1.25 %   order of L2 1.00 sphere, one body, h = a/4
-    1.28 %     5.18 %     0.12 %     6.04 % sphere, one body, h = a/6                    0.48 %
-    3.88 %     0.18 %     1.13 % sphere, one body, h = a/8                    0.21 %     1.75 %
-    0.00 %     1.63 % sphere, one body, h = a/10                   0.02 %     2.96 %     0.09 %
-    1.76 %   order of L2 0.87 sphere, steel on aluminium, h = a/10         0.01 %     2.97 %
-    0.09 %     1.76 % sphere, hat functions, h = a/10              0.23 %     6.80 %     0.75 %
-    3.37 %
+                                                  peak         L2     radius       edge
+    cylinder, two bodies, h = a/5               0.37 %     7.19 %     0.50 %    10.00 %
+    cylinder, two bodies, h = a/10              0.05 %     3.68 %     0.13 %     5.00 %
+    cylinder, two bodies, h = a/20              0.00 %     1.83 %     0.02 %     2.50 %
+    cylinder, two bodies, h = a/40              0.01 %     0.90 %     0.01 %     1.25 %
+        order of L2 1.00
+    sphere, one body, h = a/4                   1.28 %     5.18 %     0.12 %     6.04 %
+    sphere, one body, h = a/6                   0.48 %     3.88 %     0.18 %     1.13 %
+    sphere, one body, h = a/8                   0.21 %     1.75 %     0.00 %     1.63 %
+    sphere, one body, h = a/10                  0.02 %     2.96 %     0.09 %     1.76 %
+        order of L2 0.87
+    sphere, steel on aluminium, h = a/10        0.01 %     2.97 %     0.09 %     1.76 %
+    sphere, hat functions, h = a/10             0.23 %     6.80 %     0.75 %     3.37 %
         punch a/20: L2 1.27 % for x < 0.8 a, next to the edge 66.9 %
-    sphere, third hat, two thirds dual, h = a/10 0.02 %     2.96 %     0.09 %     1.76 %   the
-        library's choice punch a/20: L2 0.39 % for x < 0.8 a, next to the edge 11.5 %
-    sphere, dual functions, h = a/10             0.17 %     4.81 %     0.29 %     4.24 %
+    sphere, third hat, two thirds dual, a/10    0.02 %     2.96 %     0.09 %     1.76 %
+        the library's choice; punch a/20: L2 0.39 % for x < 0.8 a, next to the edge 11.5 %
+    sphere, dual functions, h = a/10            0.17 %     4.81 %     0.29 %     4.24 %
         punch a/20: L2 0.38 % for x < 0.8 a, next to the edge 0.5 %
-    sphere, mid-side nodes tied, h = a/10        0.77 %     4.69 %     0.28 %     4.24 %
+    sphere, mid-side nodes tied, h = a/10       0.77 %     4.69 %     0.28 %     4.24 %
 
 The pressure falls to zero with an infinite slope, so its L2 error is of first order in h and jumps
 with the place of the edge between two nodes: the area of a handful of nodes is what "edge" sees.

@@ -1,8 +1,7 @@
 """Contact in 3-D on gmsh's meshes: Hertz spheres, rigid flat punch, partial slip of Cattaneo and
 Mindlin.
 
-    PYTHONPATH=. python benchmarks/contact_pairs.py            (about a minute and a half on one
-    core)
+    PYTHONPATH=. python benchmarks/contact_pairs.py     (a minute and a half on one core)
 
 Bodies are blocks of ten contact radii (cylinders: 60, plane stress), clamped on the far side; a
 quarter is meshed. Recorded results, relative errors:

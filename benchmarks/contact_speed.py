@@ -3,17 +3,19 @@ right-hand sides.
 
     PYTHONPATH=. python benchmarks/contact_speed.py
 
-Recorded in processor time on a shared two-core machine with four to nine jobs running beside it,
+Recorded in processor time on a shared two-core machine with four to nine other jobs running,
 one thread; "idle" are runs of the same code alone on the machine:
 
-    complementarity, 484 nodes (232 pressed): cold 1.4 ms, warm 1.1 ms; one Cholesky factor of all
-    nodes 1.5 ms complementarity, 2025 nodes (949 pressed): cold 55 ms, warm 51 ms; one Cholesky
-    factor of all nodes 87 ms wedge sector, 63069 dofs, 90 contact nodes: condensed in 2.7 s, then a
-    load state costs 0.89 ms, warm 0.39 ms compliance, 146520 dofs (blade's proportions), 1000
-    right-hand sides: factor 7.3 s, contact ports 20.8 s (12.4 s
-        idle), dense columns 21.8 s of CPU
-    compliance, 156816 dofs (block), 1000 right-hand sides: factor 22.8 s, contact ports 30.2 s
-        (21.0 s idle), dense columns 35.1 s of CPU
+    complementarity, 484 nodes (232 pressed):
+        cold 1.4 ms, warm 1.1 ms; one Cholesky factor of all nodes 1.5 ms
+    complementarity, 2025 nodes (949 pressed):
+        cold 55 ms, warm 51 ms; one Cholesky factor of all nodes 87 ms
+    wedge sector, 63069 dofs, 90 contact nodes:
+        condensed in 2.7 s, then a load state costs 0.89 ms, warm 0.39 ms
+    compliance, 146520 dofs (blade's proportions), 1000 right-hand sides:
+        factor 7.3 s, contact ports 20.8 s (12.4 s idle), dense columns 21.8 s of CPU
+    compliance, 156816 dofs (block), 1000 right-hand sides:
+        factor 22.8 s, contact ports 30.2 s (21.0 s idle), dense columns 35.1 s of CPU
 
 The factor is not part of the right-hand sides: modes and reduction need it, too. A blade is within
 25 s for 1000 of them on a busy machine; a block only on an idle one, since sweeps over its wide

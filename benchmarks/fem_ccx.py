@@ -1,8 +1,8 @@
 """Cyclic sectors against CalculiX (apt install calculix-ccx): frequencies, processor time and
 memory in one run.
 
-    python benchmarks/fem_ccx.py [dofs ...]        (45000 when left out; one process, one thread
-    each) python benchmarks/fem_ccx.py --golden          writes tests/fem/ccx_sector.json
+    python benchmarks/fem_ccx.py [dofs ...]   (45000 when left out; one process, one thread each)
+    python benchmarks/fem_ccx.py --golden     writes tests/fem/ccx_sector.json
 
 The mesh is the default wedge sector with 24 blades. Facts about ccx: nodes of the slave face stay
 off *BOUNDARY, middle nodes 9 and 10 are swapped against gmsh, numbers have at most 20 characters,
@@ -12,13 +12,13 @@ every frequency is printed twice. ccx integrates the mass of C3D10 with degree 2
 Recorded with ccx 2.20 on two shared cores, ten modes each, processor time of ccx over that of
 bladefem, peak memory of bladefem over that of ccx, largest relative difference of a frequency:
 
-    dofs     nodal diameters  elements  ccx [s]  bladefem [s]  ratio  memory [GB]  ratio  ccx's mass
-    exact mass 45 549   5                curved       21.9           3.3    6.7         0.57   1.50
-    1.8e-07     6.6e-05 45 549   0                curved       18.3           3.0    6.0
-    0.55   1.45     3.1e-07     6.8e-05 45 549   0 to 12          curved      298.3          10.0
-    29.8         0.83   1.92     3.4e-07     7.1e-05 45 549   5                straight     18.8
-    3.1    6.0         0.57   1.51     3.3e-07     7.1e-06 151 047  5                curved
-    156.9          13.8   11.4         2.09   1.18     1.4e-07     1.3e-05
+                                                                memory          frequencies with
+    dofs     diameters  elements  ccx [s]  bladefem [s]  ratio  [GB]   ratio    ccx's    exact mass
+     45 549  5          curved       21.9           3.3    6.7  0.57    1.50   1.8e-07      6.6e-05
+     45 549  0          curved       18.3           3.0    6.0  0.55    1.45   3.1e-07      6.8e-05
+     45 549  0 to 12    curved      298.3          10.0   29.8  0.83    1.92   3.4e-07      7.1e-05
+     45 549  5          straight     18.8           3.1    6.0  0.57    1.51   3.3e-07      7.1e-06
+    151 047  5          curved      156.9          13.8   11.4  2.09    1.18   1.4e-07      1.3e-05
 
 The first and third rows, both sides in one run, are from a machine whose other core was busy, the
 others from a quiet one. There ccx had taken 19.0 and 240.8 s; bladefem's best of three for all

@@ -1,7 +1,6 @@
 """A rotating twisted blade against CalculiX (apt install calculix-ccx): linear preload and NLGEOM.
 
-    python benchmarks/fem_ccx_rotation.py [speed in rad/s ...]      (100, 300, 800, 1200 when left
-    out)
+    python benchmarks/fem_ccx_rotation.py [speed in rad/s ...]   (100, 300, 800, 1200 by default)
 
 Same mesh of 48 straight C3D10, same quadrature of degree 2; ccx prints seven digits of a frequency.
 In one increment ccx leaves the centrifugal load where the blade was before it moved (at 800 rad/s,
@@ -9,11 +8,12 @@ where the tip moves 13 mm of 200 mm span, the two preloads then differ by 2e-3 o
 in 20 increments the load follows, and the frequencies agree at every speed. Largest relative
 difference of six frequencies, ccx 2.20 and dolfinx 0.5:
 
-    speed [rad/s]    still to rotating, f1    linear preload    NLGEOM, 1 increment    NLGEOM, 20
-    increments 100              132.9 to 135.3 Hz        2.4e-7            3.0e-6
-    2.8e-7 300              132.9 to 153.5 Hz        3.6e-7            2.4e-6                 2.4e-7
-    800              132.9 to 243.3 Hz        8.8e-7            5.1e-4                 2.6e-7 1200
-    132.9 to 331.3 Hz        1.8e-6            1.1e-4                 1.4e-7
+    speed    still to rotating, f1    linear     NLGEOM,        NLGEOM,
+    [rad/s]                           preload    1 increment    20 increments
+     100     132.9 to 135.3 Hz        2.4e-7     3.0e-6         2.8e-7
+     300     132.9 to 153.5 Hz        3.6e-7     2.4e-6         2.4e-7
+     800     132.9 to 243.3 Hz        8.8e-7     5.1e-4         2.6e-7
+    1200     132.9 to 331.3 Hz        1.8e-6     1.1e-4         1.4e-7
 """
 
 from __future__ import annotations

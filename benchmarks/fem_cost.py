@@ -1,18 +1,18 @@
 """Cost of the modes of one complex nodal diameter against degrees of freedom, 10^4 to 4*10^5, and a
 model fitted to it.
 
-    PYTHONPATH=. python benchmarks/fem_cost.py      (4 minutes; writes docs/figures/fem_cost.png and
-    .csv)
+    PYTHONPATH=. python benchmarks/fem_cost.py   (4 minutes; docs/figures/fem_cost.png and .csv)
 
 Wedge sector with 24 blades, ten modes of nodal diameter 5 from the mesh on, one process, one
 thread, all in core. The largest run also solves nodal diameter 0 with the same factors. Recorded on
 two shared cores:
 
-    dofs            12 530  19 990  45 550  87 190  151 000  240 300  395 100 cpu [s]           1.2
-    1.5     3.0     7.0     14.2     32.0     61.5   (395 100: 71.4 with diameter 0) memory [GB]
-    0.22    0.28    0.56    1.09     2.05     3.68     6.66 entries [1e6]     1.7     3.6    13.8
-    35.7     79.3      155      316
+    dofs            12 530  19 990  45 550  87 190  151 000  240 300  395 100
+    cpu [s]           1.2     1.5     3.0     7.0     14.2     32.0     61.5
+    memory [GB]      0.22    0.28    0.56    1.09     2.05     3.68     6.66
+    entries [1e6]     1.7     3.6    13.8    35.7     79.3      155      316
 
+With diameter 0 in addition the largest takes 71.4 s.
 Memory follows 0.12 GB + 3290 B n + 180.5 B n^(4/3), which bladefem.fem.memory warns with; processor
 time grows with n^1.46 over the four largest. By that model a million dofs take 21.5 GB and about 4
 minutes.

@@ -5,28 +5,26 @@ Processor time of this thread, the best of forty runs, so that other work on the
 little. Run it with ``python benchmarks/friction_kernels.py``. The first call compiles and is not
 measured.
 
-Recorded in one run while the other core was busy. With the Jacobian summed in double, in single
-precision (as Newton takes it), and without it:
+Recorded in one run on an idle machine. With the Jacobian summed in double, in single precision (as
+Newton takes it), and without it; 1-D costs the same in all three:
 
-    H, samples       3, 128            5, 128            5, 256            7, 256            7, 512
-    3-D, stuck       6.4  6.6  4.7     10   9.2  5.9     6.7  6.4  4.5     9.5  9.8  5.5     7.2
-    6.9  4.7 3-D, partial     40   36   22      57   48   24      43   34   18      48   37   19
-    38   29   15 3-D, mixed       44   39   22      66   52   25      51   38   18      58   44   21
-    48   35   17 3-D, gross       40   36   17      62   47   18      50   37   15      57   43   16
-    49   35   15 1-D, stuck       6.8               9.1               6.1               10
-    7.5 1-D, mixed       17                13                9.6               14                9.3
-    1-D, gross       10                14                10                15                9.8
+    H, samples    3, 128          5, 128          5, 256          7, 256          7, 512
+    3-D, stuck   6.0  6.0  5.2   8.2  8.0  6.4   5.9  5.7  4.8   7.7  7.6  5.7   6.2  6.2  4.9
+    3-D, partial  31   30   19    47   40   21    34   27   16    38   30   16    31   23   13
+    3-D, mixed    36   33   20    53   42   21    42   31   16    45   34   17    38   27   14
+    3-D, gross    32   30   15    49   38   16    41   29   13    45   33   14    37   26   12
+    1-D, stuck   5.8             7.8             4.8             6.3             4.6
+    1-D, partial 6.8             9.0             5.8             7.4             5.5
+    1-D, mixed   7.3             9.9             6.4             8.3             6.0
+    1-D, gross   7.7              13             6.7             9.4             6.5
 
-The kernel before and this one in turn within one minute, 250 nodes whose Jacobian stays in the
-cache, in single: partial 44, 58, 42, 48, 39, now 33, 42, 34, 37, 31; mixed 48, 61, 46, 53, 43, now
-39, 50, 39, 44, 37; gross 40, 54, 43, 48, 40, now 35, 46, 39, 43, 37. On a calmer machine H 5 at 128
-samples took 41, 47, 43 and H 7 at 256 took 36, 42, 40.
+Exact 1-D forces take 34 to 41 us a node at H 3, 64 to 68 at H 5 and 99 to 105 at H 7, whatever the
+samples.
 
-Of what was wanted, 40 ns in 3-D and 15 in 1-D, single precision meets the first but for few samples
-a harmonic: H 5 at 128 samples is up to a third above, H 7 at 256 up to a tenth. At H 5 a node costs
-2.4 to 3.7 us and 19 to 28 ns a sample, at H 7 3.8 to 4.4 us and 20 to 28 ns: once a node come
-changes of state, the start of the period and writing the Jacobian, 9 KB at H 5. 1-D meets its 15
-but at H 3 in mixed slip, whose turns the processor cannot foretell.
+Of what was wanted, 40 ns in 3-D and 15 in 1-D, single precision meets both, but for 42 ns at H 5
+and 128 samples in mixed slip. At H 5 a node costs 2.4 to 3.1 us and 15 to 20 ns a sample, at H 7
+3.3 to 3.5 us and 16 to 21 ns: once a node come changes of state, the start of the period and
+writing the Jacobian, 9 KB at H 5.
 
 Parts of 47 ns at H 5, 128 samples, mixed, by a profile: sums over time 9, of which the part of the
 normal load 4; slip from edge to edge 5; edges 3; how they turn the rows 2.5; rows 3; stick 1.5;
@@ -59,16 +57,16 @@ Tried, and slower or no faster:
   of the samples. Its forces were equal to the kernel of its day to 1e-12 for nearly all nodes. One
   node took 1.7 times as long.
 - A first period of which only the second half is followed: 1 ns less in gross slip, nothing
-elsewhere.
+  elsewhere.
 - Leaps as long as the number of stretches of slip stays, not all states: half the periods, but a
-wrong limit at times.
+  wrong limit at times.
 - References to arrays counted in the inner functions, as Numba does unless told: a fifth of the
-time.
+  time.
 - Both tangents in one pass of the sums over time: a fiftieth less at H 3, a tenth more at H 5 for
-want of registers.
+  want of registers.
 - The edges that slip marked once, not in each period; Gram matrices in vectors for 1-D: nothing.
 - The Jacobian of a node written by masked stores: a tenth more than by stores that reach into the
-next row.
+  next row.
 """
 
 from __future__ import annotations

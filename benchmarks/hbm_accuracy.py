@@ -9,11 +9,13 @@ periods and extrapolated in the step. Errors are those of the first harmonic at 
 the worst of the frequencies.
 
 Measured (exact: transitions located; the patch has 2048 samples at H 31, 1024 at 15, 256 at 5):
+
     H                          5/7       15        31        63
     single mass            1.6e-04   1.2e-05   4.7e-07   2.7e-08
     beam, 20 elements      1.8e-05   2.5e-06   8.3e-08   9.6e-10
     chain with lift-off    5.1e-05   3.4e-06   7.3e-08   7.4e-09
     3-D patch, 100 nodes   6.2e-04   3.5e-06   8.3e-07
+
 Two contacts of the chain stick all the time and could carry any mean force: left to the shooting it
 moves by 8e-6, and with it the reference by 6e-8, which is more than the error of the balance with
 63 harmonics.

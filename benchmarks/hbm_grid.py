@@ -2,6 +2,7 @@
 modes 1 and 2.
 
     python benchmarks/hbm_grid.py            all 252 points, each from full stick
+
 Measured: 252 of 252, residual at most 1e-13, median 2 iterations (5 where contacts slip), 90 %
 within 8, most 43.
 """

@@ -13,12 +13,14 @@ it a third, idle direction, 72 dofs in place of 48. That is its best way to this
 like for like.
 
 Measured on two busy cores, ms a solved point, and the error at the points that both solved:
+
                            bladefem   pyHarm   ratio      solved       error     pyHarm     MB
     single mass                0.05      3.6      70   61  61/61     2.6e-04    2.6e-04    191   302
     beam                       0.04      102    2300   31  31/31     6.1e-05    6.1e-05    191   350
     chain                      5.0       865     174   31  31/31     3.1e-05    3.1e-05    183   529
     chain with lift-off       36       14608     411   31  15/31     5.7e-05    2.8e-01    194   548
     3-D patch                199      112108     563    4    4/4     3.8e-05    2.3e-01    224  2202
+
 H 7 and 256 samples; the patch H 5 and 128. Lost points count in the time. Where contacts lift off
 some points that pyHarm accepts are far from the reference: other motions, or its coarse residual. A
 dense Newton step of the patch has 24 GFlop, 0.5 s at the machine's limit.

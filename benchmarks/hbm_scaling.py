@@ -1,8 +1,8 @@
 """Cost of one converged point against contact nodes and harmonics, with the floating-point limit of
 each part.
 
-    python benchmarks/hbm_scaling.py [docs/figures/hbm_scaling]        table, and cost as .png and
-    .csv
+    python benchmarks/hbm_scaling.py [docs/figures/hbm_scaling]   table, and cost as .png and .csv
+
 Square 3-D patches of `hbm_models.patch`. Limits: condensation 8/3 + 8 complex m^3 a harmonic (LU
 and m right-hand sides, m = 3 n), or 8 m k (m + k) with k modes, at the rate at which this machine
 multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a Newton step.
@@ -10,6 +10,7 @@ multiplies matrices; a dense Jacobian would take 2/3 (m (2H+1))^3 a Newton step.
 Memory is the peak of the arrays made for a point.
 
 Measured (CPU seconds, one thread, 48 GFlop/s in matrix products; H = 3):
+
     all modes
     nodes   point   condense   forces    limit   one dense step   MiB   dense MiB   Newton steps
         9   0.005     0.0002   0.0006   0.00001          0.0001     1         0.3              4
@@ -23,6 +24,7 @@ Measured (CPU seconds, one thread, 48 GFlop/s in matrix products; H = 3):
       196   0.26      0.041    0.0054   0.011                    122                           6
       400   2.8       0.23     0.021    0.045                    493                           9
      1024   130       4.1      0.078    0.29                    3094                           8
+
 Forces grow linearly. With all modes the condensation grows with the cube, 2.3 to 3.6 times above
 its limit; with few it grows with the square. At 1000 nodes three quarters and more go into the
 Newton steps, that is into products with the flexibilities of the nodes that slip and into copies of

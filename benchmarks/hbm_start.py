@@ -7,6 +7,7 @@ Seconds are the least of five new processes, by the clock and of CPU; memory is 
 whole process, with Python and its libraries.
 
 Measured (seconds of CPU):
+
     import bladefem.hbm                                    0.001 s
     import of all that solves (NumPy, SciPy, numba)        0.34 s
     the same and the first point, 1-D and 3-D elements     0.62 s

@@ -1,13 +1,22 @@
 """Where each method fails on the reference blade: 128 points of (load, frequency), 144 of (load,
 contact stiffness).
 
-python benchmarks/paper_maps.py [folder]      about five minutes, writes method_map.csv and .png,
-prints the counts BLADEFEM_COARSE=1                             12 points
+    python benchmarks/paper_maps.py [folder]   about five minutes, prints the counts and writes
+                                               method_map.csv and .png
+    BLADEFEM_COARSE=1                          12 points
 
-Recorded on 272 points, 258 s of CPU (docs/paper/method_map.csv): converged / false / none paper
-159/90/23, picard 255/3/14, amplitude 272/0/0, complex 268/4/0, parts 250/21/1, anderson 264/8/0,
-anderson on the residual 271/0/1, describing 272/0/0, Newton without fallbacks 271/0/1, with them
-272/0/0 at 1e-13.
+Recorded on 272 points, 258 s of CPU (docs/paper/method_map.csv), converged / false / none:
+
+    paper                      159/90/23
+    picard                     255/3/14
+    amplitude                  272/0/0
+    complex                    268/4/0
+    parts                      250/21/1
+    anderson                   264/8/0
+    anderson on the residual   271/0/1
+    describing                 272/0/0
+    Newton without fallbacks   271/0/1
+    Newton with fallbacks      272/0/0, at 1e-13
 """
 
 import os

@@ -1,14 +1,18 @@
 """Time against error of every way to one point: reference blade, 60 g, 1.4 N a seat, 1315.5 Hz,
 first harmonic.
 
-python benchmarks/paper_speed.py      about a minute; CPU seconds of one thread, relative error
-against shooting Direct integration starts from the stuck motion and stops at a change of 1e-6 over
-a period.
+    python benchmarks/paper_speed.py      about a minute
 
-Recorded on a busy 2-core machine (trust ratios of ten): balance H 1 2 ms 7e-3, H 3 4 ms 6e-4, H 7
-51 ms 3e-5, H 15 103 ms 2e-6, H 31 46 ms 2e-7; paper's loop 54 to 185 ms 4e-3, whatever its
-harmonics and averaging; explicit 128 to 512 steps 104 to 200 ms 2e-3 to 1.4e-4; Newmark 64 and 128
-steps 2.2 and 5.4 s 1.7e-2 and 4.7e-3; shooting 234 ms, exact.
+CPU seconds of one thread, relative error against shooting. Direct integration starts from the stuck
+motion and stops at a change of 1e-6 over a period. Recorded on a busy 2-core machine (trust ratios
+of ten):
+
+    balance H 1, 3, 7, 15, 31          2, 4, 51, 103, 46 ms    7e-3, 6e-4, 3e-5, 2e-6, 2e-7
+    the paper's iteration              54 to 185 ms            4e-3, whatever its harmonics and
+                                                               averaging
+    explicit, 128 to 512 steps         104 to 200 ms           2e-3 to 1.4e-4
+    Newmark, 64 and 128 steps          2.2 and 5.4 s           1.7e-2 and 4.7e-3
+    shooting                           234 ms                  exact
 """
 
 import time
