@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import NotSolvedError
 from .linear.condensation import condense
+from .linear.contact_flexibility import flexibility_of_mean
 from .model import ReducedModel
 from .peak import Peak, find_peak
 from .solver.newton import DEFAULT_OPTIONS, Options
@@ -148,7 +149,8 @@ def _extreme_loads(model: ReducedModel, peak: Peak) -> Sequence[np.ndarray]:
     linear = condense(model, peak.omega, 1)
     normal = np.zeros(model.springs.shape)
     normal[:, 0] = elements.kn
-    by_start = -(linear.A[0].real.T @ normal.ravel()).reshape(normal.shape)[:, first:]
+    mean = flexibility_of_mean(linear.condensed.flex)
+    by_start = -(mean.T @ normal.ravel()).reshape(normal.shape)[:, first:]
     length = np.linalg.norm(by_start, axis=1, keepdims=True)
     if not length.max() > 0:
         return []

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..errors import InputError
 from .linear.bodies import modal_flexibility, receptance_block
+from .linear.contact_flexibility import flexibility_product, transposed_flexibility
 from .model import ReducedModel
 from .parameter_derivatives import LINEAR_PARAMETERS, contact_rate
 from .parameters import check_parameter
 from .solution import Solution
 from .solver.residual import (
     adjoint_inverse,
-    as_amplitudes,
     as_coefficients,
     solved_balance,
     transposed_force_change,
@@ -56,7 +56,8 @@ def node_gradients(
     by_force = size_by_force(model, solution, probe)
     by_motion = transposed_force_change(balance, state, by_force)
     back = adjoint_inverse(balance, state)(by_motion, 1e-9)
-    weight = by_force - transposed_flexibility(balance.linear.A, back)
+    turned = transposed_flexibility(balance.linear.condensed.flex)
+    weight = by_force - flexibility_product(turned, back)
     return {
         name: np.sum(weight * contact_rate(balance, state, name), axis=(1, 2)) for name in names
     }
@@ -75,10 +76,3 @@ def size_by_force(
     share = solution.probe[:, probe] / np.linalg.norm(solution.probe[1:, probe])
     share[0] = 0.0
     return as_coefficients(-across.conj() * share[:, None], solution.w.shape)
-
-
-def transposed_flexibility(A: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """A^T x in real coefficients (n, d, K)."""
-    return as_coefficients(
-        (A.conj().swapaxes(1, 2) @ as_amplitudes(x)[:, :, None])[:, :, 0], x.shape
-    )

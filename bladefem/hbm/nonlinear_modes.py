@@ -23,6 +23,7 @@ from ..friction.fourier import to_complex, to_real
 from ..util.newton import halve_step, iterate_newton
 from .linear.bodies import Stack
 from .linear.condensation import condense
+from .linear.contact_flexibility import flexibility_of_mean
 from .linear.woodbury import bodies_of
 from .model import ReducedModel
 from .solver.residual import contact_forces
@@ -216,7 +217,8 @@ def _frame(
         raise InputError("damping that couples modes: expected modal damping for nonlinear modes")
     still = condense(_unloaded(model), float(model.side(1).omega[mode]), H)
     shape = model.blades(H).shapes[_of(model.blades(H), 1)][model.blades(H).contact][:, mode]
-    return _Frame(model, mode, H, samples, bodies, shape, still.A[0].real, still.stuck[0].real)
+    mean = flexibility_of_mean(still.condensed.flex)
+    return _Frame(model, mode, H, samples, bodies, shape, mean, still.stuck[0].real)
 
 
 def _unloaded(model: ReducedModel) -> ReducedModel:

@@ -23,6 +23,7 @@ from .linear.bodies import (
     port_motion,
 )
 from .linear.condensation import Linear
+from .linear.contact_flexibility import flexibility_product
 from .model import ReducedModel
 from .parameters import check_parameter, layer_share, vary
 from .policy import uses_coulomb_kernels
@@ -61,9 +62,7 @@ def residual_rate(
             balance.model, linear, as_amplitudes(contact_load(balance.model, state)), name
         )
         return residual_rate_of_bodies(balance, state, moved)
-    force = as_amplitudes(contact_rate(balance, state, name))
-    moved = (linear.A @ force[:, :, None])[:, :, 0]
-    return as_coefficients(moved, state.w.shape)
+    return flexibility_product(linear.condensed.flex, contact_rate(balance, state, name))
 
 
 def residual_rate_of_bodies(balance: Balance, state: State, moved: np.ndarray) -> np.ndarray:
@@ -71,8 +70,9 @@ def residual_rate_of_bodies(balance: Balance, state: State, moved: np.ndarray) -
     constant forces, the first of `body_rate` [m].
     """
     linear = balance.linear
-    sprung = (linear.A @ (linear.springs * moved)[:, :, None])[:, :, 0]
-    return -as_coefficients(moved - sprung, state.w.shape)
+    motion = as_coefficients(moved, state.w.shape)
+    springs = linear.springs.reshape(*motion.shape[:2], 1)
+    return flexibility_product(linear.condensed.flex, springs * motion) - motion
 
 
 def contact_load(model: ReducedModel, state: State) -> np.ndarray:

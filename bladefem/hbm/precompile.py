@@ -23,6 +23,7 @@ from ..data import Elements
 from ..friction.aft import evaluate
 from ..reduction.matrices import port_model_from_matrices
 from .linear.condensation import condense
+from .linear.contact_flexibility import by_harmonic
 from .model import Damping, ReducedModel
 from .solve import solve
 from .solver.newton import newton
@@ -86,7 +87,9 @@ def compile_linear() -> None:
     # its flexibility without springs is a kernel of its own
     _ = condense(plane, 1.0, 2).G
     flexibility = np.eye(3, dtype=complex)[None].repeat(3, axis=0)
-    inverse = iterative_inverse(flexibility, np.eye(15)[None], motions=np.eye(3)[:, :1].copy())
+    inverse = iterative_inverse(
+        by_harmonic(flexibility), np.eye(15)[None], motions=np.eye(3)[:, :1].copy()
+    )
     inverse(np.ones((3, 5)), 1e-6)
     evaluate(plane.elements, np.full((1, 3, 5), 0.1), 64)
 

@@ -22,9 +22,10 @@ from ..friction.fourier import synthesis
 from ..friction.law_table import require_coulomb
 from ..util.arrays import IntegerArray, RealArray
 from .linear.condensation import condense
+from .linear.contact_flexibility import flexibility_product, transposed_flexibility
 from .linear.mean_motion import with_springs
 from .model import ReducedModel
-from .node_gradients import size_by_force, transposed_flexibility
+from .node_gradients import size_by_force
 from .solution import Solution
 from .solver.residual import (
     Balance,
@@ -203,5 +204,6 @@ def _gradient(
     by_force = size_by_force(model, solution, probe)
     by_motion = transposed_force_change(balance, state, by_force)
     back = adjoint_inverse(balance, state)(by_motion, 1e-9)
-    weight = by_force - transposed_flexibility(balance.linear.A, back)
+    turned = transposed_flexibility(balance.linear.condensed.flex)
+    weight = by_force - flexibility_product(turned, back)
     return weight[:, first:, 0]

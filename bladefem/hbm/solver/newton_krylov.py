@@ -16,7 +16,7 @@ import numpy as np
 from scipy.sparse.linalg import LinearOperator, gmres
 
 from ...friction.fourier import to_complex, to_real
-from ..linear.contact_flexibility import by_harmonic
+from ..linear.contact_flexibility import Flexibility, flexibility_product, sizes
 from .deflation import no_level, second_level
 from .krylov import conjugate_residuals
 
@@ -48,12 +48,12 @@ class Memory:
     solvers: set[str] = field(default_factory=set)
 
 
-# A (H+1, a, a) and change (nodes, dK, dK), in one precision
-Parts = tuple[np.ndarray, np.ndarray]
+# flexibility A and change (nodes, dK, dK), in one precision
+Parts = tuple[Flexibility, np.ndarray]
 
 
 def iterative_inverse(
-    A: np.ndarray,
+    flex: Flexibility,
     change: np.ndarray,
     memory: Memory | None = None,
     motions: np.ndarray | None = None,
@@ -66,13 +66,14 @@ def iterative_inverse(
     is far longer than the residual.
 
     Args:
-        A: (H+1, a, a) flexibility with contact springs [m/N].
+        flex: flexibility A with contact springs, see `bladefem.hbm.linear.contact_flexibility`
+            [m/N].
         change: (nodes, dK, dK) derivative of the forces beyond the springs [N/m].
         memory: of the Newton run; changed in place.
         motions: (a, q) that the contacts have in common, see `bladefem.hbm.solver.deflation`; none
             when left out.
     """
-    return partial(_solve_system, _System((A, change), memory or Memory(), motions))
+    return partial(_solve_system, _System((flex, change), memory or Memory(), motions))
 
 
 @dataclass
@@ -87,17 +88,24 @@ class _System:
     @cached_property
     def single(self) -> Parts:
         """The same in single precision."""
-        A, change = self.double
-        return A.astype(np.complex64), change.astype(np.float32)
+        (A, mean, R, U, T), change = self.double
+        halved = (
+            A.astype(np.complex64),
+            mean.astype(np.float32),
+            R.astype(np.float32),
+            U.astype(np.float32),
+            T.astype(np.complex64),
+        )
+        return halved, change.astype(np.float32)
 
     @cached_property
     def level(self) -> tuple[np.ndarray, ...]:
         """The second level."""
-        A, change = self.double
+        flex, change = self.double
         if self.motions is None or self.motions.size == 0:
             return no_level()
-        d = A.shape[1] // len(change)
-        return second_level(by_harmonic(A), change, self.motions, np.arange(len(change)), d)
+        d = len(self.motions) // len(change)
+        return second_level(flex, change, self.motions, np.arange(len(change)), d)
 
     def directions(
         self,
@@ -105,11 +113,9 @@ class _System:
         accuracy: float,
     ) -> np.ndarray | None:
         """The solution by conjugate residuals, or None where they do not find it."""
-        A, change = self.double
+        flex, change = self.double
         x = np.empty(residual.size)
-        found = conjugate_residuals(
-            by_harmonic(A), change, residual.ravel(), accuracy, self.level, x
-        )
+        found = conjugate_residuals(flex, change, residual.ravel(), accuracy, self.level, x)
         return x.reshape(residual.shape) if found else None
 
     def product(
@@ -119,18 +125,16 @@ class _System:
     ) -> np.ndarray:
         """The system times x, flat."""
         self.count += 1
-        A, change = parts
+        flex, change = parts
         forces = change @ x.reshape(len(change), -1, 1).astype(change.dtype)
-        return x + _apply_flexibility(A, forces.reshape(A.shape[1], -1)).ravel()
+        forces = forces.reshape(sizes(flex)[1], -1)
+        product = flexibility_product if parts is self.double else _single_product
+        return x + product(flex, forces).ravel()
 
     def prepared(self, x: np.ndarray) -> np.ndarray:
         """The preconditioner times x, flat."""
         blocks = self.memory.blocks
-        return (
-            x
-            if blocks is None
-            else _apply_flexibility(blocks, x.reshape(blocks.shape[1], -1)).ravel()
-        )
+        return x if blocks is None else _by_matrices(blocks, x.reshape(blocks.shape[1], -1)).ravel()
 
     def krylov(
         self,
@@ -195,26 +199,50 @@ def _run_gmres(
     return gmres(operator, residual, atol=target, restart=GMRES_BASIS, maxiter=1)
 
 
-def _harmonic_blocks(A: np.ndarray, change: np.ndarray) -> np.ndarray:
+def _harmonic_blocks(flex: Flexibility, change: np.ndarray) -> np.ndarray:
     """(H+1, a, a) inverses of  1 + A_h D_h  in single precision, D_h what of `change` maps harmonic
     h to h.
     """
-    nodes, (count, a) = len(change), A.shape[:2]
+    nodes, (count, a) = len(change), sizes(flex)
     d = a // nodes
     split = change.reshape(nodes, d, 2 * count - 1, d, 2 * count - 1)
-    inverse = np.empty(A.shape, dtype=np.complex64)
+    inverse = np.empty((count, a, a), dtype=np.complex64)
     for h in range(count):
         c, s = (0, 0) if h == 0 else (2 * h - 1, 2 * h)
         D = (split[:, :, c, :, c] + split[:, :, s, :, s]) / 2
         if h:
             D = D + 0.5j * (split[:, :, c, :, s] - split[:, :, s, :, c])
-        product = (
-            (A[h].reshape(a, nodes, d).transpose(1, 0, 2) @ D).transpose(1, 0, 2).reshape(a, a)
-        )
-        inverse[h] = np.linalg.inv((np.eye(a) + product).astype(np.complex64))
+        by_node = _matrix_of_harmonic(flex, h).reshape(a, nodes, d).transpose(1, 0, 2)
+        system = (by_node @ D.astype(np.complex64)).transpose(1, 0, 2).reshape(a, a)
+        system[np.arange(a), np.arange(a)] += 1
+        inverse[h] = np.linalg.inv(system)
     return inverse
 
 
-def _apply_flexibility(A: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """(a, K) real coefficients of A times the forces (a, K)."""
+def _matrix_of_harmonic(flex: Flexibility, h: int) -> np.ndarray:
+    """(a, a) A_h in single precision; no other harmonic is formed."""
+    A, mean, R, U, T = flex
+    if len(A):
+        return A[h].astype(np.complex64)
+    if h == 0:
+        return mean.astype(np.complex64)
+    shapes = U.astype(np.complex64)
+    return R.astype(np.float32) + shapes @ T[h].astype(np.complex64) @ shapes.T
+
+
+def _single_product(flex: Flexibility, forces: np.ndarray) -> np.ndarray:
+    """(a, K) real coefficients of A times the forces (a, K), in the precision of the
+    flexibility.
+    """
+    A, mean, R, U, T = flex
+    if len(A):
+        return _by_matrices(A, forces)
+    modal = T @ to_complex(U.T @ forces).T[:, :, None].astype(T.dtype)
+    moved = R @ forces + U @ to_real(modal[:, :, 0].T).astype(U.dtype)
+    moved[:, 0] = mean @ forces[:, 0]
+    return moved
+
+
+def _by_matrices(A: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """The same for A (H+1, a, a)."""
     return to_real((A @ to_complex(forces).T[:, :, None].astype(A.dtype))[:, :, 0].T)

@@ -28,6 +28,15 @@ from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import trigonometric_tables
 from ...util.arrays import RealArray
 from ..linear.condensation import Linear, condense, with_mean
+from ..linear.contact_flexibility import (
+    Flexibility,
+    flexibility_of_mean,
+    flexibility_product,
+    form_matrices,
+    select_nodes,
+    sizes,
+    transposed_flexibility,
+)
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
 from ..solution import Solution
@@ -269,7 +278,7 @@ def _held_walk(balance: Balance) -> Balance:
     along b has no influence.
     """
     linear = balance.linear
-    mean = linear.A[0] - balance.walking @ balance.walking.T
+    mean = flexibility_of_mean(linear.condensed.flex) - balance.walking @ balance.walking.T
     return replace(balance, linear=with_mean(linear, mean, linear.stuck[0]), walk=None)
 
 
@@ -279,10 +288,8 @@ def _walk_terms(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarray]
     was taken from A.
     """
     shape = state.w.shape
-    steps = [
-        _as_node_coefficients(balance, _apply_flexibility(balance.linear.A, as_amplitudes(rate)))
-        for rate in walk_rates(balance, state)
-    ]
+    flex = balance.linear.condensed.flex
+    steps = [flexibility_product(flex, rate) for rate in walk_rates(balance, state)]
     change = state.forces.jacobian.reshape(shape[0], shape[1] * shape[2], -1)
     springs = balance.model.springs[:, :, None]
     motions = []
@@ -334,14 +341,14 @@ def _linearise_blocks(
     change, active, dofs = _active_nodes(balance, state)
     if len(active) == 0:
         return lambda residual, accuracy=0.0: residual.copy()
-    A = _select_dofs(balance.linear.A, dofs)
+    flex = select_nodes(balance.linear.condensed.flex, active, d)
     if memory is not None and memory.nodes != active.tobytes():
         memory.nodes, memory.blocks, memory.slow = (
             active.tobytes(),
             None,
             memory.slow or memory.blocks is not None,
         )
-    inverse = _choose_inverse(A, change, memory, balance.linear.condensed.motions[dofs])
+    inverse = _choose_inverse(flex, change, memory, balance.linear.condensed.motions[dofs])
 
     def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
         step = np.empty(residual.shape)
@@ -373,18 +380,16 @@ def adjoint_inverse(balance: Balance, state: State) -> Inverse:
 
 def _adjoint_blocks(balance: Balance, state: State) -> Inverse:
     """`adjoint_inverse` without the walk."""
-    K = state.w.shape[2]
-    change, active, dofs = _active_nodes(balance, state)
+    _, d, K = state.w.shape
+    change, active, _ = _active_nodes(balance, state)
     if len(active) == 0:
         return lambda b, accuracy=0.0: b.copy()
-    turned = np.ascontiguousarray(balance.linear.A.conj().swapaxes(1, 2))
+    turned = transposed_flexibility(balance.linear.condensed.flex)
     back = np.ascontiguousarray(change.swapaxes(1, 2))
-    inverse = _choose_inverse(_select_dofs(turned, dofs), back)
+    inverse = _choose_inverse(select_nodes(turned, active, d), back)
 
     def solve(b: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
-        flexed = _as_node_coefficients(balance, _apply_flexibility(turned, as_amplitudes(b)))[
-            active
-        ]
+        flexed = flexibility_product(turned, b)[active]
         x = inverse(flexed.reshape(-1, K), accuracy)
         result = b.copy()
         result[active] -= (back @ x.reshape(len(active), -1, 1)).reshape(flexed.shape)
@@ -407,13 +412,14 @@ def determinant_sign(balance: Balance, state: State) -> float:
         Y = np.array([base(vector, STEP_ACCURACY) for vector in left])
         small = np.eye(len(right)) + np.tensordot(right, Y, axes=([1, 2, 3], [1, 2, 3]))
         return sign * float(np.sign(np.linalg.det(small)))
-    change, _, dofs = _active_nodes(balance, state)
+    change, active, dofs = _active_nodes(balance, state)
     if len(dofs) * state.w.shape[2] > DETERMINANT_UNKNOWNS:
         return 0.0
     # everything sticks: the derivative is the identity
     if not len(dofs):
         return 1.0
-    J = dense_jacobian(_select_dofs(balance.linear.A, dofs), change)
+    flex = select_nodes(balance.linear.condensed.flex, active, state.w.shape[1])
+    J = dense_jacobian(form_matrices(flex), change)
     return float(np.linalg.slogdet(J)[0])
 
 
@@ -429,33 +435,27 @@ def _active_nodes(balance: Balance, state: State) -> tuple[np.ndarray, np.ndarra
     return change, active, (active[:, None] * d + np.arange(d)).ravel()
 
 
-def _select_dofs(A: np.ndarray, dofs: np.ndarray) -> np.ndarray:
-    """(H+1, a, a) the flexibilities among some of the dofs, in one copy where one is needed."""
-    if len(dofs) == A.shape[1]:
-        return A
-    return np.ascontiguousarray(A[np.ix_(np.arange(len(A)), dofs, dofs)])
-
-
 def _choose_inverse(
-    A: np.ndarray,
+    flex: Flexibility,
     change: np.ndarray,
     memory: Memory | None = None,
     motions: np.ndarray | None = None,
 ) -> Inverse:
-    solver = linear_solver(A.shape[1] * (2 * len(A) - 1))
+    harmonics, dofs = sizes(flex)
+    solver = linear_solver(dofs * (2 * harmonics - 1))
     memory = Memory() if memory is None else memory
     memory.solvers.add(DENSE_LU if solver == DENSE_LU else ITERATIONS)
     if solver == DENSE_LU:
-        return _dense_inverse(A, change)
-    iterative = iterative_inverse(A, change, memory, motions)
+        return _dense_inverse(flex, change)
+    iterative = iterative_inverse(flex, change, memory, motions)
     if solver == ITERATIONS:
         return iterative
-    return _with_factors_at_need(iterative, A, change, memory)
+    return _with_factors_at_need(iterative, flex, change, memory)
 
 
 def _with_factors_at_need(
     iterative: Inverse,
-    A: np.ndarray,
+    flex: Flexibility,
     change: np.ndarray,
     memory: Memory,
 ) -> Inverse:
@@ -469,14 +469,14 @@ def _with_factors_at_need(
                 return iterative(residual, accuracy)
             except np.linalg.LinAlgError:
                 memory.solvers.add(DENSE_LU)
-                dense = _dense_inverse(A, change)
+                dense = _dense_inverse(flex, change)
         return dense(residual, accuracy)
 
     return solve
 
 
-def _dense_inverse(A: np.ndarray, change: np.ndarray) -> Inverse:
-    J = dense_jacobian(A, change)
+def _dense_inverse(flex: Flexibility, change: np.ndarray) -> Inverse:
+    J = dense_jacobian(form_matrices(flex), change)
     factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
     if not abs(np.diag(factors[0])).min() > 0:
         raise np.linalg.LinAlgError("singular Jacobian")
@@ -503,10 +503,6 @@ def contact_table(
             model.offset,
         ),
     )
-
-
-def _apply_flexibility(flexibility: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    return (flexibility @ forces[:, :, None])[:, :, 0]
 
 
 def as_amplitudes(x: np.ndarray) -> np.ndarray:
