@@ -11,14 +11,18 @@ from bladefem.hbm.linear.contact_flexibility import (
     apply_flexibility,
     apply_matrices,
     by_harmonic,
+    flexibility_of_mean,
+    flexibility_product,
     form_matrices,
     seen_by,
     select_nodes,
+    sizes,
+    transposed_flexibility,
 )
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import leading_stuck_solutions, solve
-from bladefem.hbm.solver.deflation import no_level, second_level
+from bladefem.hbm.solver.deflation import _leading_directions, no_level, second_level
 from bladefem.hbm.solver.krylov import conjugate_residuals
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.newton_compiled import dense_jacobian
@@ -84,6 +88,36 @@ def test_both_forms_of_a_flexibility_are_the_same():
             form_matrices(select_nodes(form, some, 2)), A[:, rows[:, None], rows], atol=1e-12
         )
         assert select_nodes(form, np.arange(6), 2)[0] is not None
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_the_transpose_is_that_of_the_product(first):
+    """y . A x = A^T y . x  for real coefficients, in both forms, without forming the second."""
+    flex = by_modes()
+    A = form_matrices(flex)
+    if first:
+        A[0] = A[0].real
+        flex = by_harmonic(A)
+    assert sizes(flex) == (5, 12)
+    np.testing.assert_array_equal(flexibility_of_mean(flex), A[0].real)
+    x, y = np.random.default_rng(8).normal(size=(2, 6, 2, 9))
+    left = np.vdot(y, flexibility_product(flex, x))
+    assert left == pytest.approx(np.vdot(flexibility_product(transposed_flexibility(flex), y), x))
+    with pytest.raises(AssertionError):
+        np.testing.assert_allclose(np.vdot(flexibility_product(flex, y), x), left)
+
+
+@pytest.mark.parametrize("columns", [0, 6, 40])
+def test_leading_directions_are_those_of_the_singular_values(columns):
+    """By the Gram matrix of either side; directions that are a hundredth as soft are left out."""
+    random = np.random.default_rng(2)
+    soft = random.normal(size=(20, columns)) * np.where(np.arange(columns) < 4, 1.0, 1e-4)
+    found = _leading_directions(soft, 5)
+    assert found.shape == (20, min(columns, 4))
+    if columns:
+        left, values, _ = np.linalg.svd(soft)
+        np.testing.assert_allclose(abs(np.sum(found * left[:, :4], axis=0)), 1.0, rtol=1e-9)
+        np.testing.assert_allclose(found.T @ found, np.eye(4), atol=1e-12)
 
 
 def test_a_second_level_needs_fewer_directions_for_the_same_step():

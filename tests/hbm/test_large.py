@@ -10,6 +10,7 @@ from hbm_models import patch
 from plain_linear import plain_jacobian
 
 from bladefem.hbm import policy
+from bladefem.hbm.linear import condensation
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.linear.contact_flexibility import by_harmonic
 from bladefem.hbm.solve import solve
@@ -17,10 +18,12 @@ from bladefem.hbm.solver import residual as residual_module
 from bladefem.hbm.solver.newton_krylov import iterative_inverse
 from bladefem.hbm.solver.residual import (
     Balance,
+    adjoint_inverse,
     evaluate_balance,
     linearise_balance,
     start_in_stick,
 )
+from bladefem.reduction.truncate import truncated
 
 
 def test_iterative_and_dense_steps_agree(monkeypatch):
@@ -105,6 +108,61 @@ def test_a_patch_with_lift_off_is_solved_and_balances_its_work():
             replace(model, excitation={1: 0.5 * model.excitation[1]}), omega, 3, 64, start=solution
         )
         assert lighter.converged
+
+
+@pytest.fixture(scope="module")
+def hundred_nodes():
+    """100 nodes in space on 60 modes and the residual flexibility of the others."""
+    whole = patch(side=10).model
+    return replace(whole, sides=(truncated(whole.sides[0], 60),))
+
+
+def test_a_hundred_nodes_are_solved_as_by_the_dense_jacobian(monkeypatch, hundred_nodes):
+    """By products with the residual flexibility and the modes: no matrix of a harmonic is
+    formed.
+    """
+    with monkeypatch.context() as forbidden:
+        for module in (residual_module, condensation):
+            forbidden.setattr(module, "form_matrices", None)
+        lean = solve(hundred_nodes, 0.9, 3, 88)
+    assert len(condense(hundred_nodes, 0.9, 3).condensed.flex[0]) == 0
+    assert lean.route == "NumPy Newton, iterations"
+    assert min(lean.states[name] for name in ("stick", "slip", "lift")) > 0
+    monkeypatch.setattr(policy, "DENSE_UNKNOWNS", 10**6)
+    monkeypatch.setattr(policy, "SHARED_FLEXIBILITY_DOFS", 10**6)
+    dense = solve(replace(hundred_nodes), 0.9, 3, 88)
+    assert dense.route == "NumPy Newton, dense LU"
+    np.testing.assert_allclose(lean.w, dense.w, rtol=0, atol=1e-8 * abs(dense.w).max())
+    np.testing.assert_allclose(lean.probe, dense.probe, rtol=0, atol=1e-8 * abs(dense.probe).max())
+
+
+@pytest.mark.parametrize("blocks", [False, True])
+def test_gmres_takes_both_forms_of_the_flexibility(monkeypatch, hundred_nodes, blocks):
+    """Its products and harmonic blocks by modes are those of the matrices."""
+    from bladefem.hbm.solver import newton_krylov as iterative
+
+    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
+    balance = Balance(hundred_nodes, condense(hundred_nodes, 0.9, 3), 88)
+    state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
+    n, d, K = state.w.shape
+    change = state.forces.jacobian.reshape(n, d * K, d * K).copy()
+    change[:, np.arange(d * K), np.arange(d * K)] -= np.repeat(balance.model.springs, K, axis=1)
+    right = state.residual.reshape(n * d, K)
+    flex = balance.linear.condensed.flex
+    one, other = (
+        iterative_inverse(form, change, iterative.Memory(slow=blocks))(right, 1e-8)
+        for form in (flex, by_harmonic(balance.linear.A))
+    )
+    np.testing.assert_allclose(one, other, rtol=0, atol=1e-6 * abs(other).max())
+
+
+def test_the_adjoint_of_the_second_form_is_the_transposed_inverse(hundred_nodes):
+    balance = Balance(hundred_nodes, condense(hundred_nodes, 0.9, 3), 88)
+    state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
+    x, y = np.random.default_rng(1).normal(size=(2, *state.w.shape))
+    step = linearise_balance(balance, state)(x, 1e-10)
+    back = adjoint_inverse(balance, state)(y, 1e-10)
+    assert np.vdot(y, step) == pytest.approx(np.vdot(back, x), rel=1e-6)
 
 
 def test_blocks_serve_a_whole_newton_run(monkeypatch):

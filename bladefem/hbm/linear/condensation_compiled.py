@@ -66,7 +66,7 @@ def linear_part(omega, bodies, springs, H):
     motion = _real_coefficients(stuck)
     scale, least = motion_scale(still, motion, bodies.compression)
     condensed = Condensed(
-        flex, G, motion, springs, scale, least, contact, residual, D, bodies.motions
+        flex, G, motion, springs, scale, least, contact, residual, bodies.rest, D, bodies.motions
     )
     return (D, full), condensed, free, stuck
 
@@ -95,6 +95,8 @@ def _receptance(bodies, D, full, h, G):
     """Fill G (m, m) = R + C D C^H of harmonic h > 0."""
     shapes = bodies.contact[min(h, bodies.contact.shape[0] - 1)]
     residual = bodies.residual[min(h, bodies.residual.shape[0] - 1)]
+    # the same for all harmonics, where that is
+    rest = bodies.rest
     m = G.shape[0]
     real = _real_part(shapes)
     if full.shape[0] == 0 and real.shape[0]:
@@ -104,13 +106,15 @@ def _receptance(bodies, D, full, h, G):
         loss = np.dot(real * D[h].imag, across)
         for i in range(m):
             for j in range(m):
-                G[i, j] = residual[i, j] + complex(stiff[i, j], loss[i, j])
+                own = complex(rest[i, j]) if rest.shape[0] else residual[i, j]
+                G[i, j] = own + complex(stiff[i, j], loss[i, j])
         return
     left = np.dot(shapes, full[h]) if full.shape[0] else shapes * D[h]
     moved = np.dot(left, np.ascontiguousarray(shapes.conj().T))
     for i in range(m):
         for j in range(m):
-            G[i, j] = residual[i, j] + moved[i, j]
+            own = complex(rest[i, j]) if rest.shape[0] else residual[i, j]
+            G[i, j] = own + moved[i, j]
 
 
 @njit(**INNER_KERNEL)

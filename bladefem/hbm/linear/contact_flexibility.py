@@ -198,17 +198,23 @@ def seen_by(flex, Z):
 
 
 @njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
-def apply_modes(C, R, D, x, out):
+def apply_modes(C, R, rest, D, x, out):
     """out (m, K) += (R + C D C^H) x for x (m, K) but for the mean, from C (S, m, M), R (S', m, m)
-    and D (H+1, M).
+    and D (H+1, M); R = rest (m, m) real for all harmonics where that is not empty.
     """
     m = x.shape[0]
+    shared = rest.shape[0] > 0
+    if shared:
+        moved_rest = np.dot(rest, x)
+        for i in range(m):
+            for k in range(1, x.shape[1]):
+                out[i, k] += moved_rest[i, k]
     M = C.shape[2]
     along = np.ascontiguousarray(x.T)
     q = np.empty(M, np.complex128)
     for h in range(1, D.shape[0]):
         shapes = C[min(h, C.shape[0] - 1)]
-        rest = R[min(h, R.shape[0] - 1)]
+        own = R[min(h, R.shape[0] - 1)]
         c = 2 * h - 1
         s = 2 * h
         q[:] = 0.0
@@ -221,7 +227,8 @@ def apply_modes(C, R, D, x, out):
             moved = 0.0j
             for k in range(M):
                 moved += shapes[i, k] * q[k]
-            for j in range(m):
-                moved += rest[i, j] * complex(along[c, j], -along[s, j])
+            if not shared:
+                for j in range(m):
+                    moved += own[i, j] * complex(along[c, j], -along[s, j])
             out[i, c] += moved.real
             out[i, s] -= moved.imag

@@ -36,7 +36,8 @@ class Bodies(NamedTuple):
     coupled: np.ndarray
     # (S, m, M) shapes, the damper's reversed
     contact: np.ndarray
-    # (S, m, m)
+    # (S, m, m); (1, 0, 0) in the second form of `bladefem.hbm.linear.contact_flexibility`, where
+    # `rest` has it
     residual: np.ndarray
     # (S, p, M) shapes
     probe: np.ndarray
@@ -49,7 +50,7 @@ class Bodies(NamedTuple):
     # (H+1, p) the same of the probes
     straight: np.ndarray
     # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.frequency_independent_parts`;
-    # empty where there are too many modes for it
+    # empty where there are too many modes for it; A (1, 0, 0) in the second form, where R has it
     A: np.ndarray
     U: np.ndarray
     UH: np.ndarray
@@ -58,8 +59,9 @@ class Bodies(NamedTuple):
     stuck: np.ndarray
     # (H+1, M) what pushes the modes then
     sprung: np.ndarray
-    # (m, m) and shared (m, M) of the second form of `bladefem.hbm.linear.contact_flexibility`,
-    # real; empty in the first
+    # residual flexibility without springs (m, m), R (m, m) and U (m, M) of the second form, real;
+    # empty in the first
+    rest: np.ndarray
     R: np.ndarray
     shared: np.ndarray
     # (m, q) common motions of `bladefem.hbm.solver.deflation`, real
@@ -98,11 +100,18 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
     residual = reduce(np.add, [b.residual[:, b.contact, b.contact] for b in bodies])
     spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
     push, direct, straight = _excitation(blades, model.loads(H), spare)
+    mean = _mean_parts(model, blades, (own[0], contact[0], residual[0]), (push[0], direct[0]))
     fixed = (
         frequency_independent_parts(residual, contact, springs)
         if policy.updates_by_modes(dofs, contact.shape[2])
         else (np.zeros((0, 0, 0)),) * 4
     )
+    excited = _excited_modes(fixed, springs, push, direct)
+    one = _one_for_all(fixed, residual, dofs)
+    if len(one[0]):
+        # not kept twice
+        unused = np.zeros((1, 0, 0))
+        residual, fixed = unused, (unused, *fixed[1:])
     parts = [
         contact,
         residual,
@@ -112,19 +121,8 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
         direct,
         straight,
         *fixed,
-        *_excited_modes(fixed, springs, push, direct),
+        *excited,
     ]
-    B, g, rigid = model.once("rigid motions", lambda: unheld_mean_motions(model, springs))
-    still = np.flatnonzero(blades.omega[0] == 0)
-    mean = _mean_flexibility(
-        (own[0], contact[0], residual[0]), (push[0], direct[0]), (springs, B, g)
-    )
-    # the mean displacements have no part in the balance
-    if not model.coupled:
-        mean = tuple(np.zeros_like(part) for part in mean)
-        B = B[:, :0]
-        g = g[:0]
-        rigid = rigid[:, :0]
     return Bodies._make(
         [
             own,
@@ -132,16 +130,34 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
             hysteretic,
             _coupled_damping(bodies, own.shape[1]),
             *(np.ascontiguousarray(part, dtype=complex) for part in parts),
-            *_one_for_all(fixed, dofs),
+            *one,
             common_motions(model, H),
             *mean,
-            np.ascontiguousarray(B),
-            g,
-            np.ascontiguousarray(rigid[: len(still)]),
-            still,
             model.compression,
         ]
     )
+
+
+def _mean_parts(
+    model: ReducedModel,
+    blades: Stack,
+    body: tuple[np.ndarray, ...],
+    pushed: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, ...]:
+    """mean_A, mean_stuck, mean_G, B, g, rigid and still of `Bodies`, from frequencies, shapes and
+    residual flexibility of harmonic 0 and what the excitation does there.
+    """
+    springs = model.springs.ravel()
+    B, g, rigid = model.once("rigid motions", lambda: unheld_mean_motions(model, springs))
+    still = np.flatnonzero(blades.omega[0] == 0)
+    mean = _mean_flexibility(body, pushed, (springs, B, g))
+    # the mean displacements have no part in the balance
+    if not model.coupled:
+        mean = tuple(np.zeros_like(part) for part in mean)
+        B = B[:, :0]
+        g = g[:0]
+        rigid = rigid[:, :0]
+    return *mean, np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[: len(still)]), still
 
 
 def _excitation(
@@ -190,12 +206,16 @@ def _mean_flexibility(
     return np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
 
 
-def _one_for_all(fixed: tuple[np.ndarray, ...], dofs: int) -> tuple[np.ndarray, np.ndarray]:
-    """R (m, m) and U (m, M) of `flex`; empty where it takes its first form."""
+def _one_for_all(
+    fixed: tuple[np.ndarray, ...], residual: np.ndarray, dofs: int
+) -> tuple[np.ndarray, ...]:
+    """Residual flexibility (m, m) without springs, R (m, m) and U (m, M) of `flex`; empty where it
+    takes its first form.
+    """
     A, U = fixed[:2]
     if dofs < policy.SHARED_FLEXIBILITY_DOFS or len(U) != 1 or np.iscomplexobj(A) or np.any(U.imag):
-        return np.zeros((0, 0)), np.zeros((0, 0))
-    return np.ascontiguousarray(A[0]), np.ascontiguousarray(U[0].real)
+        return (np.zeros((0, 0)),) * 3
+    return tuple(np.ascontiguousarray(part[0].real) for part in (residual, A, U))
 
 
 def _excited_modes(
@@ -210,9 +230,21 @@ def _excited_modes(
     A, _, UH, _ = fixed
     if not len(A):
         return np.zeros((0, 0)), np.zeros((0, 0))
-    at = np.minimum(np.arange(len(push)), len(A) - 1)
-    sprung = (springs * direct)[:, :, None]
-    return direct - (A[at] @ sprung)[:, :, 0], push - (UH[at] @ sprung)[:, :, 0]
+    sprung = springs * direct
+    return direct - _each_harmonic(A, sprung), push - _each_harmonic(UH, sprung)
+
+
+def _each_harmonic(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """(H+1, a) products of matrices (S, a, m) and complex vectors (H+1, m); no matrix is copied."""
+    at = np.minimum(np.arange(len(vectors)), len(matrices) - 1)
+    if np.iscomplexobj(matrices):
+        return np.array([matrices[s] @ vector for s, vector in zip(at, vectors, strict=True)])
+    return np.array(
+        [
+            matrices[s] @ vector.real + 1j * (matrices[s] @ vector.imag)
+            for s, vector in zip(at, vectors, strict=True)
+        ]
+    )
 
 
 def _with_reversed_shapes(body: Stack) -> Stack:

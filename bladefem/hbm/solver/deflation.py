@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from scipy import linalg
 
 from ...util.numba_options import INNER_KERNEL, KERNEL
 from ..linear.array_copy import copy_vector
@@ -57,11 +58,21 @@ def _softest_motions(model: ReducedModel, harmonics: int) -> np.ndarray:
         for shapes, omega in zip(body.shapes[:, body.contact], body.omega, strict=True)
     ]
     soft = np.concatenate([part for mode in modes for part in (mode.real, mode.imag)], axis=1)
-    compliances, motions = np.linalg.eigh(soft @ soft.T)
-    kept = compliances >= SMALLEST_COMPLIANCE_ROOT**2 * compliances[-1]
-    return np.ascontiguousarray(
-        motions[:, kept][:, : -min(MOST_COMMON_MOTIONS, len(soft) // DOFS_PER_MOTION) - 1 : -1]
-    )
+    return _leading_directions(soft, min(MOST_COMMON_MOTIONS, len(soft) // DOFS_PER_MOTION))
+
+
+def _leading_directions(soft: np.ndarray, most: int) -> np.ndarray:
+    """(m, q) left singular vectors of soft (m, k) with the largest singular values, by the smaller
+    one of its two Gram matrices: with few modes a system of m would take longer than many points.
+    """
+    if most < 1 or not np.any(soft):
+        return np.zeros((len(soft), 0))
+    wide = soft.shape[1] > len(soft)
+    gram = soft @ soft.T if wide else soft.T @ soft
+    squares, vectors = linalg.eigh(gram, subset_by_index=[max(0, len(gram) - most), len(gram) - 1])
+    kept = squares >= SMALLEST_COMPLIANCE_ROOT**2 * squares[-1]
+    leading = vectors if wide else soft @ (vectors / np.sqrt(np.where(kept, squares, 1.0)))
+    return np.ascontiguousarray(leading[:, kept][:, ::-1])
 
 
 @njit(**KERNEL)

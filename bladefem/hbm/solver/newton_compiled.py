@@ -67,9 +67,11 @@ class Condensed(NamedTuple):
     # size of the linear motion, and the least size that a motion is measured by [m]
     scale: float
     least: float
-    # (S, m, M), residual (S, m, m) and modal (H+1, M): these give G by `apply_modes`; or empty
+    # (S, m, M), residual (S, m, m), or rest (m, m) real for all harmonics, and modal (H+1, M):
+    # these give G by `apply_modes`; or empty
     shapes: np.ndarray
     residual: np.ndarray
+    rest: np.ndarray
     modal: np.ndarray
     # (m, q) that the contacts have in common, see `bladefem.hbm.solver.deflation`
     motions: np.ndarray
@@ -136,7 +138,7 @@ def balance_residual(w, linear, preload, F, p, r):
     if 2 * G.shape[0] - 1 == K:
         apply_matrices(G, sprung, bare)
     else:
-        apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
+        apply_modes(linear.shapes, linear.residual, linear.rest, linear.modal, sprung, bare)
     return max(
         frobenius_norm(r) / max(frobenius_norm(w), linear.least),
         frobenius_norm(bare) / linear.scale,
