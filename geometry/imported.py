@@ -12,7 +12,7 @@ which leaves their pair without matched nodes; those of other models must match.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -23,6 +23,7 @@ from scipy.spatial import cKDTree
 from bladefem.errors import InputError, suggestion
 from bladefem.util.arrays import IntegerArray
 
+from .face_distance import distance_to_face
 from .finalise_mesh import Motion
 from .jacobian import straight_jacobian
 from .joined_files import joined_files
@@ -40,6 +41,8 @@ from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary_facets, outwa
 
 # files carry few digits; a match within this share of the face is a match, and is then snapped
 MATCH_TOLERANCE = 1e-4
+# cut faces whose nodes differ: gap between the surfaces, which a curved face and its facets leave
+CUT_GAP = 1e-3
 # cosine between outward normals of two faces that look at each other
 OPPOSITE_COSINE = -0.98
 # of a model [m]: beyond these its unit was taken for another
@@ -62,8 +65,8 @@ def read_geometry(
     """The mesh of a scene's [imported] table: STEP files are meshed, mesh files are read.
 
     Args:
-        imported: has file, more, scale, sectors, axis, names, linear, tolerance, seats and
-            seat_width.
+        imported: has file, more, scale, sectors, axis, names, linear, tolerance, cut_gap, seats
+            and seat_width.
         wedge: the damper to draw between the faces ``seats`` of a STEP file, where they are named.
 
     Raises:
@@ -94,6 +97,7 @@ def read_geometry(
         imported.linear,
         imported.tolerance,
         imported.more or (),
+        imported.cut_gap,
     )
 
 
@@ -106,6 +110,7 @@ def read_mesh(
     linear: str = "refuse",
     tolerance: float = MATCH_TOLERANCE,
     more: Iterable[str] = (),
+    cut_gap: float = CUT_GAP,
 ) -> Mesh:
     """Mesh from .msh, .med, .unv, .inp, .bdf, .nas, .vtu or .cdb.
 
@@ -118,6 +123,7 @@ def read_mesh(
         linear: what becomes of first-order solids, see solid_cells.py.
         tolerance: largest distance of matched nodes, as a share of the face's size.
         more: other files of the same model, "path" or "damper = path", see joined_files.py.
+        cut_gap: largest gap between cut faces whose nodes differ, as a share of the face's size.
 
     Raises:
         InputError: as `read_geometry`.
@@ -135,6 +141,7 @@ def read_mesh(
         linear,
         tolerance,
         frozenset(wanted),
+        cut_gap,
     )
 
 
@@ -161,6 +168,7 @@ def mesh_of_raw(
     linear: str = "keep",
     tolerance: float = MATCH_TOLERANCE,
     wanted: frozenset[str] = frozenset(),
+    cut_gap: float = CUT_GAP,
 ) -> Mesh:
     """Names, axes, directions and pairs on what a file holds.
 
@@ -177,12 +185,12 @@ def mesh_of_raw(
             "factor from the file's unit to metres (0.001 for millimetres)"
         )
     mesh = _with_faces(mesh, raw, wanted)
-    mesh = _find_pairs(mesh, sectors, source, tolerance)
+    mesh = _find_pairs(mesh, sectors, source, tolerance, cut_gap)
     points, straightened = straighten_cells(
         replace(mesh, points=snap_slaves(mesh.points, mesh.pairs))
     )
     mesh = replace(mesh, points=points)
-    words = {"source": source, "notes": (*raw.notes, *solids.notes)}
+    words = {"source": source, "notes": (*raw.notes, *solids.notes, *_tie_notes(mesh))}
     return replace(mesh, report={**quality_report(mesh, straightened, _edge_length(mesh)), **words})
 
 
@@ -338,6 +346,7 @@ def _find_pairs(
     sectors: int,
     source: str,
     tolerance: float,
+    cut_gap: float,
 ) -> Mesh:
     """Cyclic and contact pairs, as far as the names are there."""
     on = turn_about_axis(2 * np.pi / sectors) if sectors else np.eye(3)
@@ -349,7 +358,7 @@ def _find_pairs(
                     f"imported.file = '{source}': no face group '{name}', needed with "
                     f"imported.sectors = {sectors}{suggestion(name, mesh.faces)}"
                 )
-        mesh, pairs["cyclic"] = _cyclic_pair(mesh, on, tolerance)
+        mesh, pairs["cyclic"] = _cyclic_pair(mesh, on, tolerance, cut_gap)
         mesh = replace(mesh, points=_centre_sector(mesh))
     shift = _row_pitch(mesh) if not sectors else np.zeros(3)
     motions: dict[str, Motion] = {
@@ -442,36 +451,64 @@ def _cyclic_pair(
     mesh: Mesh,
     on: np.ndarray,
     tolerance: float,
+    cut_gap: float,
 ) -> tuple[Mesh, Pair]:
-    """The cyclic pair; the names are swapped when the file has them the other way round."""
+    """The cyclic pair; the names are swapped when the file has them the other way round. Without
+    matched nodes where they differ, but the faces lie on each other.
+
+    Raises:
+        InputError: neither.
+    """
     names = ("cyclic_low", "cyclic_high")
-    try:
-        return mesh, match_faces(
-            mesh.points,
-            mesh.faces,
-            names,
-            mesh.dimension,
-            on,
-            None,
-            tolerance,
-        )
-    except InputError as first:
-        swapped = replace(
-            mesh,
-            faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]},
-        )
+    swapped = replace(
+        mesh,
+        faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]},
+    )
+    errors = []
+    for some in (mesh, swapped):
         try:
-            return swapped, match_faces(
-                mesh.points,
-                swapped.faces,
-                names,
-                mesh.dimension,
-                on,
-                None,
-                tolerance,
-            )
-        except InputError:
-            raise first from None
+            found = match_faces(some.points, some.faces, names, mesh.dimension, on, None, tolerance)
+            return some, found
+        except InputError as error:
+            errors.append(error)
+    gaps = [_largest_gap(some, names, on) for some in (mesh, swapped)]
+    best = int(np.argmin(gaps))
+    if gaps[best] > cut_gap:
+        hint = "" if np.isinf(gaps[best]) else f"; their surfaces are {gaps[best]:.2g} of it apart"
+        raise InputError(
+            f"{errors[0]}, or faces within imported.cut_gap = {cut_gap:g} of their size, which a "
+            f"mortar ties{hint}"
+        )
+    return (mesh, swapped)[best], Pair(*names, np.zeros((2, 0), dtype=int), on, np.zeros(3))
+
+
+def _largest_gap(
+    mesh: Mesh,
+    names: tuple[str, str],
+    on: np.ndarray,
+) -> float:
+    """Largest distance of a node of one cut face from the other face, as a share of its size."""
+    if mesh.dimension == 2:
+        return np.inf
+    low, high = (mesh.faces[name] for name in names)
+    if np.intersect1d(low, high).size:
+        return np.inf
+    back = mesh.points @ on
+    nodes = np.unique(low), np.unique(high)
+    size = np.ptp(mesh.points[nodes[0]], axis=0).max()
+    there = distance_to_face(back[nodes[1]], mesh.points, low)
+    here = distance_to_face(mesh.points[nodes[0]], back, high)
+    return float(max(there.max(), here.max()) / size)
+
+
+def _tie_notes(mesh: Mesh) -> Iterator[str]:
+    """What the user has to know of cut faces that do not match."""
+    if "cyclic" in mesh.pairs and not mesh.pairs["cyclic"].nodes.size:
+        low, high = (len(np.unique(mesh.faces[name])) for name in ("cyclic_low", "cyclic_high"))
+        yield (
+            f"the nodes of the cut faces do not match ({low} and {high}): they are tied in the "
+            "mean by a mortar, which costs accuracy as coarser elements there would"
+        )
 
 
 def _centre_sector(mesh: Mesh) -> np.ndarray:

@@ -490,6 +490,14 @@ class Imported:
     tolerance: float = quantity(
         1e-4, "1", 1e-9, 0.05, "largest distance of matched nodes, as a share of the face's size"
     )
+    cut_gap: float = quantity(
+        1e-3,
+        "1",
+        0.0,
+        0.05,
+        "largest gap between cut faces whose nodes do not match, as a share of the face's size; "
+        "within it a mortar ties them",
+    )
     more: tuple[str, ...] | None = quantity(
         None, help="other files of the same model, such as 'damper = damper.inp'"
     )

@@ -13,9 +13,13 @@ from writers import write_cdb, write_inp, write_step
 from bladefem.contact.resultants import resultant
 from bladefem.contact.seating import solve_mesh_seating
 from bladefem.errors import InputError
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import body_volume
-from bladefem.scene.tables import Materials
+from bladefem.fem.modes import modes
+from bladefem.scene.tables import Material, Materials
 from geometry.export import write_msh
+from geometry.face_distance import distance_to_face
 from geometry.imported import read_mesh
 from geometry.parameters import Disc, MeshSize, Plane
 from geometry.plane import plane_blades
@@ -307,3 +311,38 @@ def test_nastran_with_faces_as_shells(tmp_path):
         set(found.parts) == {"pid_1"} and found.faces["pid_7"].shape == block.faces["clamp"].shape
     )
     assert body_volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)
+
+
+def test_cut_faces_with_other_nodes_are_tied(tmp_path):
+    """Nodes that slide in the plane of one cut face, written and read again: a pair without nodes,
+    a note, and frequencies as near to the matching mesh's as its error; the names may be swapped.
+    """
+    found = {}
+    for slide in (0.0, 0.15):
+        mesh = sector(9, (6, 3, 2), "tetra10", slide=slide, straight=True)
+        write_msh(mesh, tmp_path / "a.msh")
+        found[slide] = read_mesh(tmp_path / "a.msh", sectors=9)
+    tied = found[0.15]
+    assert tied.pairs["cyclic"].nodes.shape == (2, 0)
+    assert "tied in the mean by a mortar" in tied.report["notes"][-1]
+    assert not found[0.0].report["notes"]
+    ours, theirs = (
+        modes(constrain(assemble(some, "blade", Material()), "clamp", 2), 4).frequencies
+        for some in (tied, found[0.0])
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=0.02)
+    swap = {"cyclic_low": tied.faces["cyclic_high"], "cyclic_high": tied.faces["cyclic_low"]}
+    write_msh(replace(tied, faces={**tied.faces, **swap}), tmp_path / "b.msh")
+    again = read_mesh(tmp_path / "b.msh", sectors=9)
+    assert set(np.unique(again.faces["cyclic_low"])) == set(np.unique(tied.faces["cyclic_low"]))
+    with pytest.raises(InputError, match=r"imported\.cut_gap = 0\.001.*apart"):
+        read_mesh(tmp_path / "a.msh", sectors=10)
+
+
+def test_distance_from_a_face():
+    """Above the middle, beyond an edge and beyond a corner of a square of two triangles."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    places = np.array([[0.5, 0.4, 0.2], [0.5, -0.3, 0.4], [-0.3, -0.4, 0.0], [0.2, 0.9, -0.1]])
+    for facets in (np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 1, 2, 3]])):
+        found = distance_to_face(places, points, facets)
+        np.testing.assert_allclose(found, [0.2, 0.5, 0.5, 0.1], atol=1e-14)
