@@ -43,9 +43,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "contact"))
 import test_hertz as cases
 from blocks import clamped, compliances, facing_blocks, flexibility, graded, stiffness
 
-from bladefem.contact import mortar, surface
+from bladefem.contact import mortar
 from bladefem.contact.complementarity import solve_lcp
 from bladefem.contact.patch import make_patch
+from bladefem.fem import surface
 from bladefem.fem.face_elements import LINEAR, traction_shape
 
 ONE_BODY = ((2.1e11, None), (0.3, 0.0))

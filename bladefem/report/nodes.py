@@ -15,7 +15,7 @@ from ..study.pipeline.case_models import load_cases
 from ..study.pipeline.contact_cycle import ContactCycle, contact_cycle
 from ..study.pipeline.run_records import SolvedRun
 from ..view.contact import save_faces_vtu
-from ..view.response import draw_seat_loops
+from ..view.hysteresis import draw_seat_loops
 from ..view.wear import draw_work
 from .linear import linear_columns
 

@@ -22,7 +22,7 @@ from ..io.stage_cache import read_results
 from ..io.stored_stage import stored_stage
 from ..scene.tables import Scene
 from ..scene.toml import load_scene
-from ..view import contact, modes, response
+from ..view import contact, hysteresis, modes, response
 from .tables import COLUMNS
 
 if TYPE_CHECKING:
@@ -332,4 +332,4 @@ def _draw_loops(data: xr.Dataset, file: str | Path | None = None) -> object:
             )
             for seat in data["seat"].to_numpy()
         }
-    return response.draw_seat_loops(cases, file)
+    return hysteresis.draw_seat_loops(cases, file)

@@ -41,7 +41,7 @@ from ..util.arrays import ComplexArray
 from ..util.communicator import Communicator
 from ..util.message import method, warning
 from ..util.progress import Progress, without_progress
-from ..view import mesh, modes, response, speed
+from ..view import mesh, modes, optimum, response, speed
 from ..view.influence import draw_influences
 from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
 from ..view.live_shapes import live_motion, live_shapes
@@ -544,7 +544,7 @@ def _drawings(
             name: partial(response.draw_responses, points, title=_title(result.scene))
             for name, points in _by_mass(tables["response/points"])
         },
-        "response/optimum": lambda file: response.draw_optimum(
+        "response/optimum": lambda file: optimum.draw_optimum(
             tables["response/summary"],
             file,
             points=tables["response/points"],

@@ -9,8 +9,8 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 
+from .accuracy import draw_accuracy
 from .labels import names_apart
-from .response import draw_accuracy
 from .style import canvas, log_axis
 
 ERROR_LABELS = {

@@ -14,7 +14,7 @@ from bladefem.report.linear import harmonic_table, linear_sentence
 from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu, wear_sentence, wear_table
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.contact_cycle import contact_cycle
-from bladefem.view.response import loop_energy
+from bladefem.view.hysteresis import loop_energy
 
 KT, MU, N = 2e6, 0.3, 10.0
 

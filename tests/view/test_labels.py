@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from bladefem.view.response import draw_accuracy
+from bladefem.view.accuracy import draw_accuracy
 from verification.paper.view_outcomes import _round_ticks
 
 

@@ -9,6 +9,7 @@ import synthetic
 from matplotlib.image import imread
 
 from bladefem.contact.resultants import resultant
+from bladefem.view.accuracy import draw_accuracy, pareto_front
 from bladefem.view.contact import (
     draw_pressure,
     pressure_points,
@@ -16,6 +17,7 @@ from bladefem.view.contact import (
     save_pressure_vtu,
     unfold,
 )
+from bladefem.view.hysteresis import draw_loops, draw_seat_loops, loop_energy
 from bladefem.view.live_shapes import live_motion
 from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, pyvista_grid, save_vtu
 from bladefem.view.modes import (
@@ -28,16 +30,8 @@ from bladefem.view.modes import (
     save_modes_vtu,
 )
 from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
-from bladefem.view.response import (
-    draw_accuracy,
-    draw_loops,
-    draw_optimum,
-    draw_responses,
-    draw_seat_loops,
-    loop_energy,
-    pareto_front,
-    smooth_curve,
-)
+from bladefem.view.optimum import draw_optimum
+from bladefem.view.response import draw_responses, smooth_curve
 from bladefem.view.skin import skin, wheel_skin
 
 

@@ -4,8 +4,8 @@ frequency.
 With G = R + L D L^H, where R are the residual flexibilities, L the modes of both bodies at the
 contact and D their inverse modal impedances, the flexibility with springs K is
 
-    (1 + G K)^-1 G = A + U T U^H,    A = (1 + R K)^-1 R,    U = (1 + R K)^-1 L,    T = (1 + D N)^-1
-    D,    N = L^H K U
+    (1 + G K)^-1 G = A + U T U^H,    A = (1 + R K)^-1 R,    U = (1 + R K)^-1 L,
+    T = (1 + D N)^-1 D,              N = L^H K U
 
 (Sherman, Morrison and Woodbury). Only T, as large as the number of modes, changes with the
 frequency: a point costs m^2 k operations for m contact degrees of freedom and k modes, where
