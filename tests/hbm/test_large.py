@@ -23,7 +23,7 @@ from bladefem.hbm.solver.residual import (
     linearise_balance,
     start_in_stick,
 )
-from bladefem.reduction.truncate import truncated
+from bladefem.reduction.truncate import truncate_modes
 
 
 def test_iterative_and_dense_steps_agree(monkeypatch):
@@ -114,7 +114,7 @@ def test_a_patch_with_lift_off_is_solved_and_balances_its_work():
 def hundred_nodes():
     """100 nodes in space on 60 modes and the residual flexibility of the others."""
     whole = patch(side=10).model
-    return replace(whole, sides=(truncated(whole.sides[0], 60),))
+    return replace(whole, sides=(truncate_modes(whole.sides[0], 60),))
 
 
 def test_a_hundred_nodes_are_solved_as_by_the_dense_jacobian(monkeypatch, hundred_nodes):
