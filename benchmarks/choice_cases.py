@@ -94,7 +94,8 @@ def beam_cases() -> Iterator[Case]:
 
 
 def random_body(seed: int, nodes: int, modes: int = 24) -> ReducedModel:
-    """A blade of random modes with two patches of 3-D contacts and a rigid wedge of six freedoms.
+    """A blade of random modes with two patches of 3-D contacts and a rigid wedge of six degrees of
+    freedom.
 
     Mode shapes are smooth over the patches, as those of a platform are: a rigid motion of the
     patch, and a little more.

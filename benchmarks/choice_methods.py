@@ -48,7 +48,7 @@ Run = Callable[[object, float, object], Point]
 
 
 def ways(case: Case) -> dict[str, list[Run]]:
-    """Methods that take a case, each from cheap to dear."""
+    """Methods that take a case, each from cheap to expensive."""
     if case.model.elements.tangents > 1:
         return {}
     found = {"exact events": [sampled_balance(H, 0) for H in HARMONICS]}

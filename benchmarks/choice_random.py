@@ -65,7 +65,7 @@ def main(first: int, last: int, accuracy: float) -> None:
         family = Family(lambda _, m=model, n=nodes: Member(m, n), len(model.sides[0].omega))
         start = replace(first_for(10), points=None, chosen=("harmonics", "samples"))
         hertz = case.band[0] / (2 * np.pi), case.band[1] / (2 * np.pi)
-        rich, dear = timed(lambda: list(bf.sweep(model, case.band, HARMONICS, SAMPLES)))  # noqa: B023
+        rich, expensive = timed(lambda: list(bf.sweep(model, case.band, HARMONICS, SAMPLES)))  # noqa: B023
         try:
             found, cheap = timed(lambda: resonance_curve(family, start, hertz, 1, accuracy))  # noqa: B023
         except NotSolvedError as error:
@@ -77,18 +77,18 @@ def main(first: int, last: int, accuracy: float) -> None:
             # the choice follows a peak beyond the band
             outside.append(seed)
             continue
-        spent += cheap, dear
-        ratios.append(cheap / dear)
+        spent += cheap, expensive
+        ratios.append(cheap / expensive)
         truth = closed_in(model, peak_of(rich))
         error = abs(bf.size(peak_of(found.points)) / truth - 1)
         told = found.settings.error
         bad = error > accuracy and (told is None or told <= accuracy)
         wrong += [seed] * bad
         unsure += [seed] * (told is not None and told < error / 2 and error > 1e-4)
-        if bad or cheap > 1.1 * dear:
+        if bad or cheap > 1.1 * expensive:
             print(
                 f"seed {seed}, {case.name}: error {error:.2%}, estimated {told:.2%}, "
-                f"H {found.settings.harmonics}, CPU {cheap:.3f} s against {dear:.3f} s",
+                f"H {found.settings.harmonics}, CPU {cheap:.3f} s against {expensive:.3f} s",
                 flush=True,
             )
     slower = sum(r > 1.1 for r in ratios)

@@ -89,7 +89,7 @@ def main(source: str, target: str) -> None:
     probe = edf[(edf.node_num == load // d) & (edf.dof_num == load % d)]
     cosine = probe[(probe.harm == 1) & (probe.cs == "c")].index[0]
     sine = probe[(probe.harm == 1) & (probe.cs == "s")].index[0]
-    # its automatic derivative of |x| is not a number at rest: start beside it
+    # its automatic derivative of |x| is not a number at rest: start next to it
     rest = 1e-4 * np.random.default_rng(0).normal(size=len(edf) + 1)
     x = rest.copy()
     amplitude, converged, seconds = [], [], []

@@ -1,5 +1,5 @@
 """Random loading histories against the interval of a resonance, on a coarse wedge scene; and what
-the interval costs beside the plain curve.
+the interval costs in addition to the plain curve.
 
     python benchmarks/history_interval.py [histories]
 

@@ -155,7 +155,7 @@ for load in (200.0,) if coarse else (20.0, 200.0):
 # %% [markdown]
 # ## Does the damper's normal motion matter?
 #
-# The paper leaves it out (Fig. 13). With springs along the normal and three freedoms of the rigid damper:
+# The paper leaves it out (Fig. 13). With springs along the normal and three degrees of freedom of the rigid damper:
 
 # %%
 for kt, scene in list(scenes.items())[: 1 if coarse else 2]:

@@ -6,7 +6,7 @@
 #
 # $$ m\ddot x = \sum_i f_{ix}, \quad m\ddot y = \sum_i f_{iy}, \quad I\ddot\theta = \sum_i (x_i f_{iy} - y_i f_{ix}), $$
 #
-# with $|f_i| \le \mu N_i(t)$ at each of 40 points. Sizes, motion and loads stand in `scenes/zmass.toml`; the plate has
+# with $|f_i| \le \mu N_i(t)$ at each of 40 points. Sizes, motion and loads are in `scenes/zmass.toml`; the plate has
 # the mass and the moment of inertia of Table 1.
 
 # %%

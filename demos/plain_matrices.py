@@ -13,7 +13,7 @@ from bladefem import balance as bf
 
 M = np.diag([1.0, 1.0])  # [kg]
 K = np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]])  # [N/m]
-ports = {"contact": [0], "load": [0, 1], "probe": [0, 1]}  # numbers of freedoms
+ports = {"contact": [0], "load": [0, 1], "probe": [0, 1]}  # numbers of degrees of freedom
 body = bf.body_from_matrices(M, K, ports, C=4e-6 * K)
 element = bf.Elements(kt=[1e6], kn=[0.0], mu=[0.4], n0=[10.0], tangents=1)
 force = {

@@ -1,5 +1,5 @@
 # %% [markdown]
-# # One sector stands for the wheel: modes by nodal diameter
+# # One sector represents the wheel: modes by nodal diameter
 #
 # In a tuned wheel of $N$ blades every mode has a nodal diameter $n$: the next blade moves as this one does, turned by
 # $2\pi/N$ and shifted in phase by $n\,2\pi/N$. One sector with

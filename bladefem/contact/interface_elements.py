@@ -102,7 +102,7 @@ def scaled_contact(
     """[contact] with the tangential and the normal stiffness of all seats times factors.
 
     What follows from the other stiffness by ``ratio`` = k_t / k_n is written out first, so that
-    one changes without the other. The layer of rough faces stays: it hangs on their roughness
+    one changes without the other. The layer of rough faces stays: it depends on their roughness
     (``rougher_contact``).
     """
     followed = {

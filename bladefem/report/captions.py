@@ -34,7 +34,7 @@ CAPTIONS = {
     "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
     "response/best_load": "The load that makes the resonance smallest, by exact search; every load "
     "of the range in the last columns was open to it.",
-    "response/influences": "What the best load hangs on: each parameter over its range, by exact "
+    "response/influences": "What the best load depends on: each parameter over its range, by exact "
     "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
     "response/local_resonances": "Every local maximum of each response: motions found at its "
     "frequency, and by which slow sweep it is reached (isolated: by neither).",

@@ -1,4 +1,4 @@
-"""Tables of what the best load hangs on."""
+"""Tables of what the best load depends on."""
 
 from __future__ import annotations
 

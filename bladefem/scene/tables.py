@@ -264,8 +264,8 @@ class Study:
     )
     influences: bool = quantity(
         True,
-        help="also what the best load hangs on: contact stiffness, friction, damping, and friction "
-        "while seating, each over its range",
+        help="also what the best load depends on: contact stiffness, friction, damping, and "
+        "friction while seating, each over its range",
     )
     interval: bool = quantity(
         False,

@@ -1,4 +1,4 @@
-"""What the best load hangs on: how it, its amplitude and its frequency change with what is known
+"""What the best load depends on: how it, its amplitude and its frequency change with what is known
 least.
 
 With A(L, p) the height of the resonance under load L with a parameter p, both as logarithms, the
@@ -102,7 +102,7 @@ def parameters_of(
     scene: Scene,
     angles: tuple[float, float] | None = None,
 ) -> list[Parameter]:
-    """The parameters that an answer hangs on, with their ranges.
+    """The parameters that an answer depends on, with their ranges.
 
     Args:
         angles: of both flanks against the radial plane [rad], where the damper is a wedge.
@@ -119,7 +119,7 @@ def parameters_of(
 
 
 def _layer_parameters(contact: Contact) -> list[Parameter]:
-    """What the stiffness of the layer hangs on; nothing of rigid faces."""
+    """What the stiffness of the layer depends on; nothing of rigid faces."""
     if contact.stiffness == "rigid":
         return []
     if not gives_stiffness(contact):

@@ -1,4 +1,4 @@
-"""What the best load hangs on: bars of each parameter over its range."""
+"""What the best load depends on: bars of each parameter over its range."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def draw_influences(table: pd.DataFrame, file: str | Path | None = None) -> obje
             ax.margins(x=0.08)
             ax.tick_params(axis="x", labelsize=9)
         axes[0].set_yticks(rows, names)
-        axes[1].set_title("what the best load hangs on")
+        axes[1].set_title("what the best load depends on")
         handles, labels = axes[0].get_legend_handles_labels()
         figure = axes[0].figure
         figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)

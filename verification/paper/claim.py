@@ -19,7 +19,7 @@ class Claim:
     ours: str
     # "holds", "holds in part", "fails"
     verdict: str
-    # files beside the page
+    # files next to the page
     pictures: tuple[str, ...] = ()
     # of the pictures
     caption: str = ""

@@ -1,4 +1,4 @@
-"""Claims of the paper, each beside a number computed here and a verdict that follows from it:
+"""Claims of the paper, each with a number computed here and a verdict that follows from it:
 element, contact, maps.
 
 The mass is in ``paper_mass``, the blades in ``paper_blades``, ``paper_loop``, ``paper_response``
@@ -136,7 +136,7 @@ def _printed_damping() -> Claim:
         "Eq. 16",
         "C from Fourier coefficients, several harmonics",
         f"three harmonics: {printed[3]:.3f} of Eq. 11 as printed, {mended[3]:.6f} with the factor "
-        f"k that both sums lack; one harmonic: {printed[1]:.6f}",
+        f"k that is missing in both sums; one harmonic: {printed[1]:.6f}",
         verdict(abs(printed[3] - 1) < 1e-3, abs(printed[1] - 1) < 1e-3),
     )
 
@@ -217,7 +217,7 @@ def reference(_: Path) -> Iterator[Claim]:
         "Fig. 15",
         "the frequency rises with the load",
         f"from 1236.6 Hz to {stuck[0]:.0f} Hz (1e6 N/m a seat), {stuck[1]:.0f} Hz (2e7 N/m: mere "
-        f"mass), {stuck[2]:.0f} Hz (2e7 N/m, neighbours in antiphase: the damper stands still)",
+        f"mass), {stuck[2]:.0f} Hz (2e7 N/m, neighbours in antiphase: the damper is at rest)",
         verdict(all(rises), any(rises)),
     )
     best = {
@@ -349,7 +349,7 @@ CHAPTERS = (
     Chapter(
         "Mass on a vibrating foundation",
         "A Z-shaped steel plate with the mass and moment of inertia of Table 1 on a block of "
-        "steel (Sect. 4), scenes/zmass.toml: pressure by finite elements, then three freedoms "
+        "steel (Sect. 4), scenes/zmass.toml: pressure by finite elements, then three degrees of freedom "
         "with coupled friction at 40 points, 1e6 N/m in all, integrated in time. "
         "demos/paper_zmass.py, or bladefem run scenes/zmass.toml.",
         (mass,),

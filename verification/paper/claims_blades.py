@@ -83,7 +83,7 @@ def finite_elements(folder: Path) -> Iterator[Claim]:
     ratio = np.abs(body.shapes[0] / body.shapes[body.ports["probe"]][0])
     yield Claim(
         "Fig. 12",
-        "the platform stands where both of the first two modes move it",
+        "the platform is where both of the first two modes move it",
         f"platform over tip: {ratio[0]:.3f} in mode 1 ({modes.frequencies[0]:.1f} Hz), "
         f"{ratio[1]:.3f} in mode 2 ({modes.frequencies[1]:.1f} Hz)",
         verdict(ratio[:2].min() > 0.05, ratio[:2].max() > 0.05),
@@ -107,7 +107,7 @@ def finite_elements(folder: Path) -> Iterator[Claim]:
         f"platform; shares at 30 N and 60 N differ by {change:.0g}",
         verdict(change < 1e-6, change < 0.02),
         ("fig_13.png",),
-        "Quasi-static contact of the two seats of Fig. 13; points beside the pressed part carry "
+        "Quasi-static contact of the two seats of Fig. 13; points outside the pressed part carry "
         "nothing at any load, so that full stick of the whole seat is never reached.",
     )
 

@@ -1,4 +1,4 @@
-"""Claims about the paper's loop (Fig. 14, Eq. 33-35) beside the full balance and integration in
+"""Claims about the paper's loop (Fig. 14, Eq. 33-35) against the full balance and integration in
 time.
 """
 
@@ -24,7 +24,7 @@ from .claim import Claim, verdict
 from .claims_blades import LOADS, model_of, top_of
 
 WAYS = {"march": "damper from rest", "shooting": "damper exact"}
-# of the points beside the resonance [Hz]
+# of the points next to the resonance [Hz]
 NEAR = np.array([-40.0, -20.0, -8.0, 0.0, 8.0, 20.0, 40.0])
 # loads of the histories [N]
 SHOWN = (1.0, 6.0, 50.0, 200.0)
@@ -104,7 +104,7 @@ def _converges(
         verdict(whole, worst["march"] < 5 * WANTED),
         ("fig_14.png",),
         "Steps of the loop of Fig. 14 (left side of Eq. 35 over the motion) against its turns, to "
-        "where 2 % stops it; beside each load, how far the tip then is off.",
+        "where 2 % stops it; next to each load, how far the tip then is off.",
     )
 
 

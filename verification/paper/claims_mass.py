@@ -198,7 +198,7 @@ def _spectra(results: Mapping[str, Steady]) -> Iterator[Claim]:
     yield Claim(
         "Fig. 11a, b",
         "the nearer the loop is to an ellipse, the less leaks to other frequencies",
-        f"0 Hz: {round_['0']:.1f} % of the friction force beside the nearest ellipse, third line "
+        f"0 Hz: {round_['0']:.1f} % of the friction force outside the nearest ellipse, third line "
         f"{leak['0']:.1f} % of the first; 200 Hz: {round_['2']:.1f} % and {leak['2']:.1f} %",
         verdict((leak["0"] < leak["2"]) == (round_["0"] < round_["2"])),
     )
@@ -254,7 +254,7 @@ def _coupled(scene: Scene) -> Claim:
     spin = max(np.abs(r.motion.velocity[:, 2]).max() for r in turned)
     return Claim(
         "Eq. 28, 29",
-        "three freedoms, the two directions of friction coupled",
+        "three degrees of freedom, the two directions of friction coupled",
         "the symmetric pressure never uses them; top load skewed by 0.5 and 0.3, elliptic motion "
         f"5 mm by 3 mm: the mass turns at up to {spin:.1f} rad/s, at 50 Hz it drifts at "
         f"{turned[1].drift[0]:.3f}, {turned[1].drift[1]:.3f} m/s, and under constant load it keeps "

@@ -83,7 +83,7 @@ def _resonances(tops: Mapping[float, Solution]) -> Iterator[Claim]:
         "Sect. 6",
         "the frequency rises with the load, in general",
         f"with {STIFF:.3g} N/m a seat it goes from {stiff[0]:.1f} to {stiff[1]:.1f} Hz: 2 k_t = "
-        f"{spring:.2g} N/m beside m w² = {damper:.2g} N/m, and a stuck damper on springs that "
+        f"{spring:.2g} N/m against m w² = {damper:.2g} N/m, and a stuck damper on springs that "
         "stiff is mere mass",
         verdict(stiff[1] > stiff[0]),
     )

@@ -67,7 +67,7 @@ def in_time(_: Path) -> Iterator[Claim]:
 
 
 def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
-    """The rigid damper with its three freedoms, on contacts whose normal load follows and that may
+    """The rigid damper with its three degrees of freedom, on contacts whose normal load follows and that may
     open.
     """
     row, scene = row_and_scene("soft")

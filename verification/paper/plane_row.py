@@ -5,7 +5,7 @@ Blade in plane stress, clamped at its root, by its modes; damper rigid and free 
 the normal load of each contact point from the quasi-static contact solve, constant in time. The
 residual flexibility of the modes left out is dropped, so that the balance, the paper's loop and
 time integration solve the very same equations; ``whole`` keeps it, and the damper's other two
-freedoms with the normal load that follows them, to see what that leaves out.
+degrees of freedom with the normal load that follows them, to see what that leaves out.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
 def paper_model(
     scene: Scene, row: Row, load: float, mass: float | None = None, harmonics: int = 31
 ) -> ReducedModel:
-    """The paper's model: tangential freedoms only, prescribed normal loads from rigid faces, a
+    """The paper's model: tangential degrees of freedom only, prescribed normal loads from rigid faces, a
     damper that moves along the row.
 
     Args:
@@ -103,7 +103,7 @@ def whole_model(
 
     Args:
         load: static normal load of a seat [N].
-        damper: "mass" (residual flexibility only), "rigid" (three freedoms, normal springs) or
+        damper: "mass" (residual flexibility only), "rigid" (three degrees of freedom, normal springs) or
             "elastic".
     """
     return _joint(scene, on_layer(scene, row.problem), row, load, damper, harmonics)

@@ -192,7 +192,7 @@ def _influences(
     best: tuple[BestLoad, ...],
     keep: StageRunner,
 ) -> tuple[Influence, ...]:
-    """What the lowest of the best loads hangs on; none where it was not found or not asked for."""
+    """What the lowest of the best loads depends on; none where it was not found or not wanted."""
     found = [b for b in best if not b.reason]
     if not found or not scene.study.influences:
         return ()
@@ -211,5 +211,5 @@ def _influences(
     try:
         return tuple(keep("influences", key, compute))
     except NotSolvedError as error:
-        keep.clock.messages.append(f"what the best load hangs on is not known: {error}")
+        keep.clock.messages.append(f"what the best load depends on is not known: {error}")
         return ()

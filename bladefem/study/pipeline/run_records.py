@@ -74,7 +74,7 @@ class Response:
     limits: tuple[Limit, Limit]
     # of each mass of the damper; empty where a single load was asked for
     best: tuple[BestLoad, ...] = ()
-    # what the lowest of them hangs on, the largest influence first
+    # what the lowest of them depends on, the largest influence first
     influences: tuple[Influence, ...] = ()
 
     @property

@@ -1,4 +1,4 @@
-"""What a mesh lacks is told at once, before long work."""
+"""What is missing in a mesh is reported at once, before long work."""
 
 from __future__ import annotations
 
