@@ -75,15 +75,14 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
 
 @njit(cache=True)
 def _stick_share(a, b, c):
-    """Share s of the step in stick: a s^2 + 2 b s + c = 0, where the force meets its growing
-    limit.
+    """Share s of the step in stick: the first root in [0, 1] of a s^2 + 2 b s + c = 0, where the
+    force meets its limit; 0 if it starts there and leaves it. c <= 0 but for rounding.
     """
-    inside = b * b - a * c
-    if a > 0.0 and inside > 0.0:
-        return min(max((np.sqrt(inside) - b) / a, 0.0), 1.0)
-    if a < 0.0 and inside > 0.0 and c < 0.0:
-        return min(max((-np.sqrt(inside) - b) / a, 0.0), 1.0)
-    return 0.0
+    c = min(c, 0.0)
+    root = np.sqrt(max(b * b - a * c, 0.0))
+    if b > 0.0:
+        return min(-c / (b + root), 1.0)
+    return min(max((root - b) / a, 0.0), 1.0) if a > 0.0 else 0.0
 
 
 @njit(cache=True)

@@ -3,8 +3,8 @@ free to move as they like.
 
 The steady motion without contact forces is known; what is marched is the motion that the contact
 forces add to it. The bodies are integrated exactly for forces that are linear between two instants
-(`bladefem.hbm.linearised_flow`); the forces at the end of a step follow from the friction law node
-by node: a Newton step of each in turn, until none changes.
+(`bladefem.hbm.linearised_flow`); the forces at the end of a step follow from the friction law
+(`bladefem.hbm.step_forces`).
 """
 
 from __future__ import annotations
@@ -16,20 +16,17 @@ from numba import njit
 
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
-from ..util.numba_options import INNER_KERNEL, KERNEL
+from ..util.numba_options import KERNEL
 from .linear.condensation import condense
-from .linearised_flow import _step_2d, linear_steps
+from .linearised_flow import linear_steps
 from .model import ReducedModel
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
+from .step_forces import contact_forces
 
 # of the instants of a period
 INSTANTS = 256
-# most sweeps over the nodes in a step
-SWEEPS = 60
-# change of a force in a sweep that counts as none, over the largest force
-SETTLED = 1e-7
 
 
 @dataclass(frozen=True)
@@ -186,111 +183,14 @@ def _march(y, f, w, bodies, F, table, load, preload, free, probe, motion):
     for i in range(n):
         for a in range(d):
             extra[i * d + a] = f[i, a] - preload[i * d + a]
-    settled = True
     for k in range(periods * S):
         motion[k // S, k % S] = steady[k % S] + np.dot(reading, y[:M]) - np.dot(flexible, extra)
         j = (k + 1) % S
         y = np.dot(E, y) + np.dot(before, extra)
         c = free[j] + np.dot(U, y[:M])
-        settled &= _contact_forces(c, F, w, f, extra, table, load[k % S], load[j], preload)
+        if not contact_forces(c, F, w, f, extra, table, load[k % S], load[j], preload):
+            motion[k // S, k % S :] = np.nan
+            motion[k // S + 1 :] = np.nan
+            return False
         y = y + np.dot(after, extra)
-    return settled
-
-
-@njit(**INNER_KERNEL)
-def _contact_forces(c, F, w, f, extra, table, load0, load1, preload):
-    """Forces at the end of a step, of w = c - F extra: f, extra and w are those before, and then
-    those after. False where they were not found.
-    """
-    n = len(f)
-    m = len(c)
-    d = m // n
-    old_f = f.copy()
-    old_w = w.copy()
-    work = (np.empty((d, d)), np.zeros((d, d)), np.empty(d))
-    tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
-    largest = 0.0
-    for row in range(m):
-        largest = max(largest, abs(extra[row] + preload[row]), abs(preload[row]))
-    for _ in range(SWEEPS):
-        change = 0.0
-        for i in range(n):
-            first = i * d
-            for a in range(first, first + d):
-                w[a] = c[a] - _product(F[a], extra)
-            node = (table[i], load0[i] + table[i, 1] * old_w[first], load1[i])
-            step = _node_force(w, F, first, d, old_w, old_f[i], f[i], node, work, tangents)
-            for a in range(d):
-                extra[first + a] = f[i, a] - preload[first + a]
-            change = max(change, step)
-        if change <= SETTLED * largest:
-            return True
-    return False
-
-
-# the order of the sum is free, so that it is vectorised
-@njit(fastmath={"reassoc", "contract"}, **INNER_KERNEL)
-def _product(a, b):
-    total = 0.0
-    for k in range(len(a)):
-        total += a[k] * b[k]
-    return total
-
-
-@njit(**INNER_KERNEL)
-def _node_force(w, F, first, d, old_w, old_f, f, node, work, tangents):
-    """One Newton step of the forces f of a node at its displacements w; returns the largest
-    change.
-    """
-    parameters, N0, load = node
-    kt, kn, mu = parameters
-    J, B, gap = work
-    _, now, by_load = tangents
-    N1 = load + kn * w[first]
-    dx = kt * (w[first + 1] - old_w[first + 1])
-    dy = kt * (w[first + 2] - old_w[first + 2]) if d > 2 else 0.0
-    x, y, _ = _step_2d(old_f[1], old_f[2], dx, dy, (N0, N1, 0.0, 0.0), mu, tangents)
-    gap[0] = max(N1, 0.0) - f[0]
-    gap[1] = x - f[1]
-    if d > 2:
-        gap[2] = y - f[2]
-    B[0, 0] = kn if N1 > 0.0 else 0.0
-    for a in range(1, d):
-        B[a, 0] = by_load[a - 1, 1] * kn
-        for b in range(1, d):
-            B[a, b] = now[a - 1, b - 1] * kt
-    for a in range(d):
-        for b in range(d):
-            J[a, b] = 1.0 if a == b else 0.0
-            for k in range(d):
-                J[a, b] += B[a, k] * F[first + k, first + b]
-    _solve_small(J, gap)
-    change = 0.0
-    for a in range(d):
-        f[a] += gap[a]
-        change = max(change, abs(gap[a]))
-    return change
-
-
-@njit(**INNER_KERNEL)
-def _solve_small(A, b):
-    """Solve A x = b by elimination with pivots, in place."""
-    n = len(b)
-    for k in range(n):
-        p = k
-        for i in range(k + 1, n):
-            if abs(A[i, k]) > abs(A[p, k]):
-                p = i
-        if p != k:
-            for j in range(n):
-                A[k, j], A[p, j] = A[p, j], A[k, j]
-            b[k], b[p] = b[p], b[k]
-        for i in range(k + 1, n):
-            share = A[i, k] / A[k, k]
-            for j in range(k, n):
-                A[i, j] -= share * A[k, j]
-            b[i] -= share * b[k]
-    for k in range(n - 1, -1, -1):
-        for j in range(k + 1, n):
-            b[k] -= A[k, j] * b[j]
-        b[k] /= A[k, k]
+    return True

@@ -92,3 +92,18 @@ def test_the_longest_explicit_step():
     assert stable_step(0.0) == np.inf
     with pytest.raises(InputError, match="not negative"):
         stable_step(-1.0)
+
+
+@pytest.mark.parametrize("path", [1.1, 1.19, 1.2, 1.21, 1.3])
+def test_a_force_meets_a_limit_that_falls_about_as_fast_as_it_moves(path):
+    """Against ten thousand small steps: the first meeting counts, also where the limit changes
+    faster than the force.
+    """
+    start = np.array([6.99, 0.65])
+    way = path * np.array([0.68, -0.73]) / np.hypot(0.68, 0.73)
+    loads = np.linspace(23.56, 19.57, 10001)
+    fine = start
+    for before, after in zip(loads[:-1], loads[1:], strict=True):
+        fine = np.array(step_2d(*fine, *(way / 10000), before, after, 0.3)[:2])
+    found = step_2d(*start, *way, loads[0], loads[-1], 0.3)[:2]
+    np.testing.assert_allclose(found, fine, atol=0.05)

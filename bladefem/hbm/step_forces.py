@@ -1,0 +1,214 @@
+"""Contact forces at the end of a step in time: those that the friction law gives for their motion.
+
+With the displacements w = c - F f_extra, F the flexibility of the bodies for forces at the end of a
+step, each node wants f = law(w). First each node in turn takes a Newton step of its own, until none
+changes, which is cheap and nearly always enough. Nodes of a stiff layer, or with few of them
+pressed, push each other to and fro; there all take a Newton step together, with the exact
+derivative of the law or one of its sides (a semi-smooth Newton method: Alart, Curnier, Comput.
+Methods Appl. Mech. Eng. 92 (1991) 353, DOI 10.1016/0045-7825(91)90022-X), shortened until the
+violation falls.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from ..util.numba_options import INNER_KERNEL, KERNEL
+from .linearised_flow import _step_2d
+
+# most sweeps over the nodes in a step
+SWEEPS = 60
+# change of a force in a sweep that counts as none, over the largest force
+SETTLED = 1e-7
+
+# Newton steps of all nodes together, and halvings of one
+NEWTON_STEPS = 40
+HALVINGS = 10
+# decrease of the violation that a step has to bring, over its share
+DECREASE = 1e-4
+
+
+@njit(**KERNEL)
+def contact_forces(c, F, w, f, extra, table, load0, load1, preload):
+    """Forces at the end of a step, of w = c - F extra: f, extra and w are those before, and then
+    those after. False where they were not found.
+
+    Args:
+        c: (m,) displacements without extra forces; F: (m, m) flexibility.
+        w: (m,) relative displacements; f: (n, 3) contact forces; extra: (m,) those less preload.
+        table: (n, 3) kt, kn, mu; load0, load1: (n,) normal loads at zero displacement before and
+            after the step.
+    """
+    m = len(c)
+    d = m // len(f)
+    old = (f.copy(), w.copy())
+    largest = 0.0
+    for row in range(m):
+        largest = max(largest, abs(extra[row] + preload[row]), abs(preload[row]))
+    if _in_turn(c, F, w, f, extra, table, load0, load1, preload, old, largest):
+        return True
+    # from the forces before the step: sweeps that do not settle lead away
+    for i in range(len(f)):
+        for a in range(d):
+            f[i, a] = old[0][i, a]
+    return _together(c, F, w, f, extra, table, load0, load1, preload, old, largest)
+
+
+@njit(**INNER_KERNEL)
+def _in_turn(c, F, w, f, extra, table, load0, load1, preload, old, largest):
+    """Sweeps over the nodes, each with a Newton step of its own; False where they do not settle."""
+    n = len(f)
+    d = len(c) // n
+    J = np.empty((d, d))
+    B = np.zeros((d, d))
+    gap = np.empty(d)
+    tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
+    for _ in range(SWEEPS):
+        change = 0.0
+        for i in range(n):
+            first = i * d
+            for a in range(first, first + d):
+                w[a] = c[a] - _product(F[a], extra)
+            loads = (load0[i] + table[i, 1] * old[1][first], load1[i])
+            _violation(w, f[i], first, d, old[1], old[0][i], (table[i], loads), B, gap, tangents)
+            for a in range(d):
+                for b in range(d):
+                    J[a, b] = 1.0 if a == b else 0.0
+                    for k in range(d):
+                        J[a, b] += B[a, k] * F[first + k, first + b]
+            _solve_small(J, gap)
+            for a in range(d):
+                f[i, a] += gap[a]
+                extra[first + a] = f[i, a] - preload[first + a]
+                change = max(change, abs(gap[a]))
+        if change <= SETTLED * largest:
+            return True
+    return False
+
+
+@njit(**INNER_KERNEL)
+def _together(c, F, w, f, extra, table, load0, load1, preload, old, largest):
+    """Newton steps of all nodes at once, shortened until the violation falls; False where it does
+    not vanish.
+    """
+    n = len(f)
+    m = len(c)
+    d = m // n
+    B = np.zeros((n, d, d))
+    gap = np.empty(m)
+    A = np.empty((m, m))
+    start = np.empty((n, d))
+    size = _violations(c, F, w, f, extra, table, load0, load1, preload, old, B, gap)
+    for _ in range(NEWTON_STEPS):
+        worst = 0.0
+        for row in range(m):
+            worst = max(worst, abs(gap[row]))
+        if worst <= SETTLED * largest:
+            return True
+        for i in range(n):
+            start[i] = f[i, :d]
+            for a in range(d):
+                A[i * d + a] = 0.0
+                for k in range(d):
+                    A[i * d + a] += B[i, a, k] * F[i * d + k]
+                A[i * d + a, i * d + a] += 1.0
+        _solve_small(A, gap)
+        step = gap.copy()
+        share = 1.0
+        for halving in range(HALVINGS + 1):
+            if halving == HALVINGS:
+                # a kink may have to be passed before it gets better
+                share = 1.0
+            for i in range(n):
+                for a in range(d):
+                    f[i, a] = start[i, a] + share * step[i * d + a]
+            found = _violations(c, F, w, f, extra, table, load0, load1, preload, old, B, gap)
+            if found < (1.0 - DECREASE * share) * size:
+                break
+            share /= 2.0
+        size = found
+        if not np.isfinite(size):
+            return False
+    return False
+
+
+@njit(**INNER_KERNEL)
+def _violations(c, F, w, f, extra, table, load0, load1, preload, old, B, gap):
+    """Norm of what the law wants more of each force; gap (m,) and its derivatives B (n, d, d) by
+    the displacements of each node are filled, as are extra and w of the forces f.
+    """
+    n = len(f)
+    d = len(c) // n
+    tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
+    for i in range(n):
+        for a in range(d):
+            extra[i * d + a] = f[i, a] - preload[i * d + a]
+    total = 0.0
+    for i in range(n):
+        first = i * d
+        for a in range(first, first + d):
+            w[a] = c[a] - _product(F[a], extra)
+        loads = (load0[i] + table[i, 1] * old[1][first], load1[i])
+        own = gap[first : first + d]
+        _violation(w, f[i], first, d, old[1], old[0][i], (table[i], loads), B[i], own, tangents)
+        for a in range(d):
+            total += own[a] ** 2
+    return np.sqrt(total)
+
+
+@njit(**INNER_KERNEL)
+def _violation(w, f, first, d, old_w, old_f, node, B, gap, tangents):
+    """What the friction law wants more of the forces f of a node at its displacements w: gap (d,),
+    and its derivative B (d, d) by them.
+    """
+    parameters, loads = node
+    kt, kn, mu = parameters
+    N0, load = loads
+    _, now, by_load = tangents
+    N1 = load + kn * w[first]
+    dx = kt * (w[first + 1] - old_w[first + 1])
+    dy = kt * (w[first + 2] - old_w[first + 2]) if d > 2 else 0.0
+    x, y, _ = _step_2d(old_f[1], old_f[2], dx, dy, (N0, N1, 0.0, 0.0), mu, tangents)
+    gap[0] = max(N1, 0.0) - f[0]
+    gap[1] = x - f[1]
+    if d > 2:
+        gap[2] = y - f[2]
+    B[0, 0] = kn if N1 > 0.0 else 0.0
+    for a in range(1, d):
+        B[a, 0] = by_load[a - 1, 1] * kn
+        for b in range(1, d):
+            B[a, b] = now[a - 1, b - 1] * kt
+
+
+# the order of the sum is free, so that it is vectorised
+@njit(fastmath={"reassoc", "contract"}, **INNER_KERNEL)
+def _product(a, b):
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
+
+
+@njit(**INNER_KERNEL)
+def _solve_small(A, b):
+    """Solve A x = b by elimination with pivots, in place."""
+    n = len(b)
+    for k in range(n):
+        p = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[p, k]):
+                p = i
+        if p != k:
+            for j in range(n):
+                A[k, j], A[p, j] = A[p, j], A[k, j]
+            b[k], b[p] = b[p], b[k]
+        for i in range(k + 1, n):
+            share = A[i, k] / A[k, k]
+            for j in range(k, n):
+                A[i, j] -= share * A[k, j]
+            b[i] -= share * b[k]
+    for k in range(n - 1, -1, -1):
+        for j in range(k + 1, n):
+            b[k] -= A[k, j] * b[j]
+        b[k] /= A[k, k]

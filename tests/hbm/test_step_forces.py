@@ -1,0 +1,51 @@
+"""Contact forces of a step in time, where nodes of a stiff layer push each other to and fro."""
+
+import numpy as np
+import pytest
+
+from bladefem.friction.time_step import step_2d
+from bladefem.hbm.step_forces import contact_forces
+
+NODES = 8
+MU = 0.3
+
+
+def wanted(f, before, case):
+    """Forces by the law at the motion that the forces f make, node by node."""
+    w = case["c"] - case["F"] @ f.ravel()
+    found = np.empty_like(f)
+    for i, (kt, kn, mu) in enumerate(case["table"]):
+        old = before["w"][3 * i : 3 * i + 3]
+        own = w[3 * i : 3 * i + 3]
+        loads = case["load"][i] + kn * old[0], case["load"][i] + kn * own[0]
+        found[i, 0] = max(loads[1], 0.0)
+        found[i, 1:] = step_2d(*before["f"][i, 1:], *(kt * (own - old)[1:]), *loads, mu)[:2]
+    return found
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("stiffness", [1e6, 1e8])
+def test_forces_are_those_of_the_motion_that_they_make(seed, stiffness):
+    generator = np.random.default_rng(seed)
+    m = 3 * NODES
+    shapes = generator.standard_normal((m, 4))
+    flexibility = 1e-8 * (shapes @ shapes.T + 0.02 * np.eye(m))
+    f = np.zeros((NODES, 3))
+    f[:, 0] = generator.uniform(5.0, 20.0, NODES)
+    f[:, 1] = 0.9 * MU * f[:, 0]
+    w = 1e-9 * generator.standard_normal(m)
+    table = np.tile([0.8 * stiffness, stiffness, MU], (NODES, 1))
+    load = f[:, 0] - stiffness * w[::3]
+    c = w + flexibility @ f.ravel() + 2e-7 * generator.standard_normal(m)
+    case = {"c": c, "F": flexibility, "table": table, "load": load}
+    before = {"f": f.copy(), "w": w.copy()}
+    extra = f.ravel().copy()
+    assert contact_forces_of(case, w, f, extra)
+    np.testing.assert_allclose(f, wanted(f, before, case), atol=1e-5 * f.max())
+    np.testing.assert_allclose(extra, f.ravel())
+
+
+def contact_forces_of(case, w, f, extra):
+    load = case["load"]
+    zero = np.zeros(len(extra))
+    return contact_forces(case["c"], case["F"], w, f, extra, case["table"], load, load, zero)
