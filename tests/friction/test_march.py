@@ -5,6 +5,7 @@ of explicit steps.
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_a_force_meets_a_limit_that_falls_about_as_fast_as_it_moves(path):
     way = path * np.array([0.68, -0.73]) / np.hypot(0.68, 0.73)
     loads = np.linspace(23.56, 19.57, 10001)
     fine = start
-    for before, after in zip(loads[:-1], loads[1:], strict=True):
+    for before, after in pairwise(loads):
         fine = np.array(step_2d(*fine, *(way / 10000), before, after, 0.3)[:2])
     found = step_2d(*start, *way, loads[0], loads[-1], 0.3)[:2]
     np.testing.assert_allclose(found, fine, atol=0.05)
