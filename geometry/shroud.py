@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, tan
+from math import cos, pi, tan
 
 import numpy as np
 
@@ -59,7 +59,9 @@ def shroud_block(
     length = shroud.length
     if length is None:
         length = 2 * (reach[1] + 2 * margin) if at_tip else 2 * reach[1] / 3
-    room = 2 * ((top + middle - half) * tan(pi / disc.sectors) - shroud.gap / 2 - abs(centre[0]))
+    theta = pi / disc.sectors
+    between = (top + middle - half) * tan(theta) - shroud.gap / 2 / cos(theta)
+    room = 2 * float(between - abs(centre[0]))
     width = room if shroud.width is None else shroud.width
     if width > room:
         raise InputError(

@@ -57,7 +57,11 @@ def _write_results(
     )
     from ..report.write import Page, write_report
 
-    parts = {"wheel/scatter": scatter_table(found), "wheel/scatter_optima": optimum_table(found)}
+    parts = {
+        "wheel/scatter": scatter_table(found),
+    }
+    if len(found.loads) > 1:
+        parts["wheel/scatter_optima"] = optimum_table(found)
     if used:
         parts["wheel/scatter_utilisation"] = use_table(used)
     files = []

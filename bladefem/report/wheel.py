@@ -209,11 +209,25 @@ def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
 
 
 def scatter_headlines(found: Amplification) -> list[Headline]:
-    """First numbers of the statistics."""
+    """First numbers of the statistics; one load alone has no optimum."""
+    i = int(np.argmin(found.tuned))
+    factor = quantile_interval(found.factor[i], SHARE)
+    return [
+        *(_optimum_headlines(found) if len(found.loads) > 1 else []),
+        Headline(
+            f"amplification at {found.loads[i]:.4g} N, where the tuned wheel is lowest",
+            f"{factor.value:.3g}",
+            f"95 % interval {factor.low:.3g} to {_upper(factor.high)}",
+            f"highest blade over the tuned wheel, {100 * SHARE:g} % of {found.peak.shape[1]} "
+            "wheels stay below",
+        ),
+    ]
+
+
+def _optimum_headlines(found: Amplification) -> list[Headline]:
+    """Best loads with scatter and without, and the highest blade at the first."""
     (load, height), robust = optima_of_scatter(found)
     words = f"{100 * robust.share:g} % of {found.peak.shape[1]} wheels"
-    i = int(np.argmin(found.tuned))
-    factor = quantile_interval(found.factor[i], robust.share)
     return [
         Headline(
             "robust optimum of the load of a seat",
@@ -233,12 +247,6 @@ def scatter_headlines(found: Amplification) -> list[Headline]:
             f"95 % interval {1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} µm",
             f"{words} stay below",
         ),
-        Headline(
-            f"amplification at {found.loads[i]:.4g} N, where the tuned wheel is lowest",
-            f"{factor.value:.3g}",
-            f"95 % interval {factor.low:.3g} to {_upper(factor.high)}",
-            f"highest blade over the tuned wheel, {words} stay below",
-        ),
     ]
 
 
@@ -257,19 +265,7 @@ def _upper(value: float) -> str:
 
 def scatter_sentences(found: Amplification) -> list[str]:
     """The answer, and what it is worth."""
-    (load, height), robust = optima_of_scatter(found)
-    sentences = [
-        f"tuned optimum: {load:.4g} N, {1e6 * height:.4g} um",
-        f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
-        f"{robust.load.value:.4g} N (95 % interval {robust.load.low:.4g} to "
-        f"{robust.load.high:.4g} N), {1e6 * robust.height.value:.4g} um "
-        f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
-    ]
-    if robust.at_end > 0.025:
-        sentences.append(
-            f"in {100 * robust.at_end:.2g} % of the resamples the robust optimum is the smallest "
-            "or the largest load: the interval is open there, expected a wider study.loads"
-        )
+    sentences = _optimum_sentences(found)
     i = int(np.argmin(found.tuned))
     q = quantile_interval(found.factor[i], 0.95)
     sentences.append(
@@ -285,6 +281,26 @@ def scatter_sentences(found: Amplification) -> list[str]:
         )
     lost = int(found.unsolved.sum())
     sentences.append(f"{lost} of {int(found.points.sum())} points not solved")
+    return sentences
+
+
+def _optimum_sentences(found: Amplification) -> list[str]:
+    """Both optima; one load alone has none."""
+    if len(found.loads) < 2:
+        return ["one load has no optimum, expected several in study.loads"]
+    (load, height), robust = optima_of_scatter(found)
+    sentences = [
+        f"tuned optimum: {load:.4g} N, {1e6 * height:.4g} um",
+        f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
+        f"{robust.load.value:.4g} N (95 % interval {robust.load.low:.4g} to "
+        f"{robust.load.high:.4g} N), {1e6 * robust.height.value:.4g} um "
+        f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
+    ]
+    if robust.at_end > 0.025:
+        sentences.append(
+            f"in {100 * robust.at_end:.0f} % of the resamples the robust optimum is the smallest "
+            "or the largest load: the interval is open there, expected a wider study.loads"
+        )
     return sentences
 
 

@@ -147,7 +147,8 @@ def test_left_out_sizes_cover_the_tip_and_reach_the_gap():
     given = Shroud(thickness=3e-3, gap=2e-3)
     block = shroud_block(given, PARTS[0], PARTS[3], top())
     inner = top() + PARTS[0].span - 3e-3
-    assert block.high[1] * cos(pi / 36) + 1e-3 * cos(pi / 36) == pytest.approx(inner * sin(pi / 36))
+    # the inner corner's distance from the radial plane midway between two blades
+    assert inner * sin(pi / 36) - block.high[1] * cos(pi / 36) == pytest.approx(2e-3 / 2)
     check_sector(*PARTS, Root(), given)
 
 

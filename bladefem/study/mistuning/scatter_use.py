@@ -29,7 +29,8 @@ class ScatteredUse:
     # confidence that the number of wheels leaves
     share: Quantile
     # upper end of that interval with the upper ends of the errors of mesh and loading history
-    # (contact tractions); infinite with too few wheels
+    # (contact tractions), and with what checked wheels exceed the law of one damper by; infinite
+    # with too few wheels
     highest: float
 
     @property
@@ -52,6 +53,8 @@ def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
         for i in places:
             factor = quantile_interval(found.factor[i], SHARE)
             share = Quantile(*(tuned * one for one in (factor.value, factor.low, factor.high)))
-            highest = highest_use(run, number, used) * factor.high
+            # what the law of one damper was found to miss
+            low = 1 + min(found.check_errors[i].min(initial=0.0), 0.0)
+            highest = highest_use(run, number, used) * factor.high / low
             rows.append(ScatteredUse(load, tuned, share, highest))
     return rows
