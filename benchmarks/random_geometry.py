@@ -40,7 +40,16 @@ import numpy as np
 
 from bladefem.errors import InputError
 from geometry.isolated_process import build_isolated
-from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from geometry.parameters import (
+    Aerofoil,
+    Disc,
+    MeshSize,
+    Platform,
+    Root,
+    Shank,
+    Shroud,
+    Wedge,
+)
 from geometry.sampling import sample_around, sample_in_range
 from geometry.sector_check import check_sector
 
@@ -50,15 +59,27 @@ WORST = 8
 
 
 def parameters(number, seed):
-    """Five tables; every fourth set comes from the whole ranges."""
+    """Seven tables; every fourth set comes from the whole ranges."""
     rng = np.random.default_rng((seed, number))
     if number % 4 == 0:
-        return level_plates({name: sample_in_range(table, rng) for name, table in TABLES.items()})
-    parts = level_plates(
-        {name: sample_around(table(), rng, 0.25) for name, table in TABLES.items()}
-    )
+        parts = level_plates({name: sample_in_range(table, rng) for name, table in TABLES.items()})
+        return parts | {"root": sample_in_range(Root, rng), "shroud": sample_in_range(Shroud, rng)}
+    parts = level_plates({name: sample_around(table(), rng, 0.25) for name, table in TABLES.items()})
     shank, longest = parts["shank"], min(parts["disc"].width, parts["platform"].length)
-    return parts | {"shank": replace(shank, length=min(shank.length, longest))}
+    parts |= {"shank": replace(shank, length=min(shank.length, longest))}
+    # the two tables that change nothing by default: half of the sets each; and half of the
+    # fillets are left to the rule
+    root = replace(sample_around(Root(), rng, 0.25), lobes=int(rng.integers(1, 4)))
+    shroud = replace(
+        sample_around(Shroud(thickness=3e-3), rng, 0.25),
+        at=1.0 if rng.random() < 0.5 else float(rng.uniform(0.4, 0.8)),
+    )
+    fillet = float(rng.uniform(5e-4, 3e-3)) if rng.random() < 0.5 else None
+    return parts | {
+        "aerofoil": replace(parts["aerofoil"], fillet=fillet),
+        "root": root if rng.random() < 0.5 else Root(),
+        "shroud": shroud if rng.random() < 0.5 else Shroud(),
+    }
 
 
 def level_plates(parts):
@@ -89,7 +110,7 @@ def refused_before_meshing(number, seed):
     """Whether the rules of `bladefem check` refuse the set."""
     parts = parameters(number, seed)
     try:
-        check_sector(*(parts[name] for name in TABLES))
+        check_sector(*(parts[name] for name in (*TABLES, "root", "shroud")))
     except InputError:
         return True
     return False

@@ -15,6 +15,8 @@ TABLES = {
     "aerofoil": ["Aerofoil"],
     "platform": ["Platform", "Shank", "Wedge"],
     "dampers": [],
+    "roots": ["Root"],
+    "shrouds": ["Shroud"],
     "sector": ["Disc"],
     "plane": ["Plane"],
     "z_mass": ["ZMass"],
@@ -36,6 +38,7 @@ under `[imported]`; `bladefem mesh` lists what the file has.
 | damper_left, damper_right | flanks of the damper: on this blade's seat_right, on the next blade's seat_left | \
 all with contact |
 | suction_side, pressure_side, trailing_edge, tip, fillet | skin of the aerofoil | wedge sector |
+| shroud_left, shroud_right | ends of a shroud towards the neighbours | wedge sector with a shroud |
 | tip_leading, tip_mid, tip_trailing | nodes of the tip: leading edge, half chord, trailing edge | blades |
 | load | far face of the indenter | hertz, punch |
 | symmetry_x, symmetry_y | planes x = 0 and y = 0 of both bodies; nodes slide in them (y in 3-D only) | hertz, punch |

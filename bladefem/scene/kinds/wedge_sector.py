@@ -118,6 +118,8 @@ KIND = Kind(
         "dampers": SceneCall(
             "bladefem.view.parts:draw_damper_shapes", ("platform", "shank", "disc", "damper")
         ),
+        "roots": SceneCall("bladefem.view.root_and_shroud:draw_roots", ("shank", "disc", "root")),
+        "shrouds": SceneCall("bladefem.view.root_and_shroud:draw_shrouds", (*SHAPE, "shroud")),
         "sector": SceneCall("bladefem.view.parts:draw_disc", SHAPE),
     },
     conditions=conditions,
