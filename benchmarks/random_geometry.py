@@ -64,7 +64,9 @@ def parameters(number, seed):
     if number % 4 == 0:
         parts = level_plates({name: sample_in_range(table, rng) for name, table in TABLES.items()})
         return parts | {"root": sample_in_range(Root, rng), "shroud": sample_in_range(Shroud, rng)}
-    parts = level_plates({name: sample_around(table(), rng, 0.25) for name, table in TABLES.items()})
+    parts = level_plates(
+        {name: sample_around(table(), rng, 0.25) for name, table in TABLES.items()}
+    )
     shank, longest = parts["shank"], min(parts["disc"].width, parts["platform"].length)
     parts |= {"shank": replace(shank, length=min(shank.length, longest))}
     # the two tables that change nothing by default: half of the sets each; and half of the
