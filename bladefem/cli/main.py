@@ -221,7 +221,7 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
         const="",
         help="refine the mesh: frequencies at three "
         "or more element sizes such as '6, 4, 2.8 mm' (chosen when left out), estimated limit and "
-        "order",
+        "order; a mesh from a file is halved instead",
     )
     sub.add_argument(
         "--compare", metavar="FOLDER", help="MAC of the mode shapes against those of an earlier run"

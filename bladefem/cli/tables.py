@@ -109,9 +109,11 @@ def survey_tables(found: Survey) -> str:
             else "no engine order crosses a mode in this range of speeds"
         )
     if found.convergence is not None:
+        given = "given" in found.convergence.summary
         rows = [
             [
                 row.mode,
+                *([f"{row.given:.2f}", f"{100 * row.given_error:.3f}"] if given else []),
                 f"{row.frequency:.2f}",
                 "" if row.reason else f"{row.limit:.2f}",
                 "" if row.reason else f"{row.order:.2f}",
@@ -120,11 +122,8 @@ def survey_tables(found: Survey) -> str:
             ]
             for row in found.convergence.summary.itertuples()
         ]
-        parts.append(
-            plain_table(
-                rows, ["mode", "finest [Hz]", "limit [Hz]", "order", "error [%]", "why no limit"]
-            )
-        )
+        head = ["mode", *(["as given [Hz]", "its error [%]"] if given else []), "finest [Hz]"]
+        parts.append(plain_table(rows, [*head, "limit [Hz]", "order", "error [%]", "why no limit"]))
     if found.answer is not None:
         parts.append(
             report_table(

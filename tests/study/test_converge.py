@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
-from structured import box
+from structured import box, sector
 from wheels import bodies
 
 from bladefem.errors import InputError
@@ -16,7 +16,7 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import body_mass
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, scene_of
 from bladefem.study.modes.effective_mass import effective_masses
 from bladefem.study.modes.mesh_convergence import (
     PLAUSIBLE_ORDERS,
@@ -30,6 +30,7 @@ from bladefem.study.modes.mesh_convergence import (
     richardson,
 )
 from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
+from geometry.export import write_msh
 
 
 @pytest.mark.parametrize("order", [1.0, 2.0, 4.0, 5.7])
@@ -136,6 +137,35 @@ def test_an_order_that_no_element_has_is_not_believed():
         and row["error"] == pytest.approx(0.09)
     )
     assert "MAC 0.50" in _convergence_summary(points.assign(mac=0.5)).iloc[0]["reason"]
+
+
+def test_a_mesh_of_a_file_is_halved(tmp_path):
+    """The error that the given mesh is said to have holds the change to much finer ones."""
+    write_msh(sector(9, (3, 2, 1), "tetra10"), tmp_path / "a.msh")
+    tables = {
+        "kind": "imported",
+        "imported": {"file": str(tmp_path / "a.msh"), "sectors": 9},
+        "operation": {"stiffening": False},
+        "excitation": {"at": "x1"},
+    }
+    scene = scene_of(tables)
+    assert default_sizes(scene) == []
+    found = mesh_convergence(scene, [], [2], count=3)
+    assert sorted(found.points["cells"].unique()) == [36, 288, 2304]
+    finer = modes(
+        constrain(assemble(sector(9, (18, 12, 5)), "blade", Material()), "clamp", 2), 3
+    ).frequencies
+    row = found.summary
+    true = abs(row["given"] / finer - 1)
+    assert (true > 1e-3).all() and (true < 1.2 * row["given_error"]).all()
+    assert (row["given_error"] < 4 * true).all()
+    assert (row["error"] < row["given_error"]).all()
+
+
+def test_two_meshes_show_no_order():
+    points = pd.DataFrame({"size": [2.0, 1.0], "mode": 1, "frequency": [103.0, 100.0], "mac": 1.0})
+    row = _convergence_summary(points).iloc[0]
+    assert row["reason"] == "two meshes show no order" and row["error"] == pytest.approx(0.09)
 
 
 def test_wrong_sizes():

@@ -7,7 +7,9 @@ ones can be. With three of them f(h) = f + C h^p goes through all (Roache, J. Fl
 scatter of the meshes (Eca and Hoekstra, J. Comput. Phys. 262 (2014),
 doi:10.1016/j.jcp.2014.01.006). h is the size that the elements really have. Modes are paired with
 those of the finest mesh by their shapes (MAC), so two that cross while the mesh is refined keep
-their names. Where the values do not fall into line, or the order is none that the elements can
+their names. A mesh that comes from a file is halved instead, once or twice as its size allows:
+that shows the error of its elements, not that of a boundary which is faceted in the file. Where the
+values do not fall into line, or the order is none that the elements can
 have, ``reason`` says so and the error is three times the last change (Roache's safety factor for
 two meshes), of more than three meshes the largest between the last three.
 """
@@ -26,11 +28,12 @@ from geometry.mesh import Mesh
 
 from ...data import ModeSet
 from ...errors import InputError
+from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
-from ..pipeline.stages import Bodies, build_mesh, find_modes
+from ..pipeline.stages import Bodies, blade_dofs, build_mesh, find_modes
 from .comparison import mac_of
 from .mesh_transfer import nodal_volumes, transfer_fields
 
@@ -48,6 +51,10 @@ MAX_SCATTER = 0.5
 MIN_MAC = 0.8
 # modes beyond those asked for, candidates for pairs
 SPARE_MODES = 3
+# a mesh of a file and its halves
+MAX_HALVED_MESHES = 3
+# beyond which halving once more takes too long
+MAX_DOFS_HALVED_AGAIN = 60_000
 # nodes that shapes are compared at
 COMPARED_NODES = 4000
 
@@ -60,7 +67,8 @@ class Convergence:
     # and mode
     points: pd.DataFrame
     # nodal_diameter, mode, frequency, limit [Hz], order [1], error [1] of the finest mesh,
-    # scatter [1] about the fit, reason: why the order is not believed, empty when it is
+    # scatter [1] about the fit, reason: why the order is not believed, empty when it is; of a mesh
+    # from a file also its own frequency, given [Hz], and the error of that, given_error [1]
     summary: pd.DataFrame
 
 
@@ -72,19 +80,23 @@ def mesh_convergence(
     comm: Communicator | None = None,
     progress: Progress = without_progress,
 ) -> Convergence:
-    """The same scene on several meshes.
+    """The same scene on several meshes; a mesh that is given and its halves.
 
     Args:
-        sizes: target element sizes [m], at least three, from coarse to fine; where the scene leaves
-            its size open and these are :data:`SIZE_RATIOS`, they are factors on its automatic
-            sizes.
+        sizes: empty for a given mesh; else target element sizes [m], at least three, from coarse
+            to fine; where the scene leaves its size open and these are :data:`SIZE_RATIOS`, they
+            are factors on its automatic sizes.
         diameters: nodal diameters of a wheel.
         count: modes of each.
 
     Raises:
-        InputError: too few sizes, or not from coarse to fine; a scene whose mesh is given.
+        InputError: too few sizes, or not from coarse to fine; sizes for a mesh that is given, or
+            one whose halves need more memory than there is.
     """
-    refuse_given_mesh(scene)
+    if not kind_named(scene.kind).meshed_here(scene):
+        if len(sizes):
+            refuse_given_mesh(scene)
+        return _halved_mesh_convergence(scene, diameters, count, comm, progress)
     if len(sizes) < 3 or not all(a > b > 0 for a, b in pairwise(sizes)):
         raise InputError(
             f"converge = {list(sizes)} m: expected at least three element sizes, from coarse to "
@@ -100,6 +112,38 @@ def mesh_convergence(
         mesh = build_mesh(refined, comm)
         runs.append((mesh, find_modes(Bodies(refined, mesh, comm), diameters, count + SPARE_MODES)))
     return of_meshes(runs, count)
+
+
+def _halved_mesh_convergence(
+    scene: Scene,
+    diameters: Sequence[int] | None,
+    count: int,
+    comm: Communicator | None,
+    progress: Progress,
+) -> Convergence:
+    """A given mesh, its half, and the half of that where this is small enough."""
+    from ...fem.refinement import refine_uniformly
+
+    meshes = [build_mesh(scene, comm)]
+    while len(meshes) < MAX_HALVED_MESHES and (
+        len(meshes) == 1 or blade_dofs(meshes[-1]) <= MAX_DOFS_HALVED_AGAIN
+    ):
+        meshes.append(refine_uniformly(meshes[-1]))
+    runs = [
+        (mesh, find_modes(Bodies(scene, mesh, comm), diameters, count + SPARE_MODES))
+        for mesh in progress(meshes, "meshes")
+    ]
+    found = of_meshes(runs, count)
+    keys = [key for key in ("nodal_diameter", "mode") if key in found.points]
+    given = found.points[found.points["dofs"] == found.points["dofs"].min()]
+    summary = found.summary.merge(
+        given[[*keys, "frequency"]].rename(columns={"frequency": "given"}), on=keys
+    )
+    own = abs(summary["given"] / summary["limit"] - 1)
+    summary["given_error"] = np.where(
+        summary["reason"] == "", own + summary["scatter"], UNTRUSTED_FACTOR * own
+    )
+    return replace(found, summary=summary)
 
 
 def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Convergence:
@@ -168,8 +212,10 @@ def _mesh_rows(
 
 def default_sizes(scene: Scene) -> list[float]:
     """Element sizes [m] down to the scene's own; where that is open, :data:`SIZE_RATIOS`
-    themselves.
+    themselves; none for a mesh that is given.
     """
+    if not kind_named(scene.kind).meshed_here(scene):
+        return []
     return [ratio * (scene.mesh.size or 1.0) for ratio in SIZE_RATIOS]
 
 
@@ -210,6 +256,8 @@ def fitted_order(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
         the finest value and NaN where the values have no trend, or three of them do not fall into
         line.
     """
+    if len(f) < 3:
+        return float(f[-1]), np.nan, 0.0
     if len(f) == 3:
         return *richardson(h, f), 0.0
 
@@ -237,7 +285,7 @@ def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
         line = line.sort_values("size", ascending=False)
         f = line["frequency"].to_numpy()
         limit, order, scatter = fitted_order(line["size"].to_numpy() / line["size"].iloc[-1], f)
-        reason = _order_doubt(order, line["mac"].min())
+        reason = _order_doubt(order, line["mac"].min(), len(f))
         change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
         error = (
             UNTRUSTED_FACTOR * change / f[-1]
@@ -258,10 +306,12 @@ def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def _order_doubt(order: float, mac: float) -> str:
+def _order_doubt(order: float, mac: float, meshes: int) -> str:
     """Why an order is not believed."""
     if mac < MIN_MAC:
         return f"the shapes of two meshes differ, MAC {mac:.2f}"
+    if meshes < 3:
+        return "two meshes show no order"
     if np.isnan(order):
         return "the frequencies do not fall into line"
     if not PLAUSIBLE_ORDERS[0] <= order <= PLAUSIBLE_ORDERS[1]:
