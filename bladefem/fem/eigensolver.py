@@ -147,11 +147,16 @@ def _shielded(
     x.copy(y)
 
 
-class _Mass:
-    """M as a PETSc matrix."""
+class _Operator:
+    """A product with a column (n_own, 1), as PETSc calls it: a matrix's or a preconditioner's."""
 
-    def __init__(self, pencil: _Pencil) -> None:
+    def __init__(
+        self,
+        pencil: _Pencil,
+        product: Callable[[np.ndarray], np.ndarray],
+    ) -> None:
         self.pencil = pencil
+        self.product = product
 
     def mult(
         self,
@@ -159,7 +164,15 @@ class _Mass:
         x: PETSc.Vec,
         y: PETSc.Vec,
     ) -> None:
-        _shielded(self.pencil, x, y, partial(_times_mass, self.pencil))
+        _shielded(self.pencil, x, y, self.product)
+
+    def apply(
+        self,
+        _: PETSc.PC,
+        x: PETSc.Vec,
+        y: PETSc.Vec,
+    ) -> None:
+        _shielded(self.pencil, x, y, self.product)
 
 
 def _times_mass(pencil: _Pencil, column: np.ndarray) -> np.ndarray:
@@ -189,36 +202,6 @@ def _multiple(vector: np.ndarray | None, other: np.ndarray) -> float | None:
         return None
     difference = other - factor * vector
     return factor if abs(difference).max() <= PARALLEL_TOLERANCE * abs(other).max() else None
-
-
-class _Stiffness:
-    """K as a PETSc matrix."""
-
-    def __init__(self, pencil: _Pencil) -> None:
-        self.pencil = pencil
-
-    def mult(
-        self,
-        _: PETSc.Mat,
-        x: PETSc.Vec,
-        y: PETSc.Vec,
-    ) -> None:
-        _shielded(self.pencil, x, y, partial(apply_block, self.pencil.con.K))
-
-
-class _Inverse:
-    """K^-1 as a PETSc preconditioner."""
-
-    def __init__(self, pencil: _Pencil) -> None:
-        self.pencil = pencil
-
-    def apply(
-        self,
-        _: PETSc.PC,
-        x: PETSc.Vec,
-        y: PETSc.Vec,
-    ) -> None:
-        _shielded(self.pencil, x, y, partial(_times_inverse, self.pencil))
 
 
 def _times_inverse(pencil: _Pencil, load: np.ndarray) -> np.ndarray:
@@ -353,8 +336,8 @@ def _make_solver(
     parts = 2 if pencil.doubled else 1
     own = parts * (con.own.stop - con.own.start)
     size = ((own, parts * con.T.shape[1]),) * 2
-    K = PETSc.Mat().createPython(size, _Stiffness(pencil), comm=comm)
-    M = PETSc.Mat().createPython(size, _Mass(pencil), comm=comm)
+    K = PETSc.Mat().createPython(size, _Operator(pencil, partial(apply_block, con.K)), comm=comm)
+    M = PETSc.Mat().createPython(size, _Operator(pencil, partial(_times_mass, pencil)), comm=comm)
     for matrix in (K, M):
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setUp()
@@ -375,7 +358,7 @@ def _make_solver(
     inner = transform.getKSP()
     inner.setType(PETSc.KSP.Type.PREONLY)
     inner.getPC().setType(PETSc.PC.Type.PYTHON)
-    inner.getPC().setPythonContext(_Inverse(pencil))
+    inner.getPC().setPythonContext(_Operator(pencil, partial(_times_inverse, pencil)))
     first = K.createVecRight()
     pencil.put(start.sum(axis=1, keepdims=True).astype(con.dtype), first)
     eps.setInitialSpace(first)

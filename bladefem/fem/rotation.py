@@ -89,14 +89,8 @@ def unit_speed_displacement(
     Args:
         flex: the factorised body in nodal diameter 0 or without cyclic symmetry.
     """
-    con = flex.con
-    if con.nodal_diameter not in (None, 0):
-        raise InputError(
-            f"nodal_diameter is {con.nodal_diameter}, expected 0: a rotation loads all sectors "
-            "alike"
-        )
-    load = centrifugal(con.body, 1.0, axis).reshape(-1, 1)
-    return expand_to_mesh(con, compliance(flex, restrict_load(con, load)))[:, :, 0].real
+    load = centrifugal(flex.con.body, 1.0, axis)
+    return _static_displacement(flex, load, "a rotation loads all sectors alike")
 
 
 def has_thermal_strain(body: Body) -> bool:
@@ -131,14 +125,22 @@ def thermal_displacement(flex: Flexibility, quadrature: str = "exact") -> np.nda
     Args:
         flex: the factorised body in nodal diameter 0 or without cyclic symmetry.
     """
+    load = thermal_force(flex.con.body, quadrature)
+    return _static_displacement(flex, load, "the temperature is that of all sectors")
+
+
+def _static_displacement(flex: Flexibility, load: np.ndarray, reason: str) -> np.ndarray:
+    """(n_points, dim) linear displacement [m] by forces (n_points*dim,) [N], the same in all
+    sectors.
+
+    Args:
+        reason: why no other nodal diameter is loaded, for the message.
+    """
     con = flex.con
     if con.nodal_diameter not in (None, 0):
-        raise InputError(
-            f"nodal_diameter is {con.nodal_diameter}, expected 0: the temperature is that of all "
-            "sectors"
-        )
-    load = thermal_force(con.body, quadrature).reshape(-1, 1)
-    return expand_to_mesh(con, compliance(flex, restrict_load(con, load)))[:, :, 0].real
+        raise InputError(f"nodal_diameter is {con.nodal_diameter}, expected 0: {reason}")
+    solved = compliance(flex, restrict_load(con, load.reshape(-1, 1)))
+    return expand_to_mesh(con, solved)[:, :, 0].real
 
 
 def _thermal_strain(body: Body, degree: int) -> Any:

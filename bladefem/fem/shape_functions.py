@@ -13,6 +13,8 @@ from itertools import product
 import numpy as np
 from scipy.special import roots_jacobi
 
+from geometry.topology import EDGES, QUADS
+
 # meshio's word: (shape, degree). quad8 and hexahedron20 are read but have no dolfinx twin.
 SHAPES = {
     "line": ("line", 1),
@@ -53,37 +55,6 @@ _CORNERS: dict[str, list[tuple[int, ...]]] = {
         (0, 1, 1),
     ],
 }
-_EDGES = {
-    "line": [(0, 1)],
-    "triangle": [(0, 1), (1, 2), (2, 0)],
-    "quad": [(0, 1), (1, 2), (2, 3), (3, 0)],
-    "tetra": [(0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)],
-    "hexahedron": [
-        (0, 1),
-        (0, 3),
-        (0, 4),
-        (1, 2),
-        (1, 5),
-        (2, 3),
-        (2, 6),
-        (3, 7),
-        (4, 5),
-        (4, 7),
-        (5, 6),
-        (6, 7),
-    ],
-}
-_QUADS = {
-    "quad": [(0, 1, 2, 3)],
-    "hexahedron": [
-        (0, 3, 2, 1),
-        (0, 1, 5, 4),
-        (0, 4, 7, 3),
-        (1, 2, 6, 5),
-        (2, 3, 7, 6),
-        (4, 5, 6, 7),
-    ],
-}
 
 
 def corner_count(cell_type: str) -> int:
@@ -98,7 +69,7 @@ def reference_nodes(cell_type: str) -> np.ndarray:
     corner = np.array(_CORNERS[shape], float)
     if degree == 1:
         return corner
-    groups = [*_EDGES[shape], *_QUADS.get(shape, [])]
+    groups = [*EDGES[shape], *QUADS.get(shape, [])]
     middle = [corner[list(group)].mean(0) for group in groups]
     centre = [corner.mean(0)] if shape == "hexahedron" else []
     return np.array([*corner, *middle, *centre])

@@ -174,17 +174,22 @@ def draw_pressure(
             ax.set_title(caption(seat, ", " if stacked else ",\n"), fontsize=9, fontweight="normal")
         figure = axes[0, 0].figure
         if not line:
-            figure.colorbar(
-                ScalarMappable(Normalize(0, peak), PRESSURE_COLOURS),
-                ax=list(axes.flat),
-                aspect=25,
-                pad=0.02,
-                label="contact pressure [MPa]",
-            )
+            add_colourbar(axes, peak, PRESSURE_COLOURS, "contact pressure [MPa]")
         label_outer(axes, line)
         figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
         return figure
+
+
+def add_colourbar(axes: np.ndarray, largest: float, colours: str, label: str) -> None:
+    """One colour bar from 0 to the largest value, for all faces."""
+    axes.flat[0].figure.colorbar(
+        ScalarMappable(Normalize(0, largest), colours),
+        ax=list(axes.flat),
+        aspect=25,
+        pad=0.02,
+        label=label,
+    )
 
 
 def label_outer(axes: np.ndarray, line: bool) -> None:

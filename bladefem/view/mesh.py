@@ -11,8 +11,9 @@ import numpy as np
 from matplotlib.patches import Patch as Swatch
 
 from geometry.mesh import Mesh
+from geometry.topology import CORNERS
 
-from .skin import CORNERS, Skin, family, sector_motion, skin, wheel_count, wheel_skin
+from .skin import Skin, family, sector_motion, skin, wheel_count, wheel_skin
 from .style import COLOURS, canvas, headline, photograph, show_photograph, size_for
 
 if TYPE_CHECKING:

@@ -10,27 +10,8 @@ import numpy as np
 
 from bladefem.errors import InputError
 from geometry.mesh import Mesh, sector_of
+from geometry.topology import CORNERS, EDGES
 
-# gmsh's node order: corners, then one node on each of these edges.
-EDGES = {
-    "triangle": ((0, 1), (1, 2), (2, 0)),
-    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
-    "tetra": ((0, 1), (1, 2), (2, 0), (3, 0), (2, 3), (1, 3)),
-    "hexahedron": (
-        (0, 1),
-        (0, 3),
-        (0, 4),
-        (1, 2),
-        (1, 5),
-        (2, 3),
-        (2, 6),
-        (3, 7),
-        (4, 5),
-        (4, 7),
-        (5, 6),
-        (6, 7),
-    ),
-}
 SIDES = {
     "tetra": ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)),
     "hexahedron": (
@@ -42,7 +23,8 @@ SIDES = {
         (4, 5, 6, 7),
     ),
 }
-CORNERS = {"line": 2, "triangle": 3, "quad": 4, "tetra": 4, "hexahedron": 8}
+# cells that are drawn
+DRAWN_CELLS = ("triangle", "quad", "tetra", "hexahedron")
 
 
 @dataclass(frozen=True)
@@ -116,9 +98,9 @@ def face_corners(mesh: Mesh) -> int:
         InputError: cells that cannot be drawn.
     """
     shape = family(mesh.cell_type)
-    if shape not in EDGES:
+    if shape not in DRAWN_CELLS:
         raise InputError(
-            f"cells of type '{mesh.cell_type}' cannot be drawn, expected {', '.join(EDGES)}"
+            f"cells of type '{mesh.cell_type}' cannot be drawn, expected {', '.join(DRAWN_CELLS)}"
         )
     return len(SIDES[shape][0]) if shape in SIDES else CORNERS[shape]
 

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.tri import Triangulation
 
 from bladefem.data import Patch
 
-from .contact import arrangement, label_outer, seat_name, unfold
+from .contact import add_colourbar, arrangement, label_outer, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
@@ -62,13 +60,7 @@ def draw_work(
             )
         figure = axes[0, 0].figure
         if not line:
-            figure.colorbar(
-                ScalarMappable(Normalize(0, most), WORK_COLOURS),
-                ax=list(axes.flat),
-                aspect=25,
-                pad=0.02,
-                label="friction work [J/m²]",
-            )
+            add_colourbar(axes, most, WORK_COLOURS, "friction work [J/m²]")
         label_outer(axes, line)
         named = {
             label: handle
