@@ -68,6 +68,8 @@ class PortModel:
     static_offset: RealOrComplex | None = None
     # (m,) or coupled (m, m) viscous modal damping, in addition to the model's [1/s]
     damping: RealOrComplex | None = None
+    # (m, m) forces of the displacements that have no energy, by unsymmetric stiffness [1/s^2]
+    circulatory: RealOrComplex | None = None
 
     def __post_init__(self) -> None:
         p = len(self.residual)
@@ -77,10 +79,11 @@ class PortModel:
             "shapes": [(p, m)],
             "residual": [(p, p)],
             "damping": [(m,), (m, m)],
+            "circulatory": [(m, m)],
         }
         for name, shapes in wanted.items():
             value = getattr(self, name)
-            if value is None and name == "damping":
+            if value is None and name in ("damping", "circulatory"):
                 continue
             if np.shape(value) not in shapes or not np.isfinite(value).all():
                 raise InputError(

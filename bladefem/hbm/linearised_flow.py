@@ -34,7 +34,7 @@ def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray
     M = len(system.stiffness)
     A = np.zeros((4 * M, 4 * M))
     A[:M, M : 2 * M] = np.eye(M)
-    A[M : 2 * M, :M] = -np.diag(system.stiffness)
+    A[M : 2 * M, :M] = -system.stiffness_matrix
     A[M : 2 * M, M : 2 * M] = -system.damping
     A[M : 2 * M, 2 * M : 3 * M] = np.eye(M)
     A[2 * M : 3 * M, 3 * M :] = np.eye(M) / dt

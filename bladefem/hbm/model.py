@@ -100,6 +100,12 @@ class ReducedModel:
         )
 
     @cached_property
+    def circulatory(self) -> bool:
+        """Displacements raise forces that have no energy: some stiffness is unsymmetric."""
+        bodies = self.sides + (self.damper if isinstance(self.damper, tuple) else ())
+        return any(body.circulatory is not None for body in bodies)
+
+    @cached_property
     def directions(self) -> int:
         """Displacements of a node that enter the balance: the normal one does where some kn > 0."""
         return self.elements.tangents + bool(np.any(self.elements.kn > 0))

@@ -215,6 +215,8 @@ def _frame(
     bodies = bodies_of(model, H)
     if any(body.coupled is not None for body in bodies):
         raise InputError("damping that couples modes: expected modal damping for nonlinear modes")
+    if model.circulatory:
+        raise InputError("unsymmetric stiffness: expected a symmetric one for nonlinear modes")
     still = condense(_unloaded(model), float(model.side(1).omega[mode]), H)
     shape = model.blades(H).shapes[_of(model.blades(H), 1)][model.blades(H).contact][:, mode]
     mean = flexibility_of_mean(still.condensed.flex)

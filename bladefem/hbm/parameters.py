@@ -64,7 +64,14 @@ def _scale_density(body: PortModel, factor: float) -> PortModel:
     """
     root = float(np.sqrt(factor))
     damping = None if body.damping is None else body.damping / factor
-    return replace(body, omega=body.omega / root, shapes=body.shapes / root, damping=damping)
+    circulatory = None if body.circulatory is None else body.circulatory / factor
+    return replace(
+        body,
+        omega=body.omega / root,
+        shapes=body.shapes / root,
+        damping=damping,
+        circulatory=circulatory,
+    )
 
 
 def _scale_load(model: ReducedModel, factor: float) -> ReducedModel:

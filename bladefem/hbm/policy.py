@@ -65,6 +65,9 @@ def uses_coulomb_kernels(model: ReducedModel) -> bool:
 
 def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
     """True if a whole point is one compiled call: few 1-D Coulomb elements."""
+    if model.circulatory:
+        # what couples the modes then changes with the frequency
+        return False
     dofs = model.springs.size
     return dofs <= COMPILED_POINT_DOFS and uses_compiled_newton(model, dofs * (2 * harmonics + 1))
 

@@ -144,9 +144,11 @@ def _modal_start(
     q = np.zeros_like(push)
     for n in range(1, H + 1):
         w = n * point.omega
-        q[n] = np.linalg.solve(np.diag(system.stiffness - w**2) + 1j * w * system.damping, push[n])
+        impedance = system.stiffness_matrix - w**2 * np.eye(len(system.stiffness))
+        q[n] = np.linalg.solve(impedance + 1j * w * system.damping, push[n])
     still = system.stiffness <= 0
-    q[0, ~still] = push[0, ~still] / system.stiffness[~still]
+    held = system.stiffness_matrix[np.ix_(~still, ~still)]
+    q[0, ~still] = np.linalg.solve(held, push[0, ~still])
     if still.any():
         # where the rigid motions rest is known from the contacts; where they walk it is anywhere
         mean = point.w[:, :, 0].ravel()

@@ -9,6 +9,7 @@ are its modes.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import reduce
 
@@ -45,6 +46,14 @@ class SectorModes:
     # (r p, M) and (r p, m) the same as U and R for the p probes of each blade
     probe: np.ndarray
     probe_residual: np.ndarray
+    # (M, M) forces of the displacements that have no energy [1/s^2]; None where there are none
+    circulatory: np.ndarray | None = None
+
+    @property
+    def stiffness_matrix(self) -> np.ndarray:
+        """(M, M) L with the forces that have no energy [1/s^2]."""
+        matrix = np.diag(self.stiffness)
+        return matrix if self.circulatory is None else matrix + self.circulatory
 
 
 def sector_modes(model: ReducedModel) -> SectorModes:
@@ -64,7 +73,13 @@ def sector_modes(model: ReducedModel) -> SectorModes:
         linalg.block_diag(*[part.turn for part in parts]),
         np.hstack([_probes(part, len(parts[0].probe)) for part in parts]),
         parts[0].probe_residual,
+        _joined_circulation(parts) if model.circulatory else None,
     )
+
+
+def _joined_circulation(parts: Sequence[SectorModes]) -> np.ndarray:
+    """(M, M) of the modes of several bodies one after the other."""
+    return linalg.block_diag(*[part.stiffness_matrix - np.diag(part.stiffness) for part in parts])
 
 
 def _probes(part: SectorModes, count: int) -> np.ndarray:
@@ -120,8 +135,14 @@ def _same(
             (one.omega, other.omega),
             (one.shapes, other.shapes),
             (one.residual, other.residual),
+            (_circulation(one), _circulation(other)),
         )
     )
+
+
+def _circulation(body: PortModel) -> np.ndarray:
+    """(m, m), or empty where there is none."""
+    return np.zeros((0, 0)) if body.circulatory is None else body.circulatory
 
 
 def _bodies(model: ReducedModel, r: int) -> list[tuple[Stack, float]]:
@@ -140,6 +161,7 @@ def _ring(
     contact: list[np.ndarray] = []
     probe: list[np.ndarray] = []
     loss: list[np.ndarray] = []
+    turning: list[np.ndarray] = []
     turned: list[np.ndarray] = []
     blade = np.arange(r)
     for j in range(r):
@@ -150,6 +172,9 @@ def _ring(
         viscous = np.diag(stack.viscous[row]) + np.diag(
             np.divide(stack.hysteretic[row], own, out=np.zeros_like(own), where=own > 0)
         )
+        moved = np.zeros((len(own), len(own)))
+        if stack.circulatory is not None:
+            moved = stack.circulatory[min(j, len(stack.circulatory) - 1)]
         if stack.coupled is not None:
             viscous = viscous + stack.coupled[min(j, len(stack.coupled) - 1)]
         double = 0 < 2 * j < r
@@ -160,6 +185,7 @@ def _ring(
             found.extend([shapes.real] + [shapes.imag] * double)
         stiffness.extend([own**2] * (1 + double))
         loss.append(_real_form(viscous) if double else viscous.real)
+        turning.append(_real_form(moved) if double else moved.real)
         handed_on = np.exp(-2j * np.pi * j / r) * np.eye(len(own))
         turned.append(_real_form(handed_on) if double else handed_on.real)
     return SectorModes(
@@ -171,6 +197,7 @@ def _ring(
         linalg.block_diag(*turned),
         np.hstack(probe),
         _ring_residual(stack, r, stack.probe),
+        None if stack.circulatory is None else linalg.block_diag(*turning),
     )
 
 

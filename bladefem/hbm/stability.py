@@ -77,7 +77,7 @@ def stability_verdict(
     """
     if not solution.converged:
         return Verdict(UNKNOWN, reason="not converged")
-    if model.directions == model.elements.tangents and model.damped:
+    if has_one_motion(model):
         return Verdict(UNIQUE)
     system = _system(model)
     if isinstance(system, InputError):
@@ -98,11 +98,17 @@ def _needs_a_closer_look(growth: float) -> bool:
     return growth > UNSTABLE_GROWTH - NEAR_ONE and abs(growth) > NEUTRAL_GROWTH
 
 
+def has_one_motion(model: ReducedModel) -> bool:
+    """Normal loads are prescribed, and the bodies lose work by themselves in every motion."""
+    prescribed = model.directions == model.elements.tangents
+    return prescribed and model.damped and not model.circulatory
+
+
 def verdict_operations(model: ReducedModel, solution: Solution) -> float:
     """Operations of a verdict with the fewest instants, roughly; 0 where none are needed or it
     cannot be made.
     """
-    if not solution.converged or (model.directions == model.elements.tangents and model.damped):
+    if not solution.converged or has_one_motion(model):
         return 0.0
     system = _system(model)
     if isinstance(system, InputError):
@@ -274,12 +280,16 @@ def _without_stuck(
     R = R - across @ inverse @ across.T
     K = np.diag(system.stiffness) + own.T @ inverse @ own
     values, vectors = np.linalg.eigh((K + K.T) / 2)
+    circulatory = system.circulatory
+    if circulatory is not None:
+        circulatory = vectors.T @ circulatory @ vectors
     changed = replace(
         system,
         stiffness=np.maximum(values, 0.0),
         damping=vectors.T @ system.damping @ vectors,
         contact=U @ vectors,
         residual=R,
+        circulatory=circulatory,
         turn=vectors.T @ system.turn @ vectors,
     )
     return changed, changed.contact, R

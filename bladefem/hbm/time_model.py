@@ -115,6 +115,8 @@ def _bodies_in_time(model: ReducedModel) -> list[Stack]:
         raise InputError("elements with two tangents, expected tangents = 1")
     if len(model.sides) > 1 or (isinstance(model.damper, tuple) and len(model.damper) > 1):
         raise InputError("one body for each harmonic, expected a single one for all of them")
+    if model.circulatory:
+        raise InputError("unsymmetric stiffness, expected a symmetric one for the model in time")
     damper = model.elastic_damper(0)
     bodies = [model.blades(0)] + ([] if damper is None else [damper])
     if isinstance(model.damper, RigidBody):

@@ -123,7 +123,7 @@ def _higher_motion(
         part[np.minimum(orders, len(part) - 1)]
         for part in (body.shapes[:, body.contact], body.residual[:, body.contact, body.contact])
     )
-    names = ("omega", "viscous", "hysteretic", "coupled")
+    names = ("omega", "viscous", "hysteretic", "coupled", "circulatory")
     each: dict[str, Any] = {
         name: np.repeat(part[rows], p, axis=0)
         for name in names

@@ -116,6 +116,9 @@ def join_bodies(bodies: tuple[PortModel, ...]) -> PortModel:
     damping = None
     if any(body.damping is not None for body in bodies):
         damping = block_diag(*map(_damping_matrix, bodies))
+    circulatory = None
+    if any(body.circulatory is not None for body in bodies):
+        circulatory = block_diag(*map(_circulatory_matrix, bodies))
     return PortModel(
         np.concatenate([body.omega for body in bodies]),
         block_diag(*(body.shapes for body in bodies))[order],
@@ -123,6 +126,7 @@ def join_bodies(bodies: tuple[PortModel, ...]) -> PortModel:
         ports,
         bodies[0].nodal_diameter,
         damping=damping,
+        circulatory=circulatory,
     )
 
 
@@ -160,6 +164,10 @@ def _damping_matrix(body: PortModel) -> np.ndarray:
     return np.diag(body.damping) if body.damping.ndim == 1 else body.damping
 
 
+def _circulatory_matrix(body: PortModel) -> np.ndarray:
+    return np.zeros((len(body.omega),) * 2) if body.circulatory is None else body.circulatory
+
+
 def _mirror(body: PortModel) -> PortModel:
     """The body in nodal diameter -n: everything conjugate."""
     return replace(
@@ -167,4 +175,5 @@ def _mirror(body: PortModel) -> PortModel:
         shapes=body.shapes.conj(),
         residual=body.residual.conj(),
         damping=None if body.damping is None else body.damping.conj(),
+        circulatory=None if body.circulatory is None else body.circulatory.conj(),
     )

@@ -21,6 +21,10 @@ RIGID_EIGENVALUE_SHARE = 1e-10
 MASSLESS_EIGENVALUE_SHARE = 1e-13
 # negative damping below this share of the largest one is rounding
 DAMPING_ROUNDING_SHARE = 1e-9
+# difference of a Hermitian matrix from its transposed conjugate, relative, that is rounding
+HERMITIAN_ROUNDING_SHARE = 1e-8
+# action of the unsymmetric part on a motion, over its largest, that is rounding
+CIRCULATION_ROUNDING_SHARE = 1e-9
 
 
 def port_model_from_matrices(
@@ -31,6 +35,7 @@ def port_model_from_matrices(
     count: int | None = None,
     C: np.ndarray | None = None,
     nodal_diameter: int | None = None,
+    unsymmetric: bool = False,
 ) -> PortModel:
     """The body M, C, K seen from its ports, by normal modes and the residual flexibility of the
     modes left out.
@@ -43,21 +48,25 @@ def port_model_from_matrices(
         count: modes kept; all when left out.
         C: (dofs, dofs) viscous damping and gyroscopic matrix [N s/m], which need not be symmetric;
             modes that it couples stay coupled.
+        unsymmetric: K may be unsymmetric: its modes are those of the symmetric part, which the rest
+            couples.
 
     Degrees of freedom without mass follow the others statically, and leave their flexibility as a
     residual one; the damping of that flexibility is left out.
 
     Raises:
-        InputError: shapes do not fit, M or K is not Hermitian, M is not positive semidefinite, or a
-            motion has neither mass nor stiffness.
+        InputError: shapes do not fit, M or K is not Hermitian, M is not positive semidefinite, a
+            motion has neither mass nor stiffness, or unsymmetric stiffness acts on a motion that
+            lacks one of them.
     """
+    K, circulation = _split_stiffness(K) if unsymmetric else (K, None)
     M, K, C = _checked_matrices(M, K, C)
     P, slices = _port_selection(ports, M.shape[0])
     massless = np.zeros((len(P), len(P)))
     try:
         values, vectors = linalg.eigh(K, M)
     except linalg.LinAlgError:
-        M, K, C, P, massless = _without_massless(M, K, C, P)
+        M, K, C, P, massless, circulation = _without_massless(M, K, C, P, circulation)
         values, vectors = linalg.eigh(K, M)
     if values[0] < -RIGID_EIGENVALUE_SHARE * values[-1]:
         raise InputError(
@@ -80,7 +89,39 @@ def port_model_from_matrices(
         slices,
         nodal_diameter,
         damping=damping,
+        circulatory=_modal_circulation(circulation, kept, values[:count]),
     )
+
+
+def _split_stiffness(K: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Hermitian and skew-Hermitian part of K; None for a second one that is rounding."""
+    K = _square_matrix(K, "K")
+    skew = (K - K.conj().T) / 2
+    if abs(skew).max() <= HERMITIAN_ROUNDING_SHARE * abs(K).max():
+        return K, None
+    return (K + K.conj().T) / 2, skew
+
+
+def _modal_circulation(
+    circulation: np.ndarray | None, kept: np.ndarray, values: np.ndarray
+) -> np.ndarray | None:
+    """(m, m) of the modes (dofs, m) with these eigenvalues (m,) [1/s^2].
+
+    Raises:
+        InputError: a rigid motion is pushed, or pushes.
+    """
+    if circulation is None:
+        return None
+    modal = kept.conj().T @ circulation @ kept
+    rigid = values == 0
+    acting = abs(modal[rigid]).max(initial=0.0)
+    if acting > CIRCULATION_ROUNDING_SHARE * abs(modal).max():
+        raise InputError(
+            f"K: its unsymmetric part acts on a rigid motion by {acting:.3g} 1/s^2, expected none"
+        )
+    modal[rigid] = 0.0
+    modal[:, rigid] = 0.0
+    return modal
 
 
 def _checked_matrices(
@@ -159,9 +200,10 @@ def _without_massless(
     K: np.ndarray,
     C: np.ndarray | None,
     P: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray]:
+    circulation: np.ndarray | None,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray, np.ndarray, np.ndarray | None]:
     """M, K, C and port readings P (p, dofs) on the motions with mass, the others following
-    statically, and the flexibility (p, p) of the others.
+    statically, the flexibility (p, p) of the others, and the skew part of K on the first.
     """
     masses, motions = linalg.eigh(M)
     if masses[0] < -MASSLESS_EIGENVALUE_SHARE * masses[-1]:
@@ -178,6 +220,11 @@ def _without_massless(
         raise InputError(
             "M and K: a motion has neither mass nor stiffness, expected one of them in each"
         )
+    if circulation is not None:
+        acting = abs(circulation @ light).max()
+        if acting > CIRCULATION_ROUNDING_SHARE * abs(circulation).max():
+            raise InputError("K: its unsymmetric part acts on a motion without mass, expected none")
+        circulation = heavy.conj().T @ circulation @ heavy
     follow = heavy - light @ linalg.solve(own, light.conj().T @ K @ heavy, assume_a="pos")
     read = P @ light
     return (
@@ -186,6 +233,7 @@ def _without_massless(
         None if C is None else follow.conj().T @ C @ follow,
         P @ follow,
         read @ linalg.solve(own, read.conj().T, assume_a="pos"),
+        circulation,
     )
 
 
@@ -201,10 +249,11 @@ def _square_matrix(matrix: np.ndarray, name: str) -> np.ndarray:
 def _hermitian_matrix(matrix: np.ndarray, name: str) -> np.ndarray:
     matrix = _square_matrix(matrix, name)
     error = abs(matrix - matrix.conj().T).max()
-    if error > 1e-8 * abs(matrix).max():
+    if error > HERMITIAN_ROUNDING_SHARE * abs(matrix).max():
+        option = ", or unsymmetric = True" if name == "K" else ""
         raise InputError(
             f"{name} differs from its transposed conjugate by {error:.3g}: expected a Hermitian "
-            "matrix"
+            f"matrix{option}"
         )
     return (matrix + matrix.conj().T) / 2
 

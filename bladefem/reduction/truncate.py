@@ -26,4 +26,5 @@ def truncate_modes(body: PortModel, count: int) -> PortModel:
         shapes=body.shapes[:, kept],
         residual=body.residual + (high / omega**2) @ high.conj().T,
         damping=damping,
+        circulatory=None if body.circulatory is None else body.circulatory[kept, kept],
     )

@@ -278,6 +278,8 @@ def _check_wheel(wheel: Wheel) -> None:
         raise InputError(
             f"sectors: nodal diameters {sorted(wheel.sectors)}, expected 0 to {wheel.count // 2}"
         )
+    if any(body.circulatory is not None for body in wheel.sectors.values()):
+        raise InputError("sectors: unsymmetric stiffness, expected a symmetric one in a wheel")
     loads = _size(wheel.sectors[0], "load")
     for name in ("contact", "load", "probe"):
         sizes = {_size(body, name) for body in wheel.sectors.values()}

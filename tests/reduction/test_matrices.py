@@ -22,6 +22,8 @@ def receptance(body, w):
     Z = np.diag(body.omega**2 - w**2) + 1j * w * (
         np.diag(damping) if damping.ndim == 1 else damping
     )
+    if body.circulatory is not None:
+        Z = Z + body.circulatory
     return body.shapes @ np.linalg.solve(Z, body.shapes.conj().T) + body.residual
 
 
@@ -198,3 +200,44 @@ def test_motions_without_mass_follow_statically():
     for w in (0.0, 0.4, 1.7):
         exact = P @ np.linalg.solve(K - w**2 * M, P.T)
         np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)
+
+
+def test_unsymmetric_stiffness_is_part_of_the_receptance():
+    """At rest as well; of all modes, and of a body joined of two."""
+    rng = np.random.default_rng(5)
+    turn = rng.normal(size=(5, 5))
+    K = chain(ground=1.0) + 0.2 * (turn - turn.T)
+    C = 0.02 * chain(ground=1.0)
+    body = port_model_from_matrices(
+        np.eye(5), K, {"contact": [0, 2], "probe": [4]}, C=C, unsymmetric=True
+    )
+    P = np.eye(5)[[0, 2, 4]]
+    for w in (0.0, 0.5, 1.3):
+        exact = P @ np.linalg.solve(K - w**2 * np.eye(5) + 1j * w * C, P.T)
+        assert abs(exact - exact.T).max() > 0.02 * abs(exact).max()
+        np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)
+        twice = receptance(join((body, body)), w)
+        np.testing.assert_allclose(twice[:2, :2], exact[:2, :2], rtol=0, atol=1e-11)
+        np.testing.assert_allclose(twice[2:4, 2:4], exact[:2, :2], rtol=0, atol=1e-11)
+    assert truncated(body, 3).circulatory.shape == (3, 3)
+
+
+def test_unsymmetric_stiffness_is_asked_for_and_leaves_rigid_and_massless_motions_alone():
+    skew = np.zeros((5, 5))
+    skew[2, 3], skew[3, 2] = 0.3, -0.3
+    ports = {"contact": [0, 1], "probe": [4]}
+    with pytest.raises(InputError, match="unsymmetric = True"):
+        port_model_from_matrices(np.eye(5), chain(ground=1.0) + skew, ports)
+    with pytest.raises(InputError, match="rigid motion"):
+        port_model_from_matrices(np.eye(5), chain() + skew, ports, unsymmetric=True)
+    K = chain(ground=1.0) + skew
+    with pytest.raises(InputError, match="without mass"):
+        port_model_from_matrices(np.diag([1.0, 1, 0, 1, 1]), K, ports, unsymmetric=True)
+    M = np.diag([1.0, 0.0, 2.0, 1.0, 0.0])
+    body = port_model_from_matrices(M, K, ports, unsymmetric=True)
+    P = np.eye(5)[[0, 1, 4]]
+    for w in (0.0, 0.4, 1.7):
+        exact = P @ np.linalg.solve(K - w**2 * M, P.T)
+        np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)
+    symmetric = port_model_from_matrices(M, chain(ground=1.0), ports, unsymmetric=True)
+    assert symmetric.circulatory is None

@@ -71,10 +71,12 @@ class Stack:
     contact: slice
     load: slice
     probe: slice
+    # (S, m, m) forces of the displacements that have no energy [1/s^2]
+    circulatory: RealOrComplex | None = None
 
     def first(self, count: int) -> Stack:
         """The body in the first nodal diameters."""
-        names = ("omega", "viscous", "hysteretic", "coupled", "shapes", "residual")
+        names = ("omega", "viscous", "hysteretic", "coupled", "circulatory", "shapes", "residual")
         return replace(
             self,
             **{name: part[:count] for name in names if (part := getattr(self, name)) is not None},
@@ -116,6 +118,9 @@ def stack_bodies(
     coupled = None
     if any(body.damping is not None and body.damping.ndim == 2 for body in bodies):
         coupled = np.array([_square_damping(body, most) for body in bodies])
+    circulatory = None
+    if any(body.circulatory is not None for body in bodies):
+        circulatory = np.array([_padded_circulation(body, most) for body in bodies])
     shapes = np.array(
         [_padded_shapes(body.shapes[p], most) for body, p in zip(bodies, order, strict=True)]
     )
@@ -124,7 +129,16 @@ def stack_bodies(
     )
     a, b, c = np.cumsum([len(part) for part in ports[0]])
     return Stack(
-        omega, viscous, hysteretic, coupled, shapes, residual, slice(0, a), slice(a, b), slice(b, c)
+        omega,
+        viscous,
+        hysteretic,
+        coupled,
+        shapes,
+        residual,
+        slice(0, a),
+        slice(a, b),
+        slice(b, c),
+        circulatory,
     )
 
 
@@ -139,7 +153,7 @@ def rigid_stack(mass: np.ndarray, B: np.ndarray) -> Stack:
 
 
 def modal_flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
-    """(k, m), or (k, m, m) for coupled damping: inverse modal impedances at the circular
+    """(k, m), or (k, m, m) for coupled modes: inverse modal impedances at the circular
     frequencies w (k,) [s^2].
 
     Rigid modes count as immovable at w = 0.
@@ -150,7 +164,7 @@ def modal_flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
     w = w[:, None]
     Z = stack.omega**2 - w**2 + 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic)
     still = (w == 0) & (stack.omega == 0)
-    if stack.coupled is None:
+    if stack.coupled is None and stack.circulatory is None:
         hit = np.any((Z == 0) & ~still, axis=1)
         if hit.any():
             raise NotSolvedError(
@@ -158,7 +172,11 @@ def modal_flexibility(stack: Stack, w: np.ndarray) -> np.ndarray:
                 "expected some damping, or another frequency"
             )
         return np.divide(1.0, Z, out=np.zeros_like(Z), where=~still)
-    full = 1j * w[:, :, None] * stack.coupled
+    full = np.zeros((*Z.shape, Z.shape[1]), dtype=complex)
+    if stack.coupled is not None:
+        full += 1j * w[:, :, None] * stack.coupled
+    if stack.circulatory is not None:
+        full += stack.circulatory
     modes = np.arange(Z.shape[1])
     full[:, modes, modes] += np.where(still, 1.0, Z)
     flexible = np.linalg.inv(full)
@@ -272,7 +290,7 @@ def port_receptance(
     both = [np.arange(len(body.residual))[part] for part in (rows, columns)]
     ports = {"contact": np.concatenate(both)}
     stack = stack_bodies(
-        (PortModel(body.omega, body.shapes, body.residual, ports, damping=body.damping),),
+        (replace(body, ports=ports),),
         damping,
         np.arange(len(ports["contact"])),
     )
@@ -302,6 +320,13 @@ def _fill_modes(
 ) -> np.ndarray:
     spare = count - len(values)
     return np.concatenate([values, np.full(spare, value)]) if spare else values
+
+
+def _padded_circulation(body: PortModel, count: int) -> np.ndarray:
+    """(count, count) of the body's m modes."""
+    if body.circulatory is None:
+        return np.zeros((count, count))
+    return np.pad(body.circulatory, ((0, count - len(body.omega)),) * 2)
 
 
 def _square_damping(body: PortModel, count: int) -> np.ndarray:

@@ -20,6 +20,7 @@ from ...util.arrays import ComplexArray, RealArray
 from ..model import ReducedModel
 from ..solver.newton_compiled import Condensed, motion_scale
 from .bodies import modal_flexibility
+from .circulation import joined_circulation, mean_modal_flexibility, with_circulation
 from .condensation_compiled import linear_part, unsprung_flexibility
 from .contact_flexibility import form_matrices
 from .mean_motion import unheld_mean_motions
@@ -88,13 +89,29 @@ def condense(
         B = B[:, :0]
         g = g[:0]
         rigid = rigid[:, :0]
+    if model.circulatory:
+        bodies = with_circulation(bodies, model, omega, harmonics)
     try:
         modal, condensed, free, stuck = linear_part(omega, bodies, springs, harmonics)
     except (ZeroDivisionError, np.linalg.LinAlgError):
         raise _exact_resonance(model, omega, harmonics) from None
     if not (np.isfinite(stuck).all() and np.isfinite(free).all()):
         raise _exact_resonance(model, omega, harmonics)
-    return Linear(omega, springs, bodies, modal, condensed, free, stuck, B, g, rigid)
+    linear = Linear(omega, springs, bodies, modal, condensed, free, stuck, B, g, rigid)
+    return _with_circulating_mean(model, linear) if model.circulatory else linear
+
+
+def _with_circulating_mean(model: ReducedModel, linear: Linear) -> Linear:
+    """The modes of the mean are coupled as well, which is nothing that damping does."""
+    bodies = linear.bodies
+    flexible = mean_modal_flexibility(
+        bodies.own[0], joined_circulation(model, len(linear.free) - 1)[0]
+    )
+    single, coupled = linear.modal
+    coupled[0] = flexible
+    free = linear.free.copy()
+    free[0] = bodies.direct[0] + bodies.contact[0] @ (flexible @ bodies.push[0])
+    return _with_motion(replace(linear, modal=(single, coupled)), free, linear.stuck)
 
 
 def scale_loads(linear: Linear, factor: float) -> Linear:
