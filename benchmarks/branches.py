@@ -12,6 +12,10 @@ Friction forces of nodes that never slip are what the loading history left there
 from none, the march from those of its own way through the band. Where the march is higher, the
 library sweeps once more with these forces; what it then finds is a motion of another loading
 history, and is counted apart.
+
+Seeds 0 to 200: none missed; one higher by another loading history (seed 93); no steady march in
+nine; five searches report something left open. CPU time 97 s for the library and 261 s for the
+march.
 """
 
 from __future__ import annotations
@@ -129,4 +133,4 @@ def main(first: int, last: int) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(a) for a in sys.argv[1:3]) if len(sys.argv) > 2 else (0, 200))
+    main(*(int(a) for a in sys.argv[1:3]) if len(sys.argv) > 2 else (0, 201))

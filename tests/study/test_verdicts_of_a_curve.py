@@ -17,7 +17,12 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import stability
 from bladefem.study.pipeline.kept_band import KeptBand, kept_band
 from bladefem.study.pipeline.response_remarks import search_sentence
-from bladefem.study.pipeline.stability import model_in_time, stability_of, stability_sentence
+from bladefem.study.pipeline.stability import (
+    judged_blades,
+    model_in_time,
+    stability_of,
+    stability_sentence,
+)
 
 
 def test_a_wave_of_one_harmonic_is_judged_on_the_bodies_with_which_it_repeats():
@@ -35,6 +40,19 @@ def test_a_wave_of_one_harmonic_is_judged_on_the_bodies_with_which_it_repeats():
     model = model_in_time(family, settings)
     assert len(model.sides) == 8
     assert stability_verdict(model, point).verdict in (STABLE, UNSTABLE)
+
+
+def test_the_sentence_says_which_disturbances_a_wave_was_judged_against():
+    """Those that repeat after as many blades: no verdict on those of other nodal diameters."""
+    rich = bouncing_wave()
+    settings = first_for(3)
+    wave = Family(lambda s: Member(rich, np.arange(1)), 3, harmonics=8)
+    alone = Family(lambda s: Member(bouncing(), np.arange(1)), 3, harmonics=8)
+    assert [judged_blades(family, settings) for family in (wave, alone)] == [4, 1]
+    verdicts = [(np.array([STABLE]), np.array([0.5]))]
+    said = stability_sentence(verdicts, 4)
+    assert "repeat after 4 blades" in said and "not those of other nodal diameters" in said
+    assert "blades" not in stability_sentence(verdicts)
 
 
 def test_a_point_of_one_harmonic_is_judged_by_its_motion_with_more():

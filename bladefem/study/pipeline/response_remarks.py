@@ -32,8 +32,14 @@ def response_remarks(
     settings: Settings,
     curves: list[Curve],
     nodes: int,
+    blades: int = 1,
 ) -> list[str]:
-    """What a reader of the results has to know; ``nodes`` are the contact points of a seat."""
+    """What a reader of the results has to know.
+
+    Args:
+        nodes: contact points of a seat.
+        blades: after which the wave repeats, and the disturbances that it was judged against.
+    """
     remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
         remarks.append(
@@ -42,7 +48,8 @@ def response_remarks(
             )
         )
     if scene.study.stability:
-        remarks.append(method(stability_sentence([(c.stability, c.multiplier) for c in curves])))
+        verdicts = [(c.stability, c.multiplier) for c in curves]
+        remarks.append(method(stability_sentence(verdicts, blades)))
     remarks.extend(map(method, filter(None, [ripple_sentence(curves, scene.accuracy)])))
     remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
     unstable = (unstable_sentence(c, scene.accuracy) for c in curves)

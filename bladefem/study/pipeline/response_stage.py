@@ -29,6 +29,7 @@ from .loads import Curve, study_loads
 from .response_remarks import best_load_remarks, response_remarks, stress_message
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
+from .stability import judged_blades
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
 from .stages import Bodies, with_damper_mass
@@ -146,11 +147,12 @@ def _load_responses(
             softer,
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
-        rich = family_member(family(cases[-1]), settings).model
+        models = family(cases[-1])
+        rich = family_member(models, settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
-    clock.messages.extend(
-        response_remarks(scene, settings, curves, -(-len(cases[0].elements.kt) // 2))
-    )
+    nodes = -(-len(cases[0].elements.kt) // 2)
+    blades = judged_blades(models, settings) if scene.study.stability else 1
+    clock.messages.extend(response_remarks(scene, settings, curves, nodes, blades))
     return Response(settings, curves, limits)
 
 

@@ -179,11 +179,22 @@ def _without_residual(body: PortModel) -> PortModel:
     return replace(body, shapes=body.shapes.real, residual=0 * body.residual.real)
 
 
-def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
+def judged_blades(models: Family, settings: Settings) -> int:
+    """Blades after which disturbances that are judged repeat; 1 where all move in phase, or no wave
+    can be judged.
+    """
+    try:
+        return blades_of_wave(model_in_time(models, settings))
+    except InputError:
+        return 1
+
+
+def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]], blades: int = 1) -> str:
     """What was found on all curves, for the report.
 
     Args:
         parts: verdicts and multipliers of each curve.
+        blades: after which the wave repeats, and the disturbances that it was judged against.
     """
     verdict, largest = (np.concatenate(column) for column in zip(*parts, strict=True))
     counts = {name: int((verdict == name).sum()) for name in (UNIQUE, STABLE, UNSTABLE, UNKNOWN)}
@@ -204,9 +215,15 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]]) -> str:
             " (of curves whose verdicts would cost more than their points, the local maxima, the "
             "neighbours of the highest and points spread evenly are judged)"
         )
+    wave = ""
+    if blades > 1:
+        wave = (
+            f"; disturbances that repeat after {blades} blades, as the wave does, were looked at, "
+            "not those of other nodal diameters"
+        )
     return (
         f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
-        f"{counts[UNKNOWN]} not judged{left_out}"
+        f"{counts[UNKNOWN]} not judged{left_out}{wave}"
     )
 
 
