@@ -216,10 +216,10 @@ def test_unsymmetric_stiffness_is_part_of_the_receptance():
         exact = P @ np.linalg.solve(K - w**2 * np.eye(5) + 1j * w * C, P.T)
         assert abs(exact - exact.T).max() > 0.02 * abs(exact).max()
         np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)
-        twice = receptance(join((body, body)), w)
+        twice = receptance(join_bodies((body, body)), w)
         np.testing.assert_allclose(twice[:2, :2], exact[:2, :2], rtol=0, atol=1e-11)
         np.testing.assert_allclose(twice[2:4, 2:4], exact[:2, :2], rtol=0, atol=1e-11)
-    assert truncated(body, 3).circulatory.shape == (3, 3)
+    assert truncate_modes(body, 3).circulatory.shape == (3, 3)
 
 
 def test_unsymmetric_stiffness_is_asked_for_and_leaves_rigid_and_massless_motions_alone():
