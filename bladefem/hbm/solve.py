@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..friction.states import NODE_STATES
 from .full_stick import INSTANTS_PER_HARMONIC, leading_stuck_points, sticks_safely
-from .linear.condensation import Linear, condense
+from .linear.condensation import Linear, condense, own_flexibility
 from .model import ReducedModel
 from .point_measures import MEASURES, count_states, measure_point
 from .solution import Solution, Work, probe_motion
@@ -202,7 +202,7 @@ def _stuck_throughout(
 def _failure_reasons(balance: Balance, attempts: list[Attempt]) -> str:
     """Why every attempt failed, and what may help."""
     linear = balance.linear
-    ratio = float(np.median(linear.springs * abs(np.diagonal(linear.G[1]))))
+    ratio = float(np.median(linear.springs * abs(own_flexibility(linear))))
     stiff = (
         [
             f"contacts {ratio:.1g} times as stiff as the bodies: expected less than "

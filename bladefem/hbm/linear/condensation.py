@@ -114,6 +114,19 @@ def _with_circulating_mean(model: ReducedModel, linear: Linear) -> Linear:
     return _with_motion(replace(linear, modal=(single, coupled)), free, linear.stuck)
 
 
+def own_flexibility(linear: Linear) -> ComplexArray:
+    """(m,) diagonal of G in harmonic 1: displacement of each contact degree of freedom by a unit
+    force on itself without contact springs [m/N]. G is not formed.
+    """
+    bodies = linear.bodies
+    shapes = bodies.contact[min(1, len(bodies.contact) - 1)]
+    modal, coupled = linear.modal
+    moved = shapes @ coupled[1] if len(coupled) else shapes * modal[1]
+    shared = len(bodies.rest) > 0
+    rest = bodies.rest if shared else bodies.residual[min(1, len(bodies.residual) - 1)]
+    return np.diagonal(rest) + np.sum(moved * shapes.conj(), axis=1)
+
+
 def scale_loads(linear: Linear, factor: float) -> Linear:
     """The same bodies under a multiple of all loads."""
     return _with_motion(

@@ -43,7 +43,7 @@ def linear_part(omega, bodies, springs, H):
     copy_vector(bodies.mean_stuck, stuck[0])
     few = bodies.A.shape[0] > 0
     formed = not few or full.shape[0] > 0
-    G = np.zeros((H + 1 if formed else 1, m, m), np.complex128)
+    G = np.zeros((H + 1, m, m) if formed else (1, 0, 0), np.complex128)
     for h in range(1, G.shape[0]):
         _receptance(bodies, D, full, h, G[h])
     if bodies.R.shape[0]:

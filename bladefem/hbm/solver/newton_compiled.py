@@ -58,7 +58,7 @@ class Condensed(NamedTuple):
 
     # flexibility with contact springs, see `bladefem.hbm.linear.contact_flexibility`
     flex: tuple
-    # (H+1, m, m) the same without springs, but for the mean; (1, m, m) where `modal` tells it
+    # (H+1, m, m) the same without springs, but for the mean; (1, 0, 0) where `modal` tells it
     G: np.ndarray
     # (m, K) displacement in full stick [m]
     stuck: np.ndarray
@@ -135,7 +135,7 @@ def balance_residual(w, linear, preload, F, p, r):
         for k in range(K):
             sprung[i, k] = springs[i] * r[i, k] if k else 0.0
             bare[i, k] = r[i, k]
-    if 2 * G.shape[0] - 1 == K:
+    if G.shape[1]:
         apply_matrices(G, sprung, bare)
     else:
         apply_modes(linear.shapes, linear.residual, linear.rest, linear.modal, sprung, bare)
