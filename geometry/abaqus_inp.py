@@ -171,10 +171,17 @@ def _read_set(
     option: str,
     what: str,
 ) -> None:
+    """Add the members of an *NSET or *ELSET to its set: numbers, ranges, and names of other sets.
+
+    Args:
+        option: that names the set, "NSET" or "ELSET".
+        what: "node" or "element", for messages.
+    """
     name = keyword.options.get(option)
     if not name:
         raise deck_error(keyword.file, keyword.line, f"*{option} without a name")
     instance = keyword.options.get("INSTANCE", "").upper()
+    # Abaqus does not tell upper and lower case apart
     known = {other.upper(): other for other in sets}
     members = sets.setdefault(known.get(name.upper(), name), [])
     for line, fields in keyword.data:
@@ -355,17 +362,18 @@ def _node_surfaces(
 ) -> dict[str, np.ndarray]:
     """Surfaces of TYPE=NODE as node sets; a name that a node set has already stays with it."""
     known = {name.upper(): nodes for name, nodes in sets.items()}
-    found = {}
-    for name, members in root.node_surfaces.items():
-        nodes = [np.empty(0, dtype=int)]
-        for word in members:
-            if word.upper() in known:
-                nodes.append(known[word.upper()])
-            elif word.isdigit() and ("", int(word)) in place:
-                nodes.append(np.array([place["", int(word)]]))
-        if name.upper() not in known:
-            found[name] = np.unique(np.concatenate(nodes))
-    return found
+
+    def nodes_of(word: str) -> np.ndarray:
+        if word.upper() in known:
+            return known[word.upper()]
+        found = place.get(("", int(word))) if word.isdigit() else None
+        return np.array([] if found is None else [found], dtype=int)
+
+    return {
+        name: np.unique(np.concatenate([np.empty(0, dtype=int), *map(nodes_of, members)]))
+        for name, members in root.node_surfaces.items()
+        if name.upper() not in known
+    }
 
 
 def _surface_facets(

@@ -103,14 +103,12 @@ def set_background(
     """
     field = gmsh.model.mesh.field
     tags = []
-    for kind, settings in parameters.items():
-        for setting in settings:
-            tags.append(field.add(kind))
-            for name, value in setting.items():
-                if isinstance(value, str):
-                    field.setString(tags[-1], name, value)
-                else:
-                    field.setNumber(tags[-1], name, value)
+    for kind, setting in ((k, one) for k, settings in parameters.items() for one in settings):
+        tag = field.add(kind)
+        tags.append(tag)
+        for name, value in setting.items():
+            put = field.setString if isinstance(value, str) else field.setNumber
+            put(tag, name, value)
     minimum = field.add("Min")
     field.setNumbers(minimum, "FieldsList", tags)
     field.setAsBackgroundMesh(minimum)

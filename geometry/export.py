@@ -32,33 +32,19 @@ def write_msh(
         entities = {name: gmsh.model.addDiscreteEntity(dimension) for name in mesh.bodies}
         tags = np.arange(1, len(mesh.points) + 1)
         gmsh.model.mesh.addNodes(dimension, entities[first], tags, mesh.points.ravel())
-        for name, cells in mesh.bodies.items():
-            _add_group(
-                gmsh,
-                dimension,
-                entities[name],
-                name,
-                mesh.cell_type,
-                cells,
-            )
-        for name, faces in mesh.faces.items():
-            _add_group(
-                gmsh,
-                dimension - 1,
-                gmsh.model.addDiscreteEntity(dimension - 1),
-                name,
-                face_word(faces.shape[1], dimension),
-                faces,
-            )
-        for name, nodes in mesh.nodes.items():
-            _add_group(
-                gmsh,
-                0,
-                gmsh.model.addDiscreteEntity(0),
-                name,
-                "vertex",
-                nodes[:, None],
-            )
+        groups = [
+            *((dimension, name, mesh.cell_type, cells) for name, cells in mesh.bodies.items()),
+            *(
+                (dimension - 1, name, face_word(faces.shape[1], dimension), faces)
+                for name, faces in mesh.faces.items()
+            ),
+            *((0, name, "vertex", nodes[:, None]) for name, nodes in mesh.nodes.items()),
+        ]
+        for dim, name, word, cells in groups:
+            # bodies have their entities already, as the nodes lie on the first of them
+            own = dim == dimension
+            entity = entities[name] if own else gmsh.model.addDiscreteEntity(dim)
+            _add_group(gmsh, dim, entity, name, word, cells)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", int(binary))
         gmsh.write(str(file))

@@ -7,6 +7,7 @@ Everything here is a guess to be looked at: nothing of it decides a run.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import permutations
 from pathlib import Path
 
 import numpy as np
@@ -290,24 +291,21 @@ def _cut_faces(
     """
     best: CutFaces | None = None
     most = 0.0
+    # face by face is quick to rule out by area and place; nodes are compared for what is left
+    alike = [
+        (i, j)
+        for i, j in permutations(range(len(faces)), 2)
+        if _similar_faces(faces[i], faces[j], drawing)
+    ]
     for axis in AXES:
         pairs: dict[int, list[tuple[int, int]]] = {}
-        for i, one in enumerate(faces):
-            for j, other in enumerate(faces):
-                if i != j and _similar_faces(one, other, drawing):
-                    sectors = _sector_count(one.centre, other.centre, axis, size)
-                    if sectors and _cut_faces_match(
-                        raw,
-                        outside,
-                        (i, j),
-                        axis,
-                        sectors,
-                        size,
-                        drawing,
-                    ):
-                        pairs.setdefault(sectors, []).append((i, j))
+        for i, j in alike:
+            sectors = _sector_count(faces[i].centre, faces[j].centre, axis, size)
+            if sectors and _cut_faces_match(raw, outside, (i, j), axis, sectors, size, drawing):
+                pairs.setdefault(sectors, []).append((i, j))
         for sectors, some in pairs.items():
             area = sum(faces[i].area for i, _ in some)
+            # an axis that matches as much as an earlier one, to rounding, does not replace it
             if area > most * (1 + 1e-9):
                 most = area
                 low = tuple(faces[i].name for i, _ in some)

@@ -1,8 +1,8 @@
 """A rigid mass on a vibrating foundation, held by friction alone (the paper's Sect. 4, Fig. 7-11,
 Table 1).
 
-Three freedoms (x, y, theta) of the mass, one friction element at each contact node. The force on
-the mass at node i is the radial return of f + k_t dw onto the circle |f| <= mu N_i(t), w =
+Three degrees of freedom (x, y, theta) of the mass, one friction element at each contact node. The
+force on the mass at node i is the radial return of f + k_t dw onto the circle |f| <= mu N_i(t), w =
 foundation minus mass (Eq. 28 corrected: the printed per-axis limits of Eq. 29 are not Coulomb
 friction). The nodes turn with the mass by the full rotation, so theta need not stay small; N_i
 follows the load in proportion (Eq. 27, receding contact).
@@ -78,7 +78,7 @@ def z_footprint(
     """Forty nodes on a Z: two bars of 2 x 7 nodes along x, a diagonal of 2 x 6 between them;
     point-symmetric.
 
-    Equal shares stand in for the pressure map of a finite element solution, which any caller may
+    Equal shares replace the pressure map of a finite element solution, which any caller may
     pass instead.
     """
     across = np.array([-bar / 4, bar / 4])

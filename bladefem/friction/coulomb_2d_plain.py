@@ -20,9 +20,9 @@ from bladefem.friction.states import CLOSING, SLIP, STICK
 from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 # of the largest friction limit: how well the force must repeat itself
-TOLERANCE = 1e-12
+REPEAT_TOLERANCE = 1e-12
 # of det(I - Phi): below it the state keeps a memory of its start
-SINGULAR = 1e-6
+SINGULAR_DETERMINANT = 1e-6
 
 
 @njit(**INNER_KERNEL)
@@ -161,10 +161,10 @@ def _periodic_force(path, basis, node, weights, limit, F, J):
         rows[:, M:] = np.eye(2)
         before = rows[:, :M].copy()
         slips = _march_period(path, basis, node, weights, f, rows, F, sums)
-        if np.hypot(f[0] - fx, f[1] - fy) <= TOLERANCE * scale:
+        if np.hypot(f[0] - fx, f[1] - fy) <= REPEAT_TOLERANCE * scale:
             left = np.eye(2) - rows[:, M:]
             J[:] = sums[:, :, :M]
-            if abs(left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]) > SINGULAR:
+            if abs(left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]) > SINGULAR_DETERMINANT:
                 # the periodic start's rows x fulfil  x = Phi x + q,  those of the march were before
                 shift = np.linalg.solve(left, rows[:, :M].copy() - before)
                 for c in range(2):

@@ -45,11 +45,11 @@ def _scan_period(b, g, N, low, high, opens, first, state):
     """
     last = -1
     sign = 0.0
-    quiet = True
+    unchanged = True
     for i in range(g.size):
         if opens:
             if N[i] <= 0.0:
-                quiet = False
+                unchanged = False
                 if not first and state[i] == SEPARATED:
                     break
                 state[i], last, b = SEPARATED, i, g[i]
@@ -69,11 +69,11 @@ def _scan_period(b, g, N, low, high, opens, first, state):
             last = i
             sign = -1.0
         if code != STICK:
-            quiet = False
+            unchanged = False
             if not first and state[i] == code:
                 break
         state[i] = code
-    return b, last, sign, quiet
+    return b, last, sign, unchanged
 
 
 @njit(_nrt=False, **INNER_KERNEL)
@@ -96,11 +96,11 @@ def march_states(g, N, low, high, opens, state):
         b = high[S - 1]
         last = S - 1
         sign = -1.0
-    b, event, way, quiet = _scan_period(b, g, N, low, high, opens, True, state)
-    if quiet:
+    b, event, way, unchanged = _scan_period(b, g, N, low, high, opens, True, state)
+    if unchanged:
         return last, sign, True
-    b, _, _, quiet = _scan_period(b, g, N, low, high, opens, False, state)
-    return event, way, quiet
+    b, _, _, unchanged = _scan_period(b, g, N, low, high, opens, False, state)
+    return event, way, unchanged
 
 
 @njit(_nrt=False, **INNER_KERNEL)

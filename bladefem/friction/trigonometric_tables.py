@@ -16,8 +16,8 @@ from numba import njit
 
 from bladefem.errors import InputError
 from bladefem.friction.fourier import analysis, synthesis
-from bladefem.friction.simd.codegen import BLOCK, LANES
-from bladefem.friction.simd.row_kernels import TILE, fill_gram
+from bladefem.friction.simd.codegen import BYTES_PER_BLOCK, LANES_PER_VECTOR
+from bladefem.friction.simd.row_kernels import HARMONICS_PER_TILE, fill_gram
 from bladefem.util.numba_options import INNER_KERNEL, KERNEL
 
 
@@ -51,7 +51,7 @@ class Tables(NamedTuple):
     along: np.ndarray
     # (width, K) weights of a sample in the coefficients
     analysis: np.ndarray
-    # (., 4) samples i, S/2 - i, S/2 + i, S - i; S stands for none
+    # (., 4) samples i, S/2 - i, S/2 + i, S - i; S is no sample
     fours: np.ndarray
     # K filled up to a multiple of 8
     W: int
@@ -85,7 +85,7 @@ def trigonometric_tables(H: int, samples: int) -> Tables:
     sums = np.concatenate([np.zeros((1, 4 * H + 1)), np.cumsum(wide, axis=0)])
     knots = synthesis(H, samples, -0.5)
     knots[:, 1:] /= np.repeat(np.cos(np.pi / samples * np.arange(1, H + 1)), 2)
-    more = _filled_size(samples) + LANES - samples
+    more = _filled_size(samples) + LANES_PER_VECTOR - samples
     weights = analysis(H, samples).T
     along = knots[np.arange(samples + more) % samples].T
     blank = ((0, more), (0, 0))
@@ -121,8 +121,8 @@ def derivative_patterns(
 
 def _aligned_copy(array: np.ndarray) -> np.ndarray:
     """A copy that begins as lanes.zeros does."""
-    room = np.empty(array.nbytes + BLOCK, np.uint8)
-    first = -room.ctypes.data % BLOCK
+    room = np.empty(array.nbytes + BYTES_PER_BLOCK, np.uint8)
+    first = -room.ctypes.data % BYTES_PER_BLOCK
     copy = room[first : first + array.nbytes].view(array.dtype).reshape(array.shape)
     copy[:] = array
     return copy
@@ -130,14 +130,18 @@ def _aligned_copy(array: np.ndarray) -> np.ndarray:
 
 def _filled_size(size: int) -> int:
     """The next multiple of the lanes of a vector."""
-    return -(-size // LANES) * LANES
+    return -(-size // LANES_PER_VECTOR) * LANES_PER_VECTOR
 
 
 def _tiled_size(H: int) -> int:
     """Number of coefficients that folded sums fill, at least 2H+1: harmonics by twos up to 8, then
     by eights.
     """
-    return 4 * (H // 2) + 3 if H < TILE else 2 * TILE * (H // TILE + 1) - 1
+    return (
+        4 * (H // 2) + 3
+        if H < HARMONICS_PER_TILE
+        else 2 * HARMONICS_PER_TILE * (H // HARMONICS_PER_TILE + 1) - 1
+    )
 
 
 def _sample_fours(S: int) -> np.ndarray:
@@ -157,7 +161,7 @@ def _sample_fours(S: int) -> np.ndarray:
 @njit(**KERNEL)
 def empty_gram(H):
     """Scratch for gram."""
-    return np.zeros((2, 6 * H + 2 + 2 * LANES))
+    return np.zeros((2, 6 * H + 2 + 2 * LANES_PER_VECTOR))
 
 
 @njit(_nrt=False, **KERNEL)

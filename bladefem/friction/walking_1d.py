@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 
 # of the largest friction limit: how well the force must repeat itself
-TOLERANCE = 1e-12
+REPEAT_TOLERANCE = 1e-12
 
 
 @njit(cache=True, error_model="numpy")
@@ -95,7 +95,7 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         for cycle in range(1, limit + 1):
             before = f
             f = _march_forces(before, g, N, step, node, friction, states)
-            if cycle > 1 and abs(f - before) <= TOLERANCE * mu * max(N.max(), 0.0):
+            if cycle > 1 and abs(f - before) <= REPEAT_TOLERANCE * mu * max(N.max(), 0.0):
                 cycles[e] = cycle
                 break
         closed = states >= 0

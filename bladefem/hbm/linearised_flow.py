@@ -19,9 +19,9 @@ from .linear.array_copy import copy_matrix
 from .sector_modes import SectorModes
 
 # periods marched until 2-D forces repeat
-CYCLES = 60
+MAX_PERIODS = 60
 # relative change of forces from one period to the next that counts as periodic
-REPEATS = 1e-9
+REPEAT_TOLERANCE = 1e-9
 
 
 def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -69,7 +69,7 @@ def contact_steps(u, du, N, dN, mu, before, now, load, share, stuck):
         # a literal False would compile the step twice
         slips = bool(0)
         size = mu[i] * max(np.abs(N[i]).max(), 1e-300)
-        for cycle in range(CYCLES):
+        for cycle in range(MAX_PERIODS):
             x0 = x
             y0 = y
             stuck[i] = True
@@ -86,7 +86,7 @@ def contact_steps(u, du, N, dN, mu, before, now, load, share, stuck):
                     x, y, share[j, i] = _step_2d(x, y, dx, dy, loads, mu[i], tangents)
                 if before[j, i, 0, 0] != 1.0 or now[j, i, 0, 0] != 1.0:
                     stuck[i] = False
-            if cycle > 0 and abs(x - x0) + abs(y - y0) <= REPEATS * size:
+            if cycle > 0 and abs(x - x0) + abs(y - y0) <= REPEAT_TOLERANCE * size:
                 break
 
 

@@ -166,6 +166,13 @@ def optimum(
     return lowest_peak(along, band, bounds, H, samples, tolerance=tolerance)
 
 
+def _check_range(what: str, ends: tuple[float, float], least: float) -> None:
+    """Refuse ends that are not ascending above the least value."""
+    low, high = ends
+    if not least < low < high < np.inf:
+        raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
+
+
 def lowest_peak(
     along: Variation,
     band: tuple[float, float],
@@ -188,12 +195,9 @@ def lowest_peak(
         NotSolvedError: a peak could not be solved, or the band has none.
     """
     name = along.name
-    for what, (low, high), least in (
-        ("band", band, 0.0),
-        ("bounds", bounds, -np.inf if name == "gap" else 0.0),
-    ):
-        if not least < low < high < np.inf:
-            raise InputError(f"{what} ({low}, {high}): expected {least:g} < low < high")
+    _check_range("band", band, 0.0)
+    # a gap may be an interference, all other parameters are factors
+    _check_range("bounds", bounds, -np.inf if name == "gap" else 0.0)
     search = _Search(along, band, H, samples, bounds, tolerance, options)
     middle = parameter_value(
         name, (path_coordinate(name, bounds[0]) + path_coordinate(name, bounds[1])) / 2
@@ -202,6 +206,7 @@ def lowest_peak(
         middle = float(np.clip(start, *bounds))
     first, points = _first_level(search, middle)
     levels = {middle: first}
+    # paths know the peaks that they started from: only a look over the band shows others
     for _ in range(MOST_LEVELS):
         points += _close_in(search, levels)
         tried = _highest_peaks(levels)

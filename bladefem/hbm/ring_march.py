@@ -26,7 +26,7 @@ from .solve import free_response
 from .step_forces import contact_forces
 
 # of the instants of a period
-INSTANTS = 256
+INSTANTS_PER_PERIOD = 256
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,9 @@ class RingMarch:
     settled: bool
 
 
-def march_operations(model: ReducedModel, periods: int, instants: int = INSTANTS) -> float:
+def march_operations(
+    model: ReducedModel, periods: int, instants: int = INSTANTS_PER_PERIOD
+) -> float:
     """Of a march, roughly.
 
     Raises:
@@ -55,7 +57,7 @@ def march_ring(
     point: Solution,
     disturbance: float,
     periods: int,
-    instants: int = INSTANTS,
+    instants: int = INSTANTS_PER_PERIOD,
 ) -> RingMarch:
     """March from a solution whose modal amplitudes are disturbed.
 

@@ -161,12 +161,14 @@ def sweep(
     for solution in _first_solutions(model, look, solved, H, samples, options, paths, lost):
         solved[solution.omega] = solution
         yield solution
+    # maxima are closed in point by point until folds show that one motion a frequency is too few
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
         wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
         if wanted is None:
             return
         if len(solved) >= BAND_LIMIT:
             notes.append(_limit_note())
+            # folds need normal loads that follow the motion; without them a path adds nothing
             if not (paths and _normal_loads_follow(model)):
                 return
             break
@@ -177,6 +179,7 @@ def sweep(
     found = find_branches(model, band, points, H, samples, peak=peak, options=options)
     notes.extend(found.notes)
     yield from found.points
+    # frequencies lost in the first look that no path went through
     missed = [omega for omega in lost if omega not in solved and not _crossed(found, omega)]
     yield from _solved_again(model, missed, points, H, samples, options)
 

@@ -103,17 +103,16 @@ def _read_entries(path: Path) -> Iterator[tuple[int, list[str]]]:
     for count, line in enumerate(path.read_text().splitlines(), 1):
         line = line.split("$")[0].rstrip()
         first, data = _split_fields(line)
-        if first.upper().rstrip("*") == "DMIG":
-            if fields:
-                yield number, fields
-            number = count
-            fields = ["DMIG", *data]
-        elif fields and line and first[:1] in ("", "*", "+"):
+        if not line:
+            continue
+        if fields and first[:1] in ("", "*", "+"):
             fields += data
-        elif line:
-            if fields:
-                yield number, fields
-            fields = []
+            continue
+        # any other line ends the entry before it
+        if fields:
+            yield number, fields
+        number = count
+        fields = ["DMIG", *data] if first.upper().rstrip("*") == "DMIG" else []
     if fields:
         yield number, fields
 

@@ -21,12 +21,12 @@ from .system import System
 
 # of the normal force: states change once they are wrong by more than rounding
 ROUNDING_SHARE = 1e-12
-CODES = {0: "done", 1: "too many events in one step: the states chatter"}
+OUTCOME_WORDS = {0: "done", 1: "too many events in one step: the states chatter"}
 
 
 @dataclass(frozen=True)
 class State:
-    """Where the system stands at an instant."""
+    """State of the system at an instant."""
 
     # (d,) [m kg^1/2]
     q: np.ndarray
@@ -146,7 +146,7 @@ def integrate_periods(
         history[:, 2 * d + n :],
         history[:, 2 * d : 2 * d + n],
         events,
-        CODES[code],
+        OUTCOME_WORDS[code],
         T if tangent else None,
     )
 

@@ -22,7 +22,7 @@ from ..friction.aft import evaluate
 from ..friction.law_table import select_elements
 from ..reduction.assemble import folded_diameter
 from ..util.arrays import ComplexArray, RealArray
-from .law_kernel import GHOSTS, evaluate_law
+from .law_kernel import GHOST_POINTS, evaluate_law
 from .model import Wheel
 from .tuned import travelling_order
 
@@ -65,7 +65,7 @@ class Family:
 class DamperLaw:
     """Forces on the two blades for their amplitudes, as splines over log size, ratio and phase."""
 
-    # (4, TABLE_SIZES, TABLE_RATIOS + 2 GHOSTS, TABLE_PHASES) coefficients: force on the blade
+    # (4, TABLE_SIZES, TABLE_RATIOS + 2 GHOST_POINTS, TABLE_PHASES) coefficients: force on the blade
     # before the damper, real and imaginary, then on the one after, over the size
     coefficients: RealArray
     # logarithm of the smallest size, and of one step
@@ -314,8 +314,8 @@ def _spline(table: np.ndarray) -> np.ndarray:
     one has it, which is both forces and the phase turned by half a period.
     """
     half = np.roll(table, TABLE_PHASES // 2, axis=3)
-    low = half[:, :, GHOSTS:0:-1]
-    high = -half[:, :, -2 : -2 - GHOSTS : -1]
+    low = half[:, :, GHOST_POINTS:0:-1]
+    high = -half[:, :, -2 : -2 - GHOST_POINTS : -1]
     whole = np.concatenate([low, table, high], axis=2)
     whole = ndimage.spline_filter1d(whole, 3, axis=1, mode="mirror")
     whole = ndimage.spline_filter1d(whole, 3, axis=2, mode="mirror")

@@ -6,9 +6,9 @@ import numpy as np
 from numba import njit
 
 # points beyond the ends of the ratios, by symmetry, so that the splines have no ends there
-GHOSTS = 4
+GHOST_POINTS = 4
 # smaller amplitude of a pair over the larger one: its phase means nothing
-NOTHING = 1e-9
+NEGLIGIBLE_AMPLITUDE_SHARE = 1e-9
 
 
 @njit(cache=True)
@@ -28,7 +28,7 @@ def evaluate_law(
     """
     per_step = np.empty(3)
     per_step[0] = 1 / step
-    per_step[1] = (coefficients.shape[2] - 2 * GHOSTS - 1) / (np.pi / 2)
+    per_step[1] = (coefficients.shape[2] - 2 * GHOST_POINTS - 1) / (np.pi / 2)
     per_step[2] = coefficients.shape[3] / (2 * np.pi)
     value = np.empty((4, 4))
     by = np.empty((4, 4))
@@ -36,14 +36,14 @@ def evaluate_law(
         a = before[k]
         b = after[k]
         size = np.sqrt(a.real**2 + a.imag**2 + b.real**2 + b.imag**2)
-        size = max(size, NOTHING * np.exp(first))
-        p = max(abs(a), NOTHING * size)
-        q = max(abs(b), NOTHING * size)
+        size = max(size, NEGLIGIBLE_AMPLITUDE_SHARE * np.exp(first))
+        p = max(abs(a), NEGLIGIBLE_AMPLITUDE_SHARE * size)
+        q = max(abs(b), NEGLIGIBLE_AMPLITUDE_SHARE * size)
         turn = np.arctan2(a.imag, a.real)
         other = np.arctan2(b.imag, b.real)
         place = (np.log(size) - first) * per_step[0]
         inside = 0 <= place <= coefficients.shape[1] - 1
-        ratio = np.arctan2(q, p) * per_step[1] + GHOSTS
+        ratio = np.arctan2(q, p) * per_step[1] + GHOST_POINTS
         _interpolate(coefficients, place, ratio, (other - turn) * per_step[2], value)
         ca, sa = np.cos(turn), np.sin(turn)
         cb, sb = np.cos(other), np.sin(other)

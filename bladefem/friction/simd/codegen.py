@@ -23,12 +23,12 @@ from numba.extending import intrinsic
 from bladefem.util.numba_options import KERNEL
 
 # bytes of a block; numbers of 8 bytes in it
-BLOCK = 64
-LANES = 8
-WHOLE = ir.IntType(64)
-HALF = ir.IntType(32)
+BYTES_PER_BLOCK = 64
+LANES_PER_VECTOR = 8
+INT64 = ir.IntType(64)
+INT32 = ir.IntType(32)
 # a product and a sum may be rounded once
-FUSED = ("contract",)
+FUSED_FLAGS = ("contract",)
 
 
 class Lanes:
@@ -49,7 +49,7 @@ class Lanes:
         swapped: bool = False,
     ) -> Lanes:
         pair = (self._value(other), self.value) if swapped else (self.value, self._value(other))
-        return Lanes(self.builder, getattr(self.builder, name)(*pair, flags=FUSED))
+        return Lanes(self.builder, getattr(self.builder, name)(*pair, flags=FUSED_FLAGS))
 
     def _value(self, other: Lanes | float) -> ir.Value:
         block = self.value.type
@@ -112,7 +112,7 @@ class Code:
     def __init__(
         self,
         builder: ir.IRBuilder,
-        size: int = BLOCK,
+        size: int = BYTES_PER_BLOCK,
     ) -> None:
         self.builder = builder
         self.size = size
@@ -123,7 +123,7 @@ class Code:
 
     def eight(self, array: ir.Value) -> Code:
         """The same for blocks of eight of an array's numbers."""
-        return Code(self.builder, LANES * _bytes(array.type.pointee))
+        return Code(self.builder, LANES_PER_VECTOR * _bytes(array.type.pointee))
 
     def lanes(self, array: ir.Value) -> int:
         """How many of an array's numbers are a block."""
@@ -138,11 +138,11 @@ class Code:
 
     def whole(self, number: ir.Value | int) -> ir.Value:
         """A whole number."""
-        return WHOLE(number) if isinstance(number, int) else number
+        return INT64(number) if isinstance(number, int) else number
 
     def place(self, *terms: ir.Value | int | tuple) -> ir.Value:
         """Sum of whole numbers, and of the products of pairs."""
-        total = WHOLE(0)
+        total = INT64(0)
         for term in terms:
             if isinstance(term, tuple):
                 term = self.builder.mul(*map(self.whole, term))
@@ -184,14 +184,14 @@ class Code:
         value = self._fit(block.value, array.type.pointee)
         spot = self._block(array, value.type.count, terms)
         lanes = value.type.count
-        steps = ir.Constant(ir.VectorType(WHOLE, lanes), list(range(lanes)))
+        steps = ir.Constant(ir.VectorType(INT64, lanes), list(range(lanes)))
         inside = self.builder.icmp_signed("<", steps, self._spread(count, lanes))
         kind = f"v{lanes}{value.type.element.intrinsic_name}"
         name = f"llvm.masked.store.{kind}.p0{kind}"
-        function = ir.FunctionType(ir.VoidType(), [value.type, spot.type, HALF, inside.type])
+        function = ir.FunctionType(ir.VoidType(), [value.type, spot.type, INT32, inside.type])
         self.builder.call(
             cgutils.get_or_insert_function(self.builder.module, function, name),
-            [value, spot, HALF(4), inside],
+            [value, spot, INT32(4), inside],
         )
 
     def _fit(
@@ -227,9 +227,9 @@ class Code:
         count: int,
     ) -> ir.Value:
         undefined = ir.Constant(ir.VectorType(number.type, count), ir.Undefined)
-        first = self.builder.insert_element(undefined, number, HALF(0))
+        first = self.builder.insert_element(undefined, number, INT32(0))
         return self.builder.shuffle_vector(
-            first, undefined, ir.Constant(ir.VectorType(HALF, count), None)
+            first, undefined, ir.Constant(ir.VectorType(INT32, count), None)
         )
 
     def zeros(self, array: ir.Value) -> Lanes:
@@ -275,11 +275,11 @@ class Code:
         builder.position_at_end(body)
         bits = over(i)
         bits = builder.bitcast(bits, ir.IntType(bits.type.count))
-        builder.store(builder.add(i, self.whole(LANES)), spot)
+        builder.store(builder.add(i, self.whole(LANES_PER_VECTOR)), spot)
         builder.cbranch(builder.icmp_unsigned("!=", bits, bits.type(0)), found, head)
         builder.position_at_end(found)
         builder.store(
-            builder.add(i, builder.cttz(builder.zext(bits, WHOLE), ir.IntType(1)(1))), spot
+            builder.add(i, builder.cttz(builder.zext(bits, INT64), ir.IntType(1)(1))), spot
         )
         builder.branch(done)
         builder.position_at_end(done)
@@ -293,7 +293,7 @@ class Code:
         step: int = 1,
     ):
         """``with code.loop(begin, end, step) as i``."""
-        return _Loop(self.builder, self.whole(begin), end, WHOLE(step))
+        return _Loop(self.builder, self.whole(begin), end, INT64(step))
 
 
 def _bytes(number: ir.Type) -> int:
@@ -308,7 +308,7 @@ class _Loop:
         end: ir.Value,
         step: ir.Value,
     ) -> None:
-        self.context = cgutils.for_range_slice(builder, begin, end, step, WHOLE)
+        self.context = cgutils.for_range_slice(builder, begin, end, step, INT64)
 
     def __enter__(self) -> ir.Value:
         return self.context.__enter__()[0]
@@ -322,8 +322,8 @@ def zeros(size, dtype):
     """Zeros (size,) that begin where a block does in memory, so that no load of a block crosses a
     line of the cache.
     """
-    room = np.zeros(size + BLOCK, dtype)
-    first = -room.ctypes.data % BLOCK // room.itemsize
+    room = np.zeros(size + BYTES_PER_BLOCK, dtype)
+    first = -room.ctypes.data % BYTES_PER_BLOCK // room.itemsize
     return room[first : first + size]
 
 

@@ -30,13 +30,13 @@ from bladefem.friction.simd.row_kernels import (
     join_rows,
     turn_rows,
 )
-from bladefem.friction.simd.time_kernels import TURNS, find_turns
+from bladefem.friction.simd.time_kernels import TURN_ROWS, find_turns
 from bladefem.friction.states import CLOSING, SLIP, STICK
 from bladefem.friction.trigonometric_tables import Patterns, empty_gram, gram_matrix
 from bladefem.util.numba_options import INNER_KERNEL
 
-FAST = {"contract", "reassoc", "nsz"}
-# samples after which a row is looked at for faint numbers
+FAST_MATH_FLAGS = {"contract", "reassoc", "nsz"}
+# samples after which a row is searched for nearly denormal numbers
 SAMPLES_BETWEEN_FLUSHES = 64
 # of 8 and of 4 bytes: flush-to-zero thresholds: smaller numbers would become denormal and slow
 FLUSH_TO_ZERO = 1e-60
@@ -64,7 +64,7 @@ class Rows(NamedTuple):
     closing: np.ndarray
     # (M,) row of the angle in slip
     row: np.ndarray
-    # (S + 1, M) rows of the angle at the samples; the last stands for none and is zero
+    # (S + 1, M) rows of the angle at the samples; the last is no sample and is zero
     rows: np.ndarray
     # (7, width) how the row turns
     turns: np.ndarray
@@ -98,7 +98,7 @@ def empty_rows(tab, patterns):
         np.zeros((2, M), dtype),
         zeros(M, dtype),
         zeros((S + 1) * M, dtype).reshape((S + 1, M)),
-        zeros(TURNS * width, dtype).reshape((TURNS, width)),
+        zeros(TURN_ROWS * width, dtype).reshape((TURN_ROWS, width)),
         zeros(2 * width, dtype).reshape((2, width)),
         zeros(2 * width, dtype).reshape((2, width)),
         np.zeros(tab.fours.shape[0], np.int64),
@@ -170,12 +170,12 @@ def _slide_row(a, b, scratch):
     """Turn the row of the angle along the edges a <= i < b."""
     row = scratch.row
     patterns = scratch.patterns
-    faint = FLUSH_TO_ZERO if scratch.row.itemsize == 8 else FLUSH_TO_ZERO_SINGLE
+    flush_below = FLUSH_TO_ZERO if scratch.row.itemsize == 8 else FLUSH_TO_ZERO_SINGLE
     while a < b:
         stop = min(b, a + SAMPLES_BETWEEN_FLUSHES)
         turn_rows(scratch.turns, patterns.at, patterns.change, a, stop, row, scratch.rows)
         for l in range(row.size):
-            if abs(row[l]) < faint:
+            if abs(row[l]) < flush_below:
                 row[l] = 0.0
         a = stop
 
@@ -382,10 +382,10 @@ def start_rows(vx, vy, N, el, tab, C):
     to_carry(C, 0, el.kt, tab)
 
 
-@njit(_nrt=False, **INNER_KERNEL, fastmath=FAST, forceinline=True)
+@njit(_nrt=False, **INNER_KERNEL, fastmath=FAST_MATH_FLAGS, forceinline=True)
 def close_period(rx, ry, kt, tab, scratch, F, J):
-    """J (2, K, 3K) and what F (3, K) lacks, from the sums, the rows C (2, M) at the end and its
-    misfit (rx, ry).
+    """J (2, K, 3K) and what F (3, K) is missing, from the sums, the rows C (2, M) at the end and
+    its misfit (rx, ry).
 
     The start of the period is moved to the fixed point of the linearised map.
     """

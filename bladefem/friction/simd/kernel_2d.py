@@ -17,7 +17,7 @@ from bladefem.friction.simd.derivative_rows import (
     unit_rows,
 )
 from bladefem.friction.simd.periodic_state import (
-    TOLERANCE,
+    REPEAT_TOLERANCE,
     empty_trail,
     follow_period,
     forces_along,
@@ -162,7 +162,7 @@ def _node_forces(
     """Normal force of one node, and its last period as periodic returns it; 0 cycles where it
     sticks or stays open.
 
-    There F (3, K) and J (3, K, 3K) are complete; elsewhere F lacks the harmonics of trace (2,
+    There F (3, K) and J (3, K, 3K) are complete; elsewhere F is missing the harmonics of trace (2,
     width), J the tangents.
     """
     linear = J.shape[0] > 0
@@ -196,8 +196,8 @@ def _stuck_forces(w, kt, F, J):
 def _derivative_rows(path, walks, found, el, tab, trail, scratch, trace, phi, F, J):
     """Rows J (2, K, 3K) of the tangential forces in the state that was found.
 
-    F (3, K) takes what trace (2, width), zero on entry, lacks of the periodic force. A motion that
-    walks leaves no memory of the start.
+    F (3, K) takes what trace (2, width), zero on entry, is missing of the periodic force. A motion
+    that walks leaves no memory of the start.
     """
     unique, fx, fy, gx, gy, _, pieces, cycles = found
     if unique or walks:
@@ -304,7 +304,7 @@ def disc_batch(w, ramp, load, nodes, tab, patterns, limit, F, J, shares, cycles)
     near = (
         (STEP_TOLERANCE if patterns.at.itemsize == 8 else STEP_TOLERANCE_SINGLE)
         if J.shape[1]
-        else TOLERANCE
+        else REPEAT_TOLERANCE
     )
     trail, scratch, F[:] = empty_trail(tab.at.shape[0], width), empty_rows(tab, patterns), 0.0
     for first in range(0, n, NODES_AT_ONCE):

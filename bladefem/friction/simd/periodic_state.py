@@ -42,7 +42,7 @@ from bladefem.friction.states import SLIP, STICK
 from bladefem.util.numba_options import INNER_KERNEL
 
 # of the largest friction limit: how well the force must repeat itself in marching
-TOLERANCE = 1e-12
+REPEAT_TOLERANCE = 1e-12
 # periods before Newton: load that varies allows several states, and marching chooses
 MARCHED_PERIODS = 2
 # periods in which Newton's steps need not pay at once: states of the edges have to settle first
@@ -388,7 +388,7 @@ def _iterate_newton(path, walks, mu, largest, near, limit, trail, phi):
         residual = sqrt((gx - fx) ** 2 + (gy - fy) ** 2)
         det, x, y = newton_step(fx, fy, gx, gy, R, phi)
         still = events == 0 and not walks
-        if still or (residual <= TOLERANCE * scale and abs(det) < SINGULAR_DETERMINANT):
+        if still or (residual <= REPEAT_TOLERANCE * scale and abs(det) < SINGULAR_DETERMINANT):
             return False, fx, fy, gx, gy, slips, pieces, cycle
         if abs(det) >= SINGULAR_DETERMINANT and sqrt((x - fx) ** 2 + (y - fy) ** 2) <= near * scale:
             return sure > 0 or not _has_memory(phi), fx, fy, gx, gy, slips, pieces, cycle
@@ -450,7 +450,7 @@ def _march_with_leaps(path, walks, mu, largest, leap, limit, trail, phi):
             leapt = False
             last = 0
             continue
-        if (events == 0 and not walks) or residual <= TOLERANCE * scale:
+        if (events == 0 and not walks) or residual <= REPEAT_TOLERANCE * scale:
             return (
                 events > 0 and abs(det) >= SINGULAR_DETERMINANT,
                 fx,

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from numba import njit
 
-from bladefem.friction.simd.codegen import BLOCK, LANES, Code, Lanes, kernel
-from bladefem.friction.simd.time_kernels import TURNS
+from bladefem.friction.simd.codegen import BYTES_PER_BLOCK, LANES_PER_VECTOR, Code, Lanes, kernel
+from bladefem.friction.simd.time_kernels import TURN_ROWS
 from bladefem.util.numba_options import INNER_KERNEL
 
 # harmonics summed at once
-TILE = 8
+HARMONICS_PER_TILE = 8
 
 
 @kernel
@@ -39,7 +39,7 @@ def combine_rows(
     narrow, *by = code.eight(out), *map(code.spread, code.each(by))
     a = code.spread(a)
     b = code.spread(b)
-    with code.loop(0, W, LANES) as l:
+    with code.loop(0, W, LANES_PER_VECTOR) as l:
         here = code.load(knots, (i, W), l)
         ahead = code.load(knots, (j, W), l)
         for part in range(3):
@@ -93,7 +93,7 @@ def _turn_rows(half: bool):
             state = [code.variable(code.load(row, (part, W), l)) for part in range(3)]
             with code.loop(begin, end) as i:
                 *m, a, t0, t1, t2 = (
-                    code.spread(code.one(turns, (q, width), i)) for q in range(TURNS)
+                    code.spread(code.one(turns, (q, width), i)) for q in range(TURN_ROWS)
                 )
                 by_load = code.load(at, (i, W), l)
                 by_motion = code.load(change, (i, W), l)
@@ -122,7 +122,7 @@ def turn_rows(turns, at, change, begin, end, row, rows):
     width = turns.shape[1]
     W = at.shape[1]
     M = row.size
-    if W * row.itemsize % BLOCK == 0:
+    if W * row.itemsize % BYTES_PER_BLOCK == 0:
         _turn_blocks(turns, width, at, change, W, begin, end, row, rows, M)
     else:
         _turn_halves(turns, width, at, change, W, begin, end, row, rows, M)
@@ -146,7 +146,7 @@ def fill_gram(
     with code.loop(1, code.place(H, 1)) as a:
         down = code.place(1, (H, 2), (a, -2))
         up = code.place(1, (H, 2), (a, 2))
-        with code.loop(0, K, LANES) as l:
+        with code.loop(0, K, LANES_PER_VECTOR) as l:
             row = code.place((code.place((a, 2), -1), columns), l)
             rest = code.place(K, (l, -1))
             code.store_first(rest, code.load(around, up, l) + code.load(around, down, l), out, row)
@@ -290,7 +290,7 @@ def add_folded(rows, g, normal, at, fours, chosen, count, weights, out):
     columns = rows.shape[1]
     W = at.shape[1]
     tile = weights.shape[1]
-    step = BLOCK // rows.itemsize if 8 < W < 24 else 8
+    step = BYTES_PER_BLOCK // rows.itemsize if 8 < W < 24 else 8
     for l in range(0, columns, step):
         for e in range(2):
             if l < W:
@@ -342,7 +342,7 @@ def _add_load(rows, columns, l, g, fours, chosen, count, weights, tile, out, nor
         _load_first_eight(
             rows, columns, l, g, fours, chosen, count, weights, tile, out, 0, normal, at, W
         )
-    for k in range(2 * TILE - 1, tile, 2 * TILE):
+    for k in range(2 * HARMONICS_PER_TILE - 1, tile, 2 * HARMONICS_PER_TILE):
         _load_eight_more(
             rows, columns, l, g, fours, chosen, count, weights, tile, out, k, normal, at, W
         )
@@ -363,7 +363,7 @@ def _add_motion(rows, columns, l, g, fours, chosen, count, weights, tile, out, n
         _add_first_eight(
             rows, columns, l, g, fours, chosen, count, weights, tile, out, 0, normal, at, W
         )
-    for k in range(2 * TILE - 1, tile, 2 * TILE):
+    for k in range(2 * HARMONICS_PER_TILE - 1, tile, 2 * HARMONICS_PER_TILE):
         _add_eight_more(
             rows, columns, l, g, fours, chosen, count, weights, tile, out, k, normal, at, W
         )

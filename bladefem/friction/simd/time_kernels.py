@@ -7,7 +7,7 @@ eight and eight more.
 
 from __future__ import annotations
 
-from bladefem.friction.simd.codegen import LANES, Code, Lanes, kernel
+from bladefem.friction.simd.codegen import LANES_PER_VECTOR, Code, Lanes, kernel
 
 (
     DIRECTION_X,
@@ -30,7 +30,7 @@ from bladefem.friction.simd.codegen import LANES, Code, Lanes, kernel
     EDGE_ROWS,
 ) = range(18)
 # m (3), a, t (3) of find_turns
-TURNS = 7
+TURN_ROWS = 7
 # of the limit: the shortest edge
 SHORTEST_EDGE = 1e-12
 # [N]: the least limit
@@ -73,7 +73,7 @@ def find_edges(
     edge and the next its elements 11, 12, 21, 22. Lengths and limits are forces [N].
     """
     mu = code.spread(mu)
-    with code.loop(0, code.place(width, -LANES), LANES) as i:
+    with code.loop(0, code.place(width, -LANES_PER_VECTOR), LANES_PER_VECTOR) as i:
         dx, dy, dN = (
             code.load(path, (row, width), i, 1) - code.load(path, (row, width), i)
             for row in range(3)
@@ -112,7 +112,7 @@ def find_edges(
 
 def _write_pairs(code: Code, width, out) -> None:
     """The maps of each edge and the next, from those of single edges."""
-    with code.loop(0, code.place(width, -LANES), LANES) as i:
+    with code.loop(0, code.place(width, -LANES_PER_VECTOR), LANES_PER_VECTOR) as i:
         a, b, d = (code.load(out, (row, width), i) for row in (AHEAD, ACROSS, AWAY))
         A, B, D = (code.load(out, (row, width), i, 1) for row in (AHEAD, ACROSS, AWAY))
         for row, values in (
@@ -212,7 +212,9 @@ def find_turns(
     kt = code.spread(kt)
     mu = code.spread(mu)
     mukn = mu * code.spread(kn)
-    with code.loop(code.builder.and_(begin, code.whole(-LANES)), end, LANES) as i:
+    with code.loop(
+        code.builder.and_(begin, code.whole(-LANES_PER_VECTOR)), end, LANES_PER_VECTOR
+    ) as i:
         ux, uy, h, slope, by_length, by_limit = (
             code.load(form, (row, width), i)
             for row in (DIRECTION_X, DIRECTION_Y, HALF, SLOPE, INVERSE_LENGTH, INVERSE_LIMIT)
@@ -261,7 +263,7 @@ def find_forces(
     knots (2, width).
     """
     mu = code.spread(mu)
-    with code.loop(0, code.place(width, -LANES), LANES) as i:
+    with code.loop(0, code.place(width, -LANES_PER_VECTOR), LANES_PER_VECTOR) as i:
         ux, uy, h = (code.load(form, (row, width), i) for row in (DIRECTION_X, DIRECTION_Y, HALF))
         P = code.load(knots, i)
         Q = code.load(knots, width, i)

@@ -161,7 +161,7 @@ def _modal_flexibilities(Z, own, coupled):
     for h in range(Z.shape[0]):
         for k in range(Z.shape[1]):
             rigid = h == 0 and own[0, k] == 0.0
-            # damping may stand off the diagonal alone: `_coupled_flexibilities` has it all
+            # damping may have off-diagonal terms only: `_coupled_flexibilities` has it all
             if not rigid and not (coupled and Z[h, k] == 0.0):
                 D[h, k] = 1.0 / Z[h, k]
     return D

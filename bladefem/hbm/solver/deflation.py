@@ -30,7 +30,7 @@ MOST_COMMON_MOTIONS = 12
 DOFS_PER_MOTION = 4
 # motions whose compliance is below the square of this, over the largest one, are left out
 SMALLEST_COMPLIANCE_ROOT = 1e-2
-# part of a motion that has to be left beside the others where some contacts stick
+# part of a motion that has to be independent of the others where some contacts stick
 DEPENDENT_SHARE = 1e-3
 
 

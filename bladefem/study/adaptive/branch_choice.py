@@ -9,12 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
 from ...errors import NotSolvedError
 from ...hbm.branches import PATH_TOLERANCE
 from ...hbm.continuation import follow
+from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution, size
 from .family import Family, family_member
 from .indicators import ESTIMATE_OPTIONS, moved_solution, richest_settings
@@ -74,24 +76,35 @@ def peak_error(
         start = moved_solution(family, settings, anchor, rich, ESTIMATE_OPTIONS)
         if not start.converged:
             continue
-        height = 0.0
-        count = 0
-        options = replace(ESTIMATE_OPTIONS, tolerance=PATH_TOLERANCE, frugal=False)
-        forward = top.omega > anchor.omega
-        try:
-            for point in follow(
-                model, "omega", start, bounds, forward=forward, steps=ARC_STEPS, options=options
-            ):
-                count += 1
-                now = size(point.solution)
-                height = max(height, now)
-                if now < (1 - PASSED_HEIGHT_DROP) * height or count > MAX_PATH_POINTS:
-                    break
-        except NotSolvedError:
-            continue
-        if now < height:
+        height = _peak_along_path(model, start, bounds, top.omega > anchor.omega)
+        if height is not None:
             return float(abs(height - size(top)) / height)
     return float(np.inf)
+
+
+def _peak_along_path(
+    model: ReducedModel,
+    start: Solution,
+    bounds: tuple[float, float],
+    forward: bool,
+) -> float | None:
+    """Height [m] of the first maximum of the path in frequency from a point; None where the path
+    ends before it.
+    """
+    options = replace(ESTIMATE_OPTIONS, tolerance=PATH_TOLERANCE, frugal=False)
+    path = follow(model, "omega", start, bounds, forward=forward, steps=ARC_STEPS, options=options)
+    height = 0.0
+    now = 0.0
+    try:
+        for point in islice(path, MAX_PATH_POINTS + 1):
+            now = size(point.solution)
+            height = max(height, now)
+            # small dips are rounding or a corner, not the far side of the peak
+            if now < (1 - PASSED_HEIGHT_DROP) * height:
+                break
+    except NotSolvedError:
+        return None
+    return height if now < height else None
 
 
 def _error_below(
