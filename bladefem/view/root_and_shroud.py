@@ -45,7 +45,7 @@ def draw_roots(
         "dovetail, lobes 1": replace(root, lobes=1),
         f"fir-tree, lobes {max(root.lobes, 2)}": replace(root, lobes=max(root.lobes, 2)),
     }
-    with canvas(file, size=(9.6, 4.6), grid=(1, 2), sharey=True) as axes:
+    with canvas(file, size=(9.6, 4.6), grid=(1, 2), sharey=True, width_ratios=[2.2, 3.1]) as axes:
         for ax, (name, one) in zip(axes, both.items(), strict=True):
             _draw_root(ax, shank, disc, one)
             equal_axes(ax, name, "y, circumferential", "x, radial")
