@@ -11,8 +11,8 @@ whose crash becomes a sentence.
 Half of the sets round the defaults have a dovetail or fir-tree root, half a tip shroud or snubber;
 half leave the fillet to the rule, the others have one of 0.5 to 3 mm.
 
-Measured (gmsh 4.15.2, two shared cores), 200 sets of seed 4; nothing crashed, and every refusal came
-from a rule of `bladefem check` and named a field:
+Measured (gmsh 4.15.2, two shared cores), 200 sets of seed 4; nothing crashed, and every refusal
+came from a rule of `bladefem check` and named a field:
 
     meshes, round the defaults / anywhere               73 / 0
     refusals, round the defaults / anywhere             77 / 50
@@ -21,9 +21,9 @@ from a rule of `bladefem check` and named a field:
     smallest scaled Jacobian                            0.101
     CPU, all 200 sets                                   8.5 min
 
-Seeds 1 and 2 without roots and shrouds gave 87 and 101 meshes of worst quality 0.030 and 0.021, all
-else refused too. Their number of refusals round the defaults is mostly that of the root chord, which
-overhangs a platform of nearly its length.
+Seeds 1 and 2 without roots and shrouds gave 87 and 101 meshes of worst quality 0.030 and 0.021,
+all else refused too. Round the defaults most refusals are of the root chord, which overhangs a
+platform of nearly its length.
 
 Shape quality is the ratio of inscribed to circumscribed radius, 1 at best; below 0.02 a mesh is
 refused. Before the shank's end had to be flush with the disc's or 2 % short of it, the worst cells
