@@ -27,8 +27,8 @@ from .surface import surface_quadrature
 
 # part of the high face that the low one must cover
 COVERED_PART = 0.99
-# shares of motion below this are rounding
-SMALLEST_SHARE = 1e-13
+# shares of motion below this part of the largest one in their row are left out
+SMALLEST_SHARE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,8 @@ class CutTie:
     share: RealArray
     # (s, s) mass of the high face, unit density [m^2]
     mass: RealArray
+    # (m, 3) places of the low nodes [m]
+    places: RealArray
 
 
 def tie_cut_faces(mesh: Mesh, name: str = "cyclic") -> CutTie:
@@ -65,8 +67,7 @@ def tie_cut_faces(mesh: Mesh, name: str = "cyclic") -> CutTie:
         )
     share = np.asarray(np.linalg.solve(mass, coupling), np.float64)
     share = _exact_for_rigid_motions(mesh, pair, low, high, share)
-    share[np.abs(share) < SMALLEST_SHARE] = 0.0
-    return CutTie(low, high, share, mass)
+    return CutTie(low, high, share, mass, mesh.points[low])
 
 
 def repeated_motion(tie: CutTie, count: int, free: BooleanArray) -> sp.csr_matrix:
@@ -84,9 +85,35 @@ def repeated_motion(tie: CutTie, count: int, free: BooleanArray) -> sp.csr_matri
         held = mass[:, ~moving] @ tie.share[~moving]
         share = share + np.linalg.solve(mass[:, moving], held)
     follows = free[tie.low]
-    block = sp.coo_matrix(share[:, follows])
+    block = _short_rows(share[:, follows], tie.places[follows]).tocoo()
     rows, columns = tie.high[moving][block.row], tie.low[follows][block.col]
     return sp.csr_matrix((block.data, (rows, columns)), shape=(count, count))
+
+
+def _short_rows(share: RealArray, places: RealArray) -> sp.csr_matrix:
+    """The shares (s, m) without small ones, which fall off along the face but never end: the kept
+    ones of a row are corrected so that linear and quadratic fields are repeated as before.
+
+    Args:
+        places: (m, 3) of the columns [m].
+    """
+    if not share.size:
+        return sp.csr_matrix(share.shape)
+    # of a row with one column
+    least = 1e-3 * float(np.ptp(places, axis=0).max())
+    rows = []
+    for row in share:
+        kept = np.flatnonzero(np.abs(row) > SMALLEST_SHARE * np.abs(row).max())
+        centre = places[kept].mean(axis=0)
+        x = (places - centre) / max(float(np.abs(places[kept] - centre).max()), least)
+        fields = np.column_stack(
+            [np.ones(len(x)), x, *(x[:, [i]] * x[:, i:] for i in range(x.shape[1]))]
+        )
+        lost = row @ fields - row[kept] @ fields[kept]
+        rows.append((kept, row[kept] + lost @ np.linalg.pinv(fields[kept], rcond=1e-8)))
+    ends = np.cumsum([0, *(len(kept) for kept, _ in rows)])
+    columns, values = (np.concatenate([row[i] for row in rows]) for i in range(2))
+    return sp.csr_matrix((values, columns, ends), shape=share.shape)
 
 
 def _integrals(
