@@ -50,6 +50,33 @@ COLUMNS = {
         for share in (50, 95, 99)
         for end, title in (("", " of wheels below"), ("_low", " from"), ("_high", " to"))
     },
+    # of the influences: values now, and at both ends of a parameter's range by the derivative and
+    # solved again
+    **{
+        f"{name}_{end}": Column(f"{name}{words}", unit, shown, factor)
+        for name, unit, shown, factor in (
+            ("load", "N", "", 1.0),
+            ("amplitude", "m", "µm", 1e6),
+            ("frequency", "Hz", "", 1.0),
+        )
+        for end, words in (
+            ("now", " now"),
+            ("low_solved", ", low end, solved"),
+            ("high_solved", ", high end, solved"),
+        )
+    },
+    **{
+        f"{name}_{end}": Column(f"{name}, {end} end", unit, shown, factor)
+        for name, unit, shown, factor in (
+            ("amplitude", "m", "µm", 1e6),
+            ("frequency", "Hz", "", 1.0),
+        )
+        for end in ("low", "high")
+    },
+    **{
+        f"{name}_by_parameter": Column(f"{name}, logarithmic derivative", "1", digits=3)
+        for name in ("load", "amplitude", "frequency")
+    },
     "mass": Column("damper mass", "kg", "g", 1e3),
     "mode_frequency": Column("resonance by the mode", "Hz"),
     "mode_amplitude": Column("amplitude by the mode", "m", "µm", 1e6),

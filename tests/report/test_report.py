@@ -87,6 +87,19 @@ def test_readable_units():
     assert text.to_numpy().tolist() == [["0", "500", "a", "3"], ["∞", "37.037", "b", ""]]
 
 
+def test_influences_are_shown_in_the_units_of_people():
+    names = ("amplitude_now", "amplitude_low", "amplitude_low_solved", "load_now", "frequency_high")
+    text = readable_texts(pd.DataFrame({name: [1.5e-4] for name in names}))
+    assert list(text.columns) == [
+        "amplitude now [µm]",
+        "amplitude, low end [µm]",
+        "amplitude, low end, solved [µm]",
+        "load now [N]",
+        "frequency, high end [Hz]",
+    ]
+    assert text.iloc[0, 0] == "150"
+
+
 def test_markdown_and_latex_align_numbers_and_escape():
     table = pd.DataFrame({"family": ["a_1 | 50 %"], "frequency": [812.4]})
     assert to_markdown(table).splitlines()[1] == "| --- | ---: |"
