@@ -124,5 +124,18 @@ def waves(
     return Waves(modes.nodal_diameter, speed, forward, backward, ahead, behind)
 
 
+def wave_shifts(modes: ModeSet, g: np.ndarray, speed: float) -> np.ndarray:
+    """(m,) by how much the waves that the modes become differ from their frequencies [1], the
+    larger of forward and backward; 0 of rigid modes.
+
+    Args:
+        g, speed: as in :func:`waves`.
+    """
+    found = waves(modes, g, speed)
+    f = modes.frequencies
+    away = np.maximum(np.abs(found.forward - f), np.abs(found.backward - f))
+    return np.divide(away, f, out=np.zeros_like(f), where=f > 0)
+
+
 def _normalise_columns(Z: np.ndarray) -> np.ndarray:
     return Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)

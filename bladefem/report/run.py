@@ -78,6 +78,8 @@ from .write import Page, write_report
 
 # the figure of the blade's motion under the best load
 MOTION_FIGURE = "response/damped_motion"
+# of the accuracy: shift of a frequency by Coriolis forces that responses may leave out
+CORIOLIS_SHARE = 0.1
 MESH_ERROR_NOTE = (
     "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
     "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
@@ -206,6 +208,7 @@ def _report_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]
         *result.messages,
         method(MESH_ERROR_NOTE),
         _static_contact(result),
+        *_coriolis(result),
         method(_states(result)),
         method(linear_sentence(cycles)),
         *_beyond_stick(result),
@@ -284,6 +287,25 @@ def _static_contact(result: SolvedRun) -> str:
     )
     found = quasi_static(patch, result.scene.material.blade, highest)
     return method(found.sentence) if found.holds else warning(found.sentence)
+
+
+def _coriolis(result: SolvedRun) -> list[str]:
+    """Whether Coriolis forces, which are left out of the responses, may stay out."""
+    shift = result.strength.coriolis
+    if not shift > 0:
+        return []
+    share = (
+        f"Coriolis forces move the waves of mode {result.strength.mode} by {100 * shift:.2g} % of "
+        "its frequency"
+    )
+    if shift <= CORIOLIS_SHARE * result.scene.accuracy:
+        return [method(f"{share}; they are left out of the responses.")]
+    return [
+        warning(
+            f"{share}, and are left out of the responses: resonances lie that much lower or "
+            "higher, and amplitudes may differ; 'bladefem modes --campbell' has both waves."
+        )
+    ]
 
 
 def _states(result: SolvedRun) -> str:

@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from structured import box, pair, sector, turn
 
+from bladefem.data import ModeSet, PortModel
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain
-from bladefem.fem.gyroscopic import coupling, waves
+from bladefem.fem.gyroscopic import coupling, wave_shifts, waves
 from bladefem.fem.modes import modes
 from bladefem.fem.rotation import body_under_rotation
+from bladefem.hbm.linear.bodies import Damping, modal_flexibility, stack_bodies
 from bladefem.scene.tables import Material
 from geometry.mesh import Mesh, Sector
 
@@ -102,3 +104,25 @@ def test_coupling_does_not_depend_on_ranks():
         g.append(waves(shapes, coupling(body, shapes), 1000.0))
     np.testing.assert_allclose(g[0].forward, g[1].forward, rtol=1e-9)
     np.testing.assert_allclose(g[0].backward, g[1].backward, rtol=1e-9)
+
+
+def test_shifts_of_a_mass_on_springs_in_a_rotating_frame():
+    """Foucault's pendulum: with springs w0 and K = w0^2 - Omega^2 the waves turn with w0 + Omega and
+    w0 - Omega; the reduced model with that damping answers a rotating force like them.
+    """
+    w0, speed = 2 * np.pi * 50.0, 60.0
+    still = np.sqrt(w0**2 - speed**2)
+    g = np.array([[0.0, -2.0], [2.0, 0.0]])
+    found = ModeSet(np.full(2, still / (2 * np.pi)), np.zeros((2, 1, 3)), None, np.zeros(2))
+    shifts = wave_shifts(found, g, speed)
+    np.testing.assert_allclose(shifts.max(), (w0 + speed) / still - 1, rtol=1e-12)
+    ports = {"contact": slice(0, 1), "load": slice(1, 2)}
+    none = np.zeros((2, 2))
+    body = PortModel(np.full(2, still), np.eye(2), none, ports, damping=speed * g)
+    stack = stack_bodies((body,), Damping(), np.array([0]))
+    w = np.array([100.0, 300.0, 500.0])
+    inverse = modal_flexibility(stack, w)
+    for sense in (1, -1):
+        force = np.array([1.0, -1j * sense])
+        closed = 1 / (still**2 - w**2 - 2 * sense * speed * w)
+        np.testing.assert_allclose(inverse @ force, closed[:, None] * force, rtol=1e-10)

@@ -1,11 +1,14 @@
 """Stress of the mode studied, and of rotation, against bar and beam theory."""
 
+import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bladefem.report.run import _coriolis
 from bladefem.scene.tables import Excitation, Material, Materials, Operation, Scene
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.stages import Bodies, excited_modes, find_modes
@@ -40,3 +43,17 @@ def test_slender_blade_without_contraction():
         RHO * SPEED**2 * (L**2 - found.steady_at[0] ** 2) / 2, rel=0.01
     )
     assert np.isfinite(found.steady_at).all()
+    # a plane blade turns about an axis in its plane: no Coriolis force in it
+    assert found.coriolis < 1e-9
+
+
+@pytest.mark.parametrize(
+    "shift, count, words", [(0.0, 0, ""), (1e-4, 1, "left out of"), (0.02, 1, "2 %.*--campbell")]
+)
+def test_what_is_said_of_coriolis_forces(shift, count, words):
+    """Nothing at rest, a note where they are small against the accuracy, else a warning."""
+    found = SimpleNamespace(
+        strength=SimpleNamespace(coriolis=shift, mode=1), scene=SimpleNamespace(accuracy=0.02)
+    )
+    said = _coriolis(found)
+    assert len(said) == count and all(re.search(words, text) for text in said)
