@@ -7,9 +7,12 @@ The choice finds harmonics and samples for the highest resonance of the band, se
 rich model sweeps the same band with 15 harmonics and 1024 samples. Contacts of these models are no
 neighbours on a surface, so that points and modes stay as they are.
 
-Of the seeds 0 to 32 at 2 % none was wrong; three have no resonance inside their band; six took more
-than 1.1 times the rich model's CPU time, five of them 15 to 40 ms in all, a chain with lift-off
-1.3 s against 0.35 s.
+Of the seeds 0 to 66 at 2 % none was wrong, five have no resonance inside their band, and one
+estimate (seed 1) is below half of the true error. CPU time over the rich model's: 0.25 in all,
+median 0.67, above 1.1 in 14 of 62. Ten of these lift off: the choice follows their paths round
+folds, which the rich model has too many unknowns for. In the others a damper walks (seed 34), or
+all takes less than 30 ms. Of the seeds 0 to 32 at 0.1 % none was wrong; 0.38 in all, median 0.79,
+above 1.1 in 11 of 30.
 """
 
 from __future__ import annotations
@@ -33,6 +36,13 @@ from bladefem.study.adaptive.settings import first_for
 
 HARMONICS = 15
 SAMPLES = 1024
+# of the model that tells the truth
+TRUE_HARMONICS = 31
+TRUE_SAMPLES = 4096
+# relative difference of its peak up to which it is the same
+SAME_PEAK = 0.05
+# accuracy over the tolerance to which the choice closes in its peak, which no estimate contains
+SEARCHED = 80
 Result = TypeVar("Result")
 
 
@@ -42,15 +52,17 @@ def timed(compute: Callable[[], Result]) -> tuple[Result, float]:
     return compute(), time.process_time() - clock
 
 
-def closed_in(model: bf.ReducedModel, top: bf.Solution) -> float:
-    """Height of the rich model's peak [m]: its sweep closes it in to 1e-3 only, more than many an
-    estimate.
+def true_height(model: bf.ReducedModel, top: bf.Solution) -> float:
+    """Height of the peak that the rich model's sweep has found, with TRUE_HARMONICS [m].
+
+    The choice takes more harmonics than the rich model where it has to, and that sweep closes its
+    peak in to 1e-3 only: both are more than many an estimate.
     """
     try:
-        found = find_peak(model, top.omega, HARMONICS, SAMPLES, near=top, tolerance=1e-7)
+        found = find_peak(model, top.omega, TRUE_HARMONICS, TRUE_SAMPLES, near=top, tolerance=1e-7)
     except NotSolvedError:
         return bf.size(top)
-    near = abs(found.height / bf.size(top) - 1) < 2e-3
+    near = abs(found.height / bf.size(top) - 1) < SAME_PEAK
     return found.height if near else bf.size(top)
 
 
@@ -79,12 +91,12 @@ def main(first: int, last: int, accuracy: float) -> None:
             continue
         spent += cheap, expensive
         ratios.append(cheap / expensive)
-        truth = closed_in(model, peak_of(rich))
+        truth = true_height(model, peak_of(rich))
         error = abs(bf.size(peak_of(found.points)) / truth - 1)
         told = found.settings.error
         bad = error > accuracy and (told is None or told <= accuracy)
         wrong += [seed] * bad
-        unsure += [seed] * (told is not None and told < error / 2 and error > 1e-4)
+        unsure += [seed] * (told is not None and told < error / 2 and error > accuracy / SEARCHED)
         if bad or cheap > 1.1 * expensive:
             print(
                 f"seed {seed}, {case.name}: error {error:.2%}, estimated {told:.2%}, "
