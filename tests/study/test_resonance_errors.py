@@ -93,7 +93,9 @@ def test_one_harmonic_is_not_enough_where_half_of_the_contacts_lift(lift, least,
 
 
 def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
-    """Harmonics are taken first; where they do not halve the error, the search ends."""
+    """Harmonics are taken first; where they do not halve the error, the search ends unless more
+    contact points may be chosen: then these are, and the error they had is gone.
+    """
     family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
     tried = []
 
@@ -103,10 +105,30 @@ def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
 
     monkeypatch.setattr(resonance_choice, "peak_from", found)
     settings, peak, errors = resonance_choice.choose_at_peak(
-        family, first_for(family.modes), peak_with(4, 1.0), 0.05
+        family, first_for(family.modes), peak_with(4, 1.0), 0.05, ("points",)
     )
     assert settings.points == 4 and settings.harmonics == 7
     assert 0.2 < errors.total == settings.error and peak.height == pytest.approx(1.1 - 0.1 / 7)
+    settings, peak, errors = resonance_choice.choose_at_peak(
+        family, first_for(family.modes), peak_with(4, 1.0), 0.05
+    )
+    assert settings.points > 4 and settings.harmonics == 7
+    assert errors.total < 0.01 and peak.height == pytest.approx(1.6 - 0.1 / 7)
+
+
+def test_an_error_stays_known_where_the_richer_model_is_not_solved_any_more(judged):
+    """As it was before, unless its own respect has been refined since."""
+    settings = replace(first_for(10), harmonics=7, points=4)
+    before = replace(settings, harmonics=3)
+    known = judged(99, 99)
+    unknown = resonance_choice.PeakErrors(
+        {**known.height, "points": np.inf, "harmonics": np.inf},
+        {**known.frequency, "points": np.inf, "harmonics": np.inf},
+    )
+    found = resonance_choice._with_errors_before(unknown, settings, known, before)
+    assert found.height["points"] == known.height["points"] > 0
+    assert found.frequency["points"] == known.frequency["points"]
+    assert found.height["harmonics"] == np.inf
 
 
 def test_a_curve_starts_with_the_harmonics_that_are_excited():

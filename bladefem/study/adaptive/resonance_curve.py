@@ -25,6 +25,7 @@ from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
 from .resonance_choice import (
     FAR_BEYOND,
+    JUDGE_STEPS,
     PeakErrors,
     choose_at_peak,
     compared_settings,
@@ -227,7 +228,7 @@ def _change(
     if pair is None:
         return np.inf
     own, judge = pair
-    options = replace(solver_options(1e-2), fallbacks=False)
+    options = replace(solver_options(1e-2), fallbacks=False, iterations=JUDGE_STEPS)
     base = point if own == settings else moved_solution(family, settings, point, own, options)
     if not base.converged:
         return np.inf
