@@ -95,18 +95,22 @@ def draw_bands(
             middle, low, high = 1e6 * value.T
             ax.plot(load, middle, color=colour, marker="o", label=name)
             ax.fill_between(load, low, np.where(np.isfinite(high), high, middle), alpha=0.18)
+        first = min((at for _, at, _, _ in best), default=0.0)
         for place, (name, at, lowest, highest) in enumerate(best):
             ax.axvline(at, color="#888888", linewidth=1.0, linestyle=("--", ":")[place % 2])
             words = f"{name}: {at:.4g} {unit}"
             if highest > lowest:
                 ax.axvspan(lowest, highest, color="#888888", alpha=0.15, linewidth=0)
                 words += f" ({lowest:.4g} to {highest:.4g})"
+            # words on the outer side of neighbouring lines, which they would cross otherwise
+            outside = -1 if at == first and len(best) > 1 else 1
             ax.annotate(
                 words,
                 (at, 0.97 - 0.06 * place),
                 xycoords=("data", "axes fraction"),
                 textcoords="offset points",
-                xytext=(4, 0),
+                xytext=(4 * outside, 0),
+                ha="right" if outside < 0 else "left",
                 fontsize=8.5,
             )
         log_axis(ax, "x")
