@@ -71,25 +71,10 @@ def wedge_sector(
     aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, size)
     shape = sector_profile(platform, shank, disc, wedge)
     block = shroud_block(shroud, aerofoil, disc, shape.top)
-    sizes = sector_sizes(
-        aerofoil,
-        platform,
-        shank,
-        disc,
-        wedge,
-        size,
-    )
+    sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
+    slots = root_slots(root, shank, disc)
     with gmsh_session() as gmsh:
-        blade = blade_solid(
-            gmsh,
-            aerofoil,
-            platform,
-            shank,
-            disc,
-            shape,
-            block,
-            root_slots(root, shank, disc),
-        )
+        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape, block, slots)
         marks = [
             (2, draw_polygon(gmsh, seat_face_corners(shape, wedge.length, side))[0])
             for side in (-1, 1)

@@ -66,8 +66,7 @@ def solve_lcp(
     Args:
         C: (n, n) flexibility, symmetric positive definite [m/N].
         g0: (n,) gap without contact forces [m].
-        R: (n, d) gap opened by unit rigid displacements of a floating body; None when nothing
-            floats.
+        R: (n, d) gap opened by unit rigid displacements; None when nothing floats.
         load: (d,) required R^T f [N, N m].
         start: (n,) bool, nodes in contact in a neighbouring state (warm start).
         tolerance: accepted `residual`.
@@ -94,11 +93,8 @@ def solve_lcp(
     # closes even gaps, however wide, before round-off could drown the elastic ones in them
     travel = -(U.T @ g0)
     g0 = g0 + U @ travel
-    active = (
-        _winkler_set(C, g0, U, reduced)
-        if start is None
-        else as_float_array("start", start, (n,)) > 0
-    )
+    warm = None if start is None else as_float_array("start", start, (n,)) > 0
+    active = _winkler_set(C, g0, U, reduced) if warm is None else warm
     try:
         f, y, active, its, settled = _primal_dual(C, g0, U, reduced, active, max_iterations)
         if not settled:

@@ -116,10 +116,8 @@ def follow(
         yield _path_point(task, spot, fold, spot.branches(before))
         if not low <= spot.x <= high:
             return
-    raise NotSolvedError(
-        f"path in {name} stopped at {parameter_value(name, spot.x):.6g} after {MOST_PATH_POINTS} "
-        "points"
-    )
+    end = f"{parameter_value(name, spot.x):.6g}"
+    raise NotSolvedError(f"path in {name} stopped at {end} after {MOST_PATH_POINTS} points")
 
 
 def _refuse_creeping(task: Task, recent: deque[Spot]) -> None:

@@ -4,7 +4,7 @@ needs them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from itertools import chain, islice
@@ -114,6 +114,49 @@ def _at_once(
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
 
+def _close_in_maxima(
+    model: ReducedModel,
+    solved: dict[float, Solution],
+    H: int,
+    samples: int,
+    accuracy: tuple[float, float],
+    options: Options,
+    paths: bool,
+    notes: list[str],
+) -> Generator[Solution, None, bool]:
+    """Solve the points that close in on every local maximum, one after the other.
+
+    Args:
+        solved: takes the points.
+        accuracy: of maxima, and of the curve between them, as in :func:`sweep`.
+
+    Returns:
+        True where one motion a frequency is too few, so that the response has to be followed.
+    """
+    slope = _slope_of(model, solved, options.probe)
+    while not (paths and _needs_continuation(model, solved, H, options.probe)):
+        wanted = _next_frequency(solved, slope, accuracy, options.probe)
+        if wanted is None:
+            return False
+        if len(solved) >= BAND_LIMIT:
+            notes.append(_limit_note())
+            # only normal loads that follow the motion make folds
+            return paths and _normal_loads_follow(model)
+        starts = _neighbours(solved.values(), wanted)
+        solved[wanted] = solve_from(model, wanted, H, samples, starts, options)
+        yield solved[wanted]
+    return True
+
+
+def _missed(
+    lost: list[float],
+    solved: Mapping[float, Solution],
+    found: Branches,
+) -> list[float]:
+    """Frequencies lost in the first look that no path went through either."""
+    return [omega for omega in lost if omega not in solved and not _crossed(found, omega)]
+
+
 def sweep(
     model: ReducedModel,
     band: tuple[float, float],
@@ -154,34 +197,22 @@ def sweep(
     check_probe(model, options.probe)
     solved = {point.omega: point for point in known}
     yield from known
-    slope = _slope_of(model, solved, options.probe)
     notes = [] if notes is None else notes
     lost: list[float] = []
     look = [omega for omega in first_look(model, band) if omega not in solved]
     for solution in _first_solutions(model, look, solved, H, samples, options, paths, lost):
         solved[solution.omega] = solution
         yield solution
-    # maxima are closed in point by point until folds show that one motion a frequency is too few
-    while not (paths and _needs_continuation(model, solved, H, options.probe)):
-        wanted = _next_frequency(solved, slope, (peak, curve), options.probe)
-        if wanted is None:
-            return
-        if len(solved) >= BAND_LIMIT:
-            notes.append(_limit_note())
-            # folds need normal loads that follow the motion; without them a path adds nothing
-            if not (paths and _normal_loads_follow(model)):
-                return
-            break
-        starts = _neighbours(solved.values(), wanted)
-        solved[wanted] = solve_from(model, wanted, H, samples, starts, options)
-        yield solved[wanted]
+    followed = yield from _close_in_maxima(
+        model, solved, H, samples, (peak, curve), options, paths, notes
+    )
+    if not followed:
+        return
     points = list(solved.values())
     found = find_branches(model, band, points, H, samples, peak=peak, options=options)
     notes.extend(found.notes)
     yield from found.points
-    # frequencies lost in the first look that no path went through
-    missed = [omega for omega in lost if omega not in solved and not _crossed(found, omega)]
-    yield from _solved_again(model, missed, points, H, samples, options)
+    yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)
 
 
 def _crossed(branches: Branches, omega: float) -> bool:

@@ -27,6 +27,20 @@ HERMITIAN_ROUNDING_SHARE = 1e-8
 CIRCULATION_ROUNDING_SHARE = 1e-9
 
 
+def _with_rigid_zeros(values: np.ndarray) -> np.ndarray:
+    """Ascending eigenvalues (n,) [rad^2/s^2] with those of rigid modes set to zero.
+
+    Raises:
+        InputError: the stiffness is not positive semidefinite.
+    """
+    smallest = RIGID_EIGENVALUE_SHARE * values[-1]
+    if values[0] < -smallest:
+        raise InputError(
+            f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness"
+        )
+    return np.where(values < smallest, 0.0, values)
+
+
 def port_model_from_matrices(
     M: np.ndarray,
     K: np.ndarray,
@@ -68,11 +82,7 @@ def port_model_from_matrices(
     except linalg.LinAlgError:
         M, K, C, P, massless, circulation = _without_massless(M, K, C, P, circulation)
         values, vectors = linalg.eigh(K, M)
-    if values[0] < -RIGID_EIGENVALUE_SHARE * values[-1]:
-        raise InputError(
-            f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness"
-        )
-    values[values < RIGID_EIGENVALUE_SHARE * values[-1]] = 0.0
+    values = _with_rigid_zeros(values)
     count = len(values) if count is None else count
     if not np.count_nonzero(values == 0) <= count <= len(values):
         raise InputError(

@@ -185,21 +185,7 @@ def _angle_rates(y: Lanes, gone: Lanes, rates: tuple[Lanes, ...]) -> tuple[Lanes
 
 @kernel
 def find_turns(
-    code: Code,
-    begin,
-    end,
-    path,
-    form,
-    knots,
-    slips,
-    width,
-    kt,
-    kn,
-    mu,
-    turns,
-    g,
-    normal,
-    trace,
+    code: Code, begin, end, path, form, knots, slips, width, kt, kn, mu, turns, g, normal, trace
 ):
     """How the row of the angle turns along the edges begin <= i < end in slip, from half-angle
     vectors knots.

@@ -75,17 +75,8 @@ def resonance_curve(
         # paths are followed anew
         again = any(p.branch for p in points) or not _same_points(swept, (used, accuracy))
         known = [] if again else points
-        points = covered_band(
-            family_member(family, used).model,
-            used,
-            span,
-            mode,
-            accuracy,
-            widen,
-            paths,
-            notes,
-            known,
-        )
+        model = family_member(family, used).model
+        points = covered_band(model, used, span, mode, accuracy, widen, paths, notes, known)
         swept = used, accuracy
         points = _with_peak(points, peak)
         if used.error is not None and used.error > FAR_BEYOND * accuracy:
