@@ -232,13 +232,12 @@ def choose_at_peak(
     """Settings whose estimated errors of height and frequency keep within a share of the accuracy,
     or the best that may be chosen; the peak with them, and its errors.
 
-    Nothing is refined in a respect in which the richer model was not solved: its error is unknown.
-    A respect whose error was negligible is not judged again, nor one that could not be judged where
-    contacts lift off. There refining ends once it does not halve an error that is far beyond the
-    accuracy, unless there are few contact points: such peaks converge slowly, and each round costs
-    more than the one before. Harmonics that are missing come first there: with few of them more
-    contact points lead away from the truth (36 N on the shipped wedge: 440 um with 7 harmonics and
-    4 points, 452 with 31; 909 with 3 and 16 points).
+    A respect in which the richer model was not solved is not refined, one whose error was
+    negligible not judged again, nor one that could not be judged where contacts lift off. There
+    refining ends once it does not halve an error that is far beyond the accuracy, unless there are
+    few contact points. Harmonics that are missing come first there: with few of them more contact
+    points lead away from the truth (36 N on the shipped wedge: 440 um with 7 harmonics and 4
+    points, 452 with 31; 909 with 3 and 16 points).
 
     Args:
         peak: found with `settings`.
@@ -270,10 +269,10 @@ def choose_at_peak(
             for name, need in errors.needs.items()
             if need <= NEGLIGIBLE_SHARE * accuracy or (far and not np.isfinite(need))
         }
-        missing = errors.needs["harmonics"] > SUFFICIENT_SHARE * accuracy
-        first = "harmonics" if far and missing else ""
         if sum(errors.needs.values()) <= sufficient * accuracy:
             break
+        missing = errors.needs["harmonics"] > SUFFICIENT_SHARE * accuracy
+        first = "harmonics" if far and missing else ""
         better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
         if better is None:
             break
