@@ -11,27 +11,29 @@ full stick, at the rate at which this machine multiplies matrices; a dense Jacob
 `set-up` is what the first point of a model makes for all later ones. Memory is the peak of the
 resident set from the model's set-up to the point's end, beyond what the model itself takes (Linux).
 
-Measured (CPU seconds, one thread, 48 GFlop/s in matrix products; H = 3):
-
+Measured (CPU seconds, one thread of a busy machine, 57 GFlop/s in matrix products; H = 5):
     all modes
-    nodes   point   condense   forces    limit   one dense step   MiB   dense MiB   Newton steps
-        9   0.005     0.0002   0.0006   0.00001          0.0001     1         0.3              4
-       49   0.021     0.008    0.0012   0.002            0.015      8           8              4
-      100   0.10      0.065    0.0025   0.018            0.13      19          34              7
-      196   0.57      0.34     0.0070   0.13             0.96     121         129              5
-      400   5.5       2.8      0.015    1.1              8.2      499         538              9
-     1024   165       44       0.11     19               137     3076        3528              8
+    nodes   point   set-up   condense   forces    limit   one dense step   MiB   dense MiB   steps
+        9   0.006    0.003     0.0002   0.0006   0.00002          0.0003     2         0.7       4
+       49   0.026    0.008     0.008    0.0010   0.003            0.05      11          20       5
+      100   0.13     0.015     0.059    0.0021   0.025            0.42      31          83       7
+      196   0.60     0.11      0.38     0.0053   0.19             3.2      150         319       6
+      400   5.4      0.42      3.1      0.017    1.6             26        559        1329       9
     60 modes and the residual flexibility of the others
-      100   0.11      0.014    0.0024   0.003                     26                           7
-      196   0.26      0.041    0.0054   0.011                    122                           6
-      400   2.8       0.23     0.021    0.045                    493                           9
-     1024   130       4.1      0.078    0.29                    3094                           8
-
-Forces grow linearly. With all modes the condensation grows with the cube, 2.3 to 3.6 times above
-its limit; with few it grows with the square. At 1000 nodes three quarters and more go into the
-Newton steps, that is into products with the flexibilities of the nodes that slip and into copies of
-them, which traffic limits: a whole point then costs as much as one dense Newton step at the limit.
-25 nodes: H 1 to 31 takes 0.010 to 0.22 s and 2 to 37 MiB a point.
+       49   0.017    0.006     0.0007   0.0009                              5                    5
+      100   0.038    0.013     0.0007   0.0014                             10                    6
+      196   0.083    0.049     0.0008   0.0028                             33                    6
+      400   0.49     0.33      0.0020   0.0072                            140                    9
+     1024   5.5      3.3       0.11     0.045                             705                    8
+Forces grow linearly. With all modes the condensation grows with the cube, about twice its limit;
+the rest are products with a matrix for each harmonic. With few modes a frequency costs a system as
+large as the modes; most of a point are products of the residual flexibility, which all harmonics
+share, with the forces of all harmonics at once, in the iterations of 5 to 9 Newton steps. Memory
+grows with the square of the nodes, time with their power 1.2 from 100 to 196 nodes, 2.5 above,
+where the matrix has left the caches. Bodies that differ with the harmonic, as sectors in nodal
+diameters do, keep a matrix for each: 2.2 s and 0.8 GB at 400 nodes; squared that would be 15 s and
+5 GB at 1024.
+25 nodes: H 1 to 31 takes 0.006 to 0.27 s and 2 to 42 MiB a point.
 """
 
 from __future__ import annotations
