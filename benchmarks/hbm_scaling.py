@@ -18,13 +18,13 @@ Measured (CPU seconds, one thread of a busy machine, 57 GFlop/s in matrix produc
        49   0.026    0.008     0.008    0.0010   0.003            0.05      11          20       5
       100   0.13     0.015     0.059    0.0021   0.025            0.42      31          83       7
       196   0.60     0.11      0.38     0.0053   0.19             3.2      150         319       6
-      400   5.4      0.42      3.1      0.017    1.6             26        559        1329       9
+      400   5.5      0.15      3.1      0.017    1.6             26        559        1329       9
     60 modes and the residual flexibility of the others
        49   0.017    0.006     0.0007   0.0009                              5                    5
       100   0.038    0.013     0.0007   0.0014                             10                    6
       196   0.083    0.049     0.0008   0.0028                             33                    6
-      400   0.49     0.33      0.0020   0.0072                            140                    9
-     1024   5.5      3.3       0.11     0.045                             705                    8
+      400   0.48     0.29      0.0010   0.0072                            116                    9
+     1024   4.6      4.2       0.0022   0.037                             587                    8
 Forces grow linearly. With all modes the condensation grows with the cube, about twice its limit;
 the rest are products with a matrix for each harmonic. With few modes a frequency costs a system as
 large as the modes; most of a point are products of the residual flexibility, which all harmonics

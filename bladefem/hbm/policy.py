@@ -54,7 +54,7 @@ DETERMINANT_UNKNOWNS = 600
 LOW_RANK_RATIO = 2
 # Contact degrees of freedom from which one flexibility serves all harmonics without being formed:
 # with H = 3 a point takes 0.02 s in place of 0.03 at 100 nodes in space, 0.06 in place of 0.14 at
-# 196; at 1024 nodes 6 s with H = 5, where matrices took 130 s with H = 3.
+# 196; at 1024 nodes 5 s with H = 5, where matrices took 130 s with H = 3.
 SHARED_FLEXIBILITY_DOFS = 64
 # Coordinates and elements up to which shooting is tried.
 SHOOTING_SIZE = 200
