@@ -14,6 +14,9 @@ from numba import njit
 
 from bladefem.errors import InputError
 
+# relative excess of a force over its limit that still sticks: slip leaves it on the limit
+ROUNDING = 1e-14
+
 
 @njit(cache=True)
 def step_1d(trial, N0, N1, mu):
@@ -48,9 +51,9 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
     after = mu * N1
     tx = px + dx
     ty = py + dy
-    if tx * tx + ty * ty <= after * after:
+    if tx * tx + ty * ty <= (1.0 + ROUNDING) * after * after:
         return tx, ty, 0.0
-    path = np.hypot(dx, dy)
+    path = np.sqrt(dx * dx + dy * dy)
     grow = after - before
     stick = _stick_share(
         path * path - grow * grow,
@@ -59,18 +62,21 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
     )
     px = px + stick * dx
     py = py + stick * dy
-    size = np.hypot(px, py)
+    size = np.sqrt(px * px + py * py)
     if size == 0.0 or path == 0.0:
-        scale = after / np.hypot(tx, ty)
+        scale = after / np.sqrt(tx * tx + ty * ty)
         return tx * scale, ty * scale, 1.0
     mean = 0.5 * (before + stick * grow + after)
     cosine = (px * dx + py * dy) / (size * path)
     sine = (dx * py - dy * px) / (size * path)
-    half = np.arctan2(sine, 1.0 + cosine) if cosine > -1.0 else 0.5 * np.pi
-    angle = 2.0 * np.arctan(np.tan(half) * np.exp(-(1.0 - stick) * path / mean))
-    fx = after * (np.cos(angle) * dx - np.sin(angle) * dy) / path
-    fy = after * (np.cos(angle) * dy + np.sin(angle) * dx) / path
-    return fx, fy, 1.0
+    # tan(psi / 2) falls exponentially; a force right against the motion stays so
+    if cosine <= -1.0:
+        return -after * dx / path, -after * dy / path, 1.0
+    half = sine / (1.0 + cosine) * np.exp(-(1.0 - stick) * path / mean)
+    scale = after / (path * (1.0 + half * half))
+    along = scale * (1.0 - half * half)
+    across = scale * 2.0 * half
+    return along * dx - across * dy, along * dy + across * dx, 1.0
 
 
 @njit(cache=True)

@@ -170,8 +170,8 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
     if (N0 > 0.0) != (N1 > 0.0):
         share = N0 / (N0 - N1)
     elif slips != 0.0:
-        margin = max(mu * N0 - np.hypot(x, y), 0.0)
-        over = max(np.hypot(x + dx, y + dy) - mu * N1, 0.0)
+        margin = max(mu * N0 - np.sqrt(x * x + y * y), 0.0)
+        over = max(np.sqrt((x + dx) ** 2 + (y + dy) ** 2) - mu * N1, 0.0)
         # a node that slipped before goes on
         if margin > 1e-9 * mu * N0:
             share = margin / (margin + over)
@@ -198,9 +198,10 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
     # across the force the direction of the motion is approached over a length of limit over
     # stiffness; along it the force is the limit
     sliding = 1.0 - share if N0 > 0.0 and share != 0.5 else 1.0
-    path = sliding * part * np.hypot(dx, dy) / (mu * N1)
+    path = sliding * part * np.sqrt(dx * dx + dy * dy) / (mu * N1)
     kept = np.exp(-path)
-    gained = -np.expm1(-path) / path if path > 1e-12 else 1.0
+    # of short paths by its series, exact to rounding
+    gained = (1.0 - kept) / path if path > 1e-5 else 1.0 - 0.5 * path
     nx = fx / (mu * N1)
     ny = fy / (mu * N1)
     for a in range(2):

@@ -10,13 +10,15 @@ forces add to it. The bodies are integrated exactly for forces that are linear b
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from scipy import sparse
 
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
-from ..util.numba_options import KERNEL
+from ..util.numba_options import INNER_KERNEL, KERNEL
 from .linear.condensation import condense
 from .linearised_flow import linear_steps
 from .model import ReducedModel
@@ -86,7 +88,6 @@ def march_ring(
     noise = np.random.default_rng(0).standard_normal(M)
     y = np.concatenate([q[0] * (1 + disturbance * noise), q[1]])
     E, G0, G1 = linear_steps(system, 2 * np.pi / point.omega / S)
-    before, after = -G0 @ system.contact.T, -G1 @ system.contact.T
     e = model.elements
     w = free[0] + system.contact @ y[:M] - system.residual @ (forces - preload)
     probes = len(system.probe) // r
@@ -95,8 +96,9 @@ def march_ring(
         y,
         _three(forces, e.tangents),
         w,
-        tuple(map(np.ascontiguousarray, (E, before, after, system.contact))),
-        system.residual - system.contact @ after[:M],
+        tuple(map(_sparse_rows, (E, -G0, -G1))),
+        (np.ascontiguousarray(system.contact), np.ascontiguousarray(system.contact.T)),
+        system.residual + system.contact @ G1[:M] @ system.contact.T,
         np.tile(np.column_stack([e.kt, e.kn, e.mu]), (r, 1)),
         _normal_loads(model, r, S),
         preload,
@@ -110,6 +112,21 @@ def march_ring(
         motion,
     )
     return RingMarch(motion.transpose(0, 2, 1), bool(settled))
+
+
+class _SparseRows(NamedTuple):
+    """A matrix by rows: row i has ``values[starts[i] : starts[i + 1]]`` in these columns. Those of
+    a step have few entries unless the damping couples the modes.
+    """
+
+    starts: np.ndarray
+    columns: np.ndarray
+    values: np.ndarray
+
+
+def _sparse_rows(matrix: np.ndarray) -> _SparseRows:
+    found = sparse.csr_array(matrix)
+    return _SparseRows(found.indptr, found.indices, found.data)
 
 
 def _of_blades(amplitudes: np.ndarray, r: int, S: int) -> np.ndarray:
@@ -165,19 +182,21 @@ def _modal_start(
 
 
 @njit(**KERNEL)
-def _march(y, f, w, bodies, F, table, load, preload, free, probe, motion):
+def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motion):
     """Fill motion (periods, S, r); False where the forces of a step were not found.
 
     Args:
         y: (2M,) modal displacements and velocities, changed; f: (n, 3) contact forces, changed.
         w: (m,) relative displacements, changed.
-        bodies: E (2M, 2M), maps (2M, m) of the forces before and after a step, U (m, M).
+        steps: of `linear_steps`, by rows; the last two for contact forces in the modes.
+        readings: U (m, M), and its transpose.
         F: (m, m) flexibility for the forces after a step.
         table: (n, 3) kt, kn, mu; load: (S, n) normal load at zero displacement.
         preload: (m,) forces under which nothing moves; free: (S, m) motion without contact forces.
         probe: readings (r, M), flexibility (r, m) and free motion (S, r).
     """
-    E, before, after, U = bodies
+    E, before, after = steps
+    U, by_mode = readings
     reading, flexible, steady = probe
     periods, S, _ = motion.shape
     n = len(f)
@@ -187,14 +206,29 @@ def _march(y, f, w, bodies, F, table, load, preload, free, probe, motion):
     for i in range(n):
         for a in range(d):
             extra[i * d + a] = f[i, a] - preload[i * d + a]
+    modal = np.dot(by_mode, extra)
+    moved = np.empty(2 * M)
+    change = np.zeros((n, 3))
     for k in range(periods * S):
         motion[k // S, k % S] = steady[k % S] + np.dot(reading, y[:M]) - np.dot(flexible, extra)
         j = (k + 1) % S
-        y = np.dot(E, y) + np.dot(before, extra)
-        c = free[j] + np.dot(U, y[:M])
-        if not contact_forces(c, F, w, f, extra, table, load[k % S], load[j], preload):
+        moved[:] = 0.0
+        _add_product(E, y, moved)
+        _add_product(before, modal, moved)
+        c = free[j] + np.dot(U, moved[:M])
+        if not contact_forces(c, F, w, f, change, extra, table, load[k % S], load[j], preload):
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False
-        y = y + np.dot(after, extra)
+        modal = np.dot(by_mode, extra)
+        _add_product(after, modal, moved)
+        y[:] = moved
     return True
+
+
+@njit(**INNER_KERNEL)
+def _add_product(rows, x, target):
+    """target (n,) becomes target plus the matrix (n, k) times x (k,)."""
+    for i in range(len(target)):
+        for k in range(rows.starts[i], rows.starts[i + 1]):
+            target[i] += rows.values[k] * x[rows.columns[k]]

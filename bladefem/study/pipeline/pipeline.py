@@ -129,9 +129,7 @@ def run(
     reduced = _run_reduction(seated, bodies, patches, keep)
     if until == "reduction":
         return reduced
-    # matrices and factors, without which responses get on
-    del bodies
-    return run_response(reduced, patches, keep)
+    return run_response(reduced, bodies, patches, keep)
 
 
 def _run_mesh(scene: Scene, keep: StageRunner) -> Run:

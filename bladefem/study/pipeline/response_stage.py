@@ -13,7 +13,6 @@ from ...errors import NotSolvedError
 from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
-from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
@@ -36,10 +35,16 @@ from .stages import Bodies, with_damper_mass
 from .utilisation import utilisation_message
 
 
-def run_response(before: ReducedRun, patches: list[Patch], keep: StageRunner) -> SolvedRun:
+def run_response(
+    before: ReducedRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: StageRunner,
+) -> SolvedRun:
     """The responses of every load of the study, from a reduced sector.
 
     Args:
+        bodies: with the factors that earlier stages have left, for the stresses.
         patches: the contact patches of the mesh.
         keep: computes what the run folder does not hold.
 
@@ -73,7 +78,7 @@ def run_response(before: ReducedRun, patches: list[Patch], keep: StageRunner) ->
         damped = keep(
             "damped_stress",
             stage_key("damped motion", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
-            lambda: _stresses(before, patches, curves, cases, keep.comm),
+            lambda: _stresses(before, bodies, patches, curves, cases),
         )
         clock.messages.append(stress_message(curves, damped))
     response = replace(response, best=best, influences=found)
@@ -84,10 +89,10 @@ def run_response(before: ReducedRun, patches: list[Patch], keep: StageRunner) ->
 
 def _stresses(
     before: ReducedRun,
+    bodies: Bodies,
     patches: list[Patch],
     curves: Sequence[Curve],
     cases: Sequence[LoadCase],
-    comm: Communicator | None,
 ) -> dict[int, DampedStress]:
     """The stress at the lowest resonance and at that of the damper's own load, by number of the
     curve; on rank 0, whose bodies share one factorisation over the nodal diameters.
@@ -98,9 +103,7 @@ def _stresses(
         wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
 
     def compute() -> dict[int, DampedStress]:
-        from ...fem.compat import MPI
-
-        alone = Bodies(before.scene, before.mesh, MPI.COMM_SELF)
+        alone = bodies.alone
         factorised = lru_cache(maxsize=None)(alone.factorised)
         found = {}
         for k in sorted(wanted):
@@ -119,7 +122,7 @@ def _stresses(
             )
         return found
 
-    return on_root(comm, compute)
+    return on_root(bodies.comm, compute)
 
 
 def _load_responses(
