@@ -11,6 +11,7 @@ w_normal > 0 presses the two together. f is the contact force that the damper fe
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -160,6 +161,21 @@ class Elements:
     law: Any = None
     # (n, tangents) static friction force of the preload state [N]; none when None
     t0: RealArray | None = None
+
+    @cached_property
+    def table(self) -> RealArray:
+        """(n, 4) kt, kn, mu, n0 of each element, as kernels take them.
+
+        Raises:
+            InputError: not finite, or negative where that means nothing.
+        """
+        columns = [np.asarray(part, dtype=float) for part in (self.kt, self.kn, self.mu, self.n0)]
+        nodes = np.stack(np.broadcast_arrays(*columns), axis=1)
+        if (nodes[:, :3] < 0).any() or not np.isfinite(nodes).all():
+            raise InputError(
+                "elements: kt, kn and mu must be finite and not negative, n0 must be finite"
+            )
+        return np.ascontiguousarray(nodes)
 
     @property
     def traction(self) -> np.ndarray:

@@ -62,8 +62,6 @@ class Forces:
     f: np.ndarray
     # (n, d, K, d, K) [N/m]
     dfdw: np.ndarray | None
-    # (n,) SEPARATED, STICK, PARTIAL_SLIP (at most half of the contact time) or GROSS_SLIP
-    state: np.ndarray
     # (n, 3) share of the cycle in stick, slip and separation [1]
     shares: np.ndarray
     # (n,) energy a cycle [J]
@@ -72,6 +70,11 @@ class Forces:
     cycles: np.ndarray
     converged: bool
     reason: str
+
+    @property
+    def state(self) -> np.ndarray:
+        """(n,) SEPARATED, STICK, PARTIAL_SLIP (at most half of the contact time) or GROSS_SLIP."""
+        return contact_states(self.shares)
 
     @property
     def jacobian(self) -> np.ndarray:
@@ -222,7 +225,6 @@ def _forces_of(
     return Forces(
         F,
         J,
-        contact_states(shares),
         shares,
         dissipated_energy(F, w) + np.sum(F[:, 1:, 0] * ramp, axis=1),
         np.abs(used),
@@ -270,10 +272,7 @@ def check_motion(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndar
     where they do not.
     """
     w = np.ascontiguousarray(w, dtype=float)
-    columns = [
-        np.asarray(getattr(elements, name), dtype=float) for name in ("kt", "kn", "mu", "n0")
-    ]
-    n = columns[0].size
+    n = np.size(elements.kt)
     d = 1 + elements.tangents
     if d not in (2, 3):
         raise InputError(f"elements: tangents is {elements.tangents}, expected 1 or 2")
@@ -282,12 +281,7 @@ def check_motion(elements: Elements, w: np.ndarray) -> tuple[np.ndarray, np.ndar
             f"w: shape {w.shape} does not fit {n} elements of {d} directions, expected ({n}, {d}, "
             "2H+1)"
         )
-    nodes = np.stack(np.broadcast_arrays(*columns), axis=1)
-    if (nodes[:, :3] < 0).any() or not np.isfinite(nodes).all():
-        raise InputError(
-            "elements: kt, kn and mu must be finite and not negative, n0 must be finite"
-        )
-    return w, np.ascontiguousarray(nodes)
+    return w, elements.table
 
 
 def _prescribed_load(

@@ -21,7 +21,6 @@ from bladefem.friction.aft import (
     PERIODIC,
     Forces,
     check_motion,
-    contact_states,
     convergence_reason,
     dissipated_energy,
     finite_load,
@@ -102,7 +101,6 @@ def evaluate_exact(
     return Forces(
         F,
         J if jacobian else None,
-        contact_states(shares),
         shares,
         dissipated_energy(F, w),
         np.full(n, 2),

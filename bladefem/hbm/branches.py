@@ -46,6 +46,10 @@ PATH_TOLERANCE = 1e-9
 PROBED_FREQUENCIES = 7
 # refinements of one local maximum
 MAX_REFINEMENTS = 12
+# height of a local maximum over the highest of its path below which it is not closed in
+SMALL_MAXIMUM = 0.02
+# local maxima of a path that are closed in, the highest ones: a maze of folds has dozens
+MAX_CLOSED_IN = 8
 # folds of one path, and of all before no further one is begun: a damper that lifts off everywhere
 # and strikes back has a maze of internal resonances, which leads nowhere
 MAX_FOLDS = 24
@@ -308,20 +312,31 @@ def _close_in(
     peak: float,
     options: Options,
 ) -> None:
-    """Further points round each local maximum, put into the path where they belong."""
-    probe = options.probe
-    heights = [size(p.solution, probe) for p in path.points]
-    top = max(heights, default=0.0)
-    for i in range(len(heights) - 2, 0, -1):
-        if heights[i] < max(heights[i - 1], heights[i + 1]) or heights[i] < 0.02 * top:
-            continue
-        drop = heights[i] - min(heights[i - 1], heights[i + 1])
-        if drop < peak * heights[i]:
-            continue
+    """Further points round the highest local maxima, put into the path where they belong."""
+    heights = [size(p.solution, options.probe) for p in path.points]
+    found = _maxima_to_close_in(heights, peak)
+    highest = sorted(found, key=lambda i: -heights[i])[:MAX_CLOSED_IN]
+    # from the end on: points that are put in move those behind them
+    for i in sorted(highest, reverse=True):
         three = path.points[i - 1 : i + 2]
         path.points[i - 1 : i + 2] = _by_slope(model, three, peak, options) or _finer(
             model, three, band, peak, options
         )
+
+
+def _maxima_to_close_in(heights: Sequence[float], peak: float) -> list[int]:
+    """Numbers of the local maxima that are not small, and from which the path falls by more than
+    the relative accuracy of a peak.
+    """
+    top = max(heights, default=0.0)
+    found = []
+    for i in range(1, len(heights) - 1):
+        before, here, after = heights[i - 1 : i + 2]
+        if here < max(before, after) or here < SMALL_MAXIMUM * top:
+            continue
+        if here - min(before, after) >= peak * here:
+            found.append(i)
+    return found
 
 
 def _by_slope(

@@ -4,9 +4,11 @@ included.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import TypeVar
+
+import numpy as np
 
 from ..util.communicator import Communicator
 from .checkpoint import response_with_checkpoints
@@ -21,17 +23,54 @@ Result = TypeVar("Result")
 POINTS_AT_ONCE = 16
 
 
+class SharedCounter:
+    """A number in the memory of rank 0 that all ranks take and raise without its help (collective:
+    all of them make it, and free it).
+    """
+
+    def __init__(self, comm: Communicator) -> None:
+        from mpi4py import MPI
+
+        size = MPI.INT64_T.Get_size()
+        self._window = MPI.Win.Allocate(size if comm.rank == 0 else 0, size, comm=comm)
+        if comm.rank == 0:
+            np.frombuffer(self._window.tomemory(), dtype=np.int64)[:] = 0
+        # nobody takes a number before it is zero
+        comm.allgather(None)
+
+    def numbers_below(self, count: int) -> Iterator[int]:
+        """Numbers below a count, each for the rank that asks first."""
+        from mpi4py import MPI
+
+        one = np.ones(1, dtype=np.int64)
+        taken = np.zeros(1, dtype=np.int64)
+        while True:
+            self._window.Lock(0, MPI.LOCK_SHARED)
+            self._window.Fetch_and_op(one, taken, 0, op=MPI.SUM)
+            self._window.Unlock(0)
+            if taken[0] >= count:
+                return
+            yield int(taken[0])
+
+    def free(self) -> None:
+        """Give the memory back."""
+        self._window.Free()
+
+
 def share_work(
     work: Callable[[Item], Result],
     items: Sequence[Item],
     comm: Communicator | None = None,
     shown: Callable[[Iterable[int]], Iterable[int]] = iter,
+    on_demand: bool = False,
 ) -> list[Result]:
     """Results of work on each item, dealt out to the ranks of an mpi4py communicator; every rank
     returns all of them.
 
     Args:
         shown: wraps the numbers of the items of this rank, to show how far it is.
+        on_demand: the next item goes to the rank that is free first: for items of unequal work,
+            whose results do not depend on what the rank did before; longest ones first.
 
     Raises:
         Exception: on every rank, what the first item that failed on any of them raised.
@@ -40,13 +79,19 @@ def share_work(
         return [work(items[i]) for i in shown(range(len(items)))]
     done: dict[int, Result] = {}
     failed: tuple[int, Exception] | None = None
-    for i in shown(range(comm.rank, len(items), comm.size)):
+    counter = SharedCounter(comm) if on_demand else None
+    own: Iterable[int] = range(comm.rank, len(items), comm.size)
+    if counter is not None:
+        own = counter.numbers_below(len(items))
+    for i in shown(own):
         try:
             done[i] = work(items[i])
         except Exception as error:
             # whatever it is, the other ranks must not wait for ever
             failed = i, error
             break
+    if counter is not None:
+        counter.free()
     parts = comm.allgather((done, failed))
     failures = [failure for _, failure in parts if failure is not None]
     if failures:

@@ -1,5 +1,7 @@
 """Points and studies shared over ranks: equal to the last bit on 1, 2 and 4 of them."""
 
+import time
+
 import numpy as np
 import pytest
 from models import block, single_mass
@@ -100,7 +102,29 @@ def test_a_study_over_loads_is_shared():
 
 
 @pytest.mark.mpi
-def test_an_error_on_one_rank_is_raised_on_all():
+def test_items_on_demand_are_done_once_by_whoever_is_free():
+    from mpi4py import MPI
+
+    comm = MPI.COMM_WORLD
+    done = []
+
+    def work(i):
+        done.append(i)
+        # the first item takes as long as the others together
+        time.sleep(0.3 if i == 0 else 0.05)
+        return i * i
+
+    assert share_work(work, range(7), comm, on_demand=True) == [i * i for i in range(7)]
+    everything = comm.allgather(done)
+    assert sorted(i for part in everything for i in part) == list(range(7))
+    if comm.size > 1:
+        holder = next(part for part in everything if 0 in part)
+        assert len(holder) < 7 - (comm.size - 1)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("on_demand", [False, True])
+def test_an_error_on_one_rank_is_raised_on_all(on_demand):
     from mpi4py import MPI
 
     def work(i):
@@ -108,4 +132,4 @@ def test_an_error_on_one_rank_is_raised_on_all():
             optimum(single_mass(), (5.0, 6.0), (0.5, 2.0))  # a band without a peak
 
     with pytest.raises(NotSolvedError, match="no peak"):
-        share_work(work, range(4), MPI.COMM_WORLD)
+        share_work(work, range(4), MPI.COMM_WORLD, on_demand=on_demand)

@@ -9,7 +9,7 @@ from numbers import Integral
 import numpy as np
 
 from ...errors import InputError
-from ...friction.aft import Forces, contact_states, dissipated_energy
+from ...friction.aft import Forces, dissipated_energy
 from ...util.newton import NewtonRun, Outcome, halve_step, iterate_newton, outcome_reason
 from ..policy import (
     COMPILED_NEWTON,
@@ -268,7 +268,6 @@ def _run_compiled(
     forces = Forces(
         f[:, 2 - d :],
         dfdw[:, 2 - d :, :, 2 - d :],
-        contact_states(shares),
         shares,
         dissipated_energy(f, full),
         np.full(len(f), 2),

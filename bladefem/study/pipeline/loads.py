@@ -4,7 +4,7 @@ load.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
@@ -13,6 +13,7 @@ import numpy as np
 
 from ...contact.interface_elements import seat_contact
 from ...hbm.history_interval import POINT
+from ...hbm.parallel import share_work
 from ...hbm.solution import Solution
 from ...hbm.sweep import size
 from ...scene.tables import Scene
@@ -144,43 +145,27 @@ def study_loads(
 ) -> list[Curve]:
     """One response curve a load case, shared over the ranks; every rank returns all of them.
 
-    Light loads come first and take longest, since their contacts slip and lift most.
+    Light loads come first and take longest, since their contacts slip and lift most; the next one
+    goes to the rank that is free.
 
     Args:
         family: of a load case, its models.
         settings: modes and damper model to keep; each case then takes the rest from what its own
             curve needs.
-        progress: wraps the list of cases of this rank, as tqdm does; the second argument is a
-            label.
+        progress: wraps the numbers of the cases of this rank, as tqdm does; the second argument is
+            a label.
         keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
             and kept.
         softer: the body less the error of its stiffness, for the error by its mesh.
     """
-    rank = 0 if comm is None else comm.rank
-    ranks = 1 if comm is None else comm.size
-    curves = {
-        i: keep(cases[i], partial(curve_of, scene, cases[i], family, settings, softer))
-        for i in progress(dealt_to_rank(len(cases), rank, ranks), "forced responses", delay=0.0)
-    }
-    if comm is not None and ranks > 1:
-        for part in comm.allgather(curves):
-            curves.update(part)
-    return [curves[i] for i in range(len(cases))]
 
+    def curve_at(case: LoadCase) -> Curve:
+        return keep(case, partial(curve_of, scene, case, family, settings, softer))
 
-def dealt_to_rank(
-    count: int,
-    rank: int,
-    ranks: int,
-) -> list[int]:
-    """What a rank gets of a list whose items get cheaper: dealt to and fro, 0 3 4 7 .. and 1 2 5 6
-    .. for two ranks.
-    """
-    return [
-        i
-        for i in range(count)
-        if (i % ranks if i // ranks % 2 == 0 else ranks - 1 - i % ranks) == rank
-    ]
+    def shown(numbers: Iterable[int]) -> Iterable[int]:
+        return progress(numbers, "forced responses", total=len(cases), delay=0.0)
+
+    return share_work(curve_at, cases, comm, shown, on_demand=True)
 
 
 def curve_of(
@@ -211,8 +196,14 @@ def curve_of(
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
-    halved = np.nan if scene.contact.points else halved_change(models, curve.settings, top)
-    body_mesh = np.nan if softer is None else softened_change(softer, case, curve.settings, top)
+    # nothing is gained by parts of an error that is unknown as a whole
+    known = curve.settings.error is None or bool(np.isfinite(curve.settings.error))
+    halved = np.nan
+    if known and not scene.contact.points:
+        halved = halved_change(models, curve.settings, top)
+    body_mesh = np.nan
+    if known and softer is not None:
+        body_mesh = softened_change(softer, case, curve.settings, top)
     interval = None
     if scene.study.interval:
         model = family_member(models, curve.settings).model
