@@ -22,6 +22,8 @@ PLAIN = Root()
 NO_SHROUD = Shroud()
 # of a length: a strip of this width keeps the shape quality of its elements above 0.05
 MIN_STRIP_SHARE = 0.02
+# thickness of the platform over its length or its pitch: at 1/290 a quarter of the cells stays flat
+THINNEST_PLATE = 1 / 150
 
 
 def check_sector(
@@ -117,6 +119,14 @@ def check_platform(
     """The plate fits into the pitch and holds the seat next to the shank."""
     half = section.corners[0, 1] + platform.gap / 2
     _at_most("platform.gap", platform.gap, half, "half the pitch at the platform")
+    # no mesh of it has cells that are not flat
+    widest = max(platform.length, 2 * half)
+    if platform.thickness < THINNEST_PLATE * widest:
+        raise InputError(
+            f"platform.thickness = {platform.thickness:.4g} m is too small: expected at least "
+            f"{THINNEST_PLATE * widest:.4g} m, a {1 / THINNEST_PLATE:.0f}th of the platform's "
+            "length and of its pitch"
+        )
     room = np.abs(section.seats[:, 1, 1]).min() - shank.width / 2
     needed = platform.seat_width * sin(max(wedge.angles) + section.theta)
     _at_most(

@@ -54,7 +54,9 @@ def rigid_faces(count: int) -> InterfaceLaw:
 def force_of(law: InterfaceLaw, closure: np.ndarray) -> np.ndarray:
     """(n,) normal force [N] at a closure (n,) [m]; zero where the faces are apart."""
     pressed = np.maximum(closure, 0.0)
-    linear = law.stiffness * pressed
+    # what rigid faces that just touch press with is not known from their closure: NaN
+    with np.errstate(invalid="ignore"):
+        linear = law.stiffness * pressed
     finite = np.isfinite(law.doubling)
     scale = np.where(finite, law.doubling, 1.0)
     return np.where(finite, scale * np.expm1(linear / scale), linear)

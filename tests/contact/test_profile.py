@@ -90,6 +90,8 @@ def bodies():
         scene=bladefem.load_scene("scenes/wedge.toml", ["contact.bedded=false", STIFF, *given]),
         mesh=mesh,
         still=still,
+        # at reference temperature
+        still_blade=SimpleNamespace(heat=None),
         damper=damper,
     )
 
@@ -159,7 +161,7 @@ def test_a_peak_at_a_sharp_edge_is_told(dimension):
         maps = {80.0: [PressureMap(patch, force, 0 * force, 0.0)]}
         return peak_remarks(maps, Scene(contact=Contact(kn_area=kn_area, **contact)))
 
-    assert "under 1 of 1 loads it stands at a sharp edge" in said(edge)[0]
+    assert "under 1 of 1 loads it lies at a sharp edge" in said(edge)[0]
     assert said(middle) == said(edge, 0.0) == []
     assert said(edge, bedded=False, edge_radius=1.0, edge_width=1e-3) == []
     # E* / kn = 2.4 m: the layer spreads the pressure over many elements
@@ -188,6 +190,7 @@ def seated(bodies, *given, kind=None):
             contact=found.scene.contact,
             damper=found.scene.damper,
             material=found.scene.material,
+            temperature=found.scene.temperature,
         )
     patches = [make_patch(found.mesh, name) for name in ("this", "next")]
     return solve_seating(seat_damper(found, patches), 0.0, normal=500.0)

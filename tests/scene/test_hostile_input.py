@@ -165,20 +165,23 @@ def test_dollar_signs_in_a_title_are_dollar_signs(tmp_path):
     assert (tmp_path / "title.png").stat().st_size > 1000
 
 
+COARSE_MESH = {"size": "20 mm", "order": 1}
+
+
 def test_names_are_those_of_the_meshes(mesh_of):
     """The table of names is what the builders make; the damper's own faces carry no force."""
     for name in ("wedge sector", "plane blades"):
         mesh = mesh_of(name)
         made = {face for face in (*mesh.faces, *mesh.nodes) if not face.startswith("damper_")}
-        assert set(kind_named(name).face_names(scene_of({"kind": name}))) == made
+        scene = scene_of({"kind": name, "mesh": COARSE_MESH})
+        assert set(kind_named(name).face_names(scene)) == made
 
 
 @pytest.fixture
 def mesh_of():
     from geometry.builders import build_here
 
-    coarse = {"size": "20 mm", "order": 1}
-    return lambda kind: build_here(scene_of({"kind": kind, "mesh": coarse}))
+    return lambda kind: build_here(scene_of({"kind": kind, "mesh": COARSE_MESH}))
 
 
 def test_demos_find_their_scenes_from_another_folder(tmp_path):
