@@ -61,6 +61,8 @@ const CONFIG = {responsive: true, displaylogo: false, displayModeBar: "hover", m
 // size of a name in a legend below a chart [px]
 const LEGEND_ENTRY = 140;
 const LEGEND_ROW = 24;
+// between two pictures of an animation [ms]
+const FRAME = 40;
 
 function makePlace(figure) {
   const place = document.createElement("div");
@@ -187,7 +189,8 @@ async function showShape(figure, spec) {
     if (!playing) return;
     controls.phase.value = (Number(controls.phase.value) + 10) % 360;
     await update();
-    requestAnimationFrame(step);
+    // by the clock: the same pace on every screen
+    setTimeout(step, FRAME);
   };
   controls.play.addEventListener("click", () => {
     playing = !playing;
