@@ -250,11 +250,7 @@ def choose_at_peak(
     known: dict[str, tuple[float, float]] = {}
     before: tuple[Settings, Peak, PeakErrors] | None = None
     for _ in range(MAX_ENRICHMENTS):
-        if lifts_off_widely(settings, peak.solution):
-            richer = enriched_settings(settings, "harmonics")
-            if richer is not None:
-                peak = peak_from(family, settings, peak.solution, richer, accuracy)
-                settings = richer
+        settings, peak = _with_harmonics_of_lift_off(family, settings, peak, accuracy)
         errors = peak_errors(family, settings, peak, accuracy, known)
         if before is not None:
             errors = _with_errors_before(errors, settings, before[2], before[0])
@@ -282,6 +278,21 @@ def choose_at_peak(
             break
         settings = better
     return settings, peak, errors
+
+
+def _with_harmonics_of_lift_off(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+) -> tuple[Settings, Peak]:
+    """More than one harmonic, and the peak with them, where most contacts lift off."""
+    if not lifts_off_widely(settings, peak.solution):
+        return settings, peak
+    richer = enriched_settings(settings, "harmonics")
+    if richer is None:
+        return settings, peak
+    return richer, peak_from(family, settings, peak.solution, richer, accuracy)
 
 
 def _with_errors_before(
