@@ -43,10 +43,11 @@ def draw_influences(table: pd.DataFrame, file: str | Path | None = None) -> obje
                     again,
                     rows,
                     "D",
-                    mfc="white",
-                    mec=colour,
-                    ms=7,
-                    mew=1.8,
+                    # seen on bars of either colour
+                    mfc=colour,
+                    mec="white",
+                    ms=9,
+                    mew=1.5,
                     label=f"{end} end, solved again",
                 )
             ax.axvline(now, color="#333333", lw=1)
