@@ -70,8 +70,8 @@ def port_model_from_matrices(
 
     Raises:
         InputError: shapes do not fit, M or K is not Hermitian, M is not positive semidefinite, a
-            motion has neither mass nor stiffness, or unsymmetric stiffness acts on a motion that
-            lacks one of them.
+            motion has neither mass nor stiffness, or unsymmetric stiffness acts on a motion
+            without one of them.
     """
     K, circulation = _split_stiffness(K) if unsymmetric else (K, None)
     M, K, C = _checked_matrices(M, K, C)

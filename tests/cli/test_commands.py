@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
@@ -12,6 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from processes import clean_environment, on_ranks
 
 import bladefem.report
 import bladefem.study.pipeline
@@ -471,13 +471,6 @@ def test_a_reader_that_closes_the_pipe_is_no_error(arguments):
     assert done.returncode == 0 and done.stderr == "" and done.stdout.count("\n") == 1
 
 
-def clean_environment() -> dict[str, str]:
-    """mpirun refuses to start inside a process that already is a rank."""
-    mpi = ("OMPI_", "PMIX_", "PRTE_", "ORTE_", "PMI_")
-    keep = ("OMPI_ALLOW", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl")
-    return {k: v for k, v in os.environ.items() if not k.startswith(mpi) or k.startswith(keep)}
-
-
 INTERRUPTED = """
 import sys, time
 from pathlib import Path
@@ -557,19 +550,13 @@ sys.exit(ranks.exit_code_of(action, SimpleNamespace()))
     ],
 )
 def test_no_rank_waits_for_ever(all_ranks, message):
-    command = [
-        "mpirun",
-        "--oversubscribe",
-        "--bind-to",
-        "none",
-        "-n",
-        "2",
-        sys.executable,
-        "-c",
-        ONE_RANK_FAILS.format(all=all_ranks),
-    ]
+    program = ONE_RANK_FAILS.format(all=all_ranks)
     done = subprocess.run(
-        command, capture_output=True, text=True, env=clean_environment(), timeout=60
+        on_ranks(2, [sys.executable, "-c", program]),
+        capture_output=True,
+        text=True,
+        env=clean_environment(),
+        timeout=60,
     )
     assert done.returncode == 2 and done.stderr.count(message) == 1, done.stderr
 
@@ -577,12 +564,23 @@ def test_no_rank_waits_for_ever(all_ranks, message):
 def test_a_scene_is_read_by_one_rank_and_solved_by_two(tmp_path):
     """Fresh processes: what rank 0 does alone must load nothing that needs all ranks."""
     command = [
-        *("mpirun", "--oversubscribe", "--bind-to", "none", "-n", "2", sys.executable),
-        *("-m", "bladefem.cli.main", "contact", str(SCENES / "plane.toml"), "-o", str(tmp_path)),
+        *(
+            sys.executable,
+            "-m",
+            "bladefem.cli.main",
+            "contact",
+            str(SCENES / "plane.toml"),
+            "-o",
+            str(tmp_path),
+        ),
         *("--set", "mesh.scale=4", "--set", "study.loads=20 N"),
     ]
     done = subprocess.run(
-        command, capture_output=True, text=True, env=clean_environment(), timeout=120
+        on_ranks(2, command),
+        capture_output=True,
+        text=True,
+        env=clean_environment(),
+        timeout=120,
     )
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "pressure.csv").is_file()

@@ -2,12 +2,12 @@
 demos/paper_NAME.py
 """
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import clean_environment, on_ranks
 
 HERE = Path(__file__).resolve().parents[2]
 # blades: 10.6852 on half the element size, 10.41 on the seats of ten elements that are too coarse
@@ -16,19 +16,11 @@ PINNED = {"element": 0.542996, "contact": 0.97322916, "zmass": 0.105900, "blades
 
 def output(name: str, ranks: int = 1) -> list[str]:
     """Lines that a demo prints in its coarse setting."""
-    clean = {
-        k: v
-        for k, v in os.environ.items()
-        if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
-        or k.startswith(("OMPI_ALLOW", "OMPI_MCA"))
-    }
     command = [sys.executable, f"demos/paper_{name}.py"]
-    if ranks > 1:
-        command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *command]
     done = subprocess.run(
-        command,
+        on_ranks(ranks, command),
         cwd=HERE,
-        env={**clean, "BLADEFEM_COARSE": "1", "PYTHONPATH": str(HERE)},
+        env={**clean_environment(), "BLADEFEM_COARSE": "1", "PYTHONPATH": str(HERE)},
         capture_output=True,
         text=True,
         timeout=600,

@@ -6,12 +6,12 @@ the pin and 1e-8 between rank counts. Remake them with: BLADEFEM_COARSE=1 ./run 
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import clean_environment, on_ranks
 
 HERE = Path(__file__).resolve().parents[2]
 PINNED = {
@@ -27,19 +27,11 @@ PINNED = {
 
 def final_number(name: str, ranks: int) -> float:
     """The last number that a demo prints."""
-    clean = {
-        k: v
-        for k, v in os.environ.items()
-        if not k.startswith(("OMPI_", "PMIX_", "PRTE_", "ORTE_"))
-        or k.startswith(("OMPI_ALLOW", "OMPI_MCA"))
-    }
     command = [sys.executable, f"demos/{name}.py"]
-    if ranks > 1:
-        command = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks), *command]
     done = subprocess.run(
-        command,
+        on_ranks(ranks, command),
         cwd=HERE,
-        env={**clean, "BLADEFEM_COARSE": "1"},
+        env={**clean_environment(), "BLADEFEM_COARSE": "1"},
         capture_output=True,
         text=True,
         timeout=900,

@@ -1,6 +1,7 @@
 """Every motion of a band, against a plain march in time that shares nothing with the library."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.branches import find_branches
 from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.hbm.sweep import response, size, sweep
 
 BAND = (249.0, 431.0)
@@ -151,3 +153,27 @@ def test_maxima_are_closed_in_by_their_slope(folding, monkeypatch):
         assert one.height > (1 - 1e-6) * other.height
         assert one.height == pytest.approx(other.height, rel=1e-3)
         assert one.reached == other.reached
+
+
+def test_only_the_highest_maxima_of_a_path_are_closed_in(folding, monkeypatch):
+    """A path with more maxima than are worth it: the highest are closed in, from the end on."""
+    heights = [0.01, 1.0, 0.01, 3.0, 0.01, 2.0, 0.01, 1e-4, 0.0, 2.5, 2.4999, 2.5]
+    # not one of a fraction of the highest, nor one from which the path hardly falls
+    found = branches_module._maxima_to_close_in(heights, 1e-2)
+    assert found == [1, 3, 5, 9]
+    assert branches_module._maxima_to_close_in([], 1e-2) == []
+    path = SimpleNamespace(
+        points=[
+            SimpleNamespace(solution=height, value=float(i)) for i, height in enumerate(heights)
+        ]
+    )
+    closed = []
+    monkeypatch.setattr(branches_module, "size", lambda height, probe: height)
+    monkeypatch.setattr(branches_module, "MAX_CLOSED_IN", 2)
+    monkeypatch.setattr(
+        branches_module,
+        "_by_slope",
+        lambda model, three, peak, options: closed.append(three[1].value) or list(three),
+    )
+    branches_module._close_in(folding, path, BAND, 1e-2, DEFAULT_OPTIONS)
+    assert closed == [9.0, 3.0]

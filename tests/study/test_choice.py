@@ -29,6 +29,7 @@ from bladefem.study.adaptive.family import (
 )
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
 from bladefem.study.adaptive.settings import Settings, enriched_settings, first_for
+from bladefem.study.pipeline import loads
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.response_remarks import beyond_tolerance
@@ -125,6 +126,31 @@ def test_a_response_reports_told_against_tolerated_error_at_each_point():
     assert (curve.estimated < curve.tolerated)[top].all() and curve.checked[top].all()
     missed = int((curve.estimated > curve.tolerated).sum())
     assert (f"{missed} of {len(top)} points" in beyond_tolerance([curve])) == (missed > 0)
+
+
+def test_parts_of_an_error_that_is_unknown_are_not_computed(monkeypatch):
+    """They cost solutions, and the sum stays unknown."""
+    scene = load_scene("scenes/plane.toml", ["accuracy=2 %", "study.band=1150 Hz, 1600 Hz"])
+    model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
+    case = LoadCase(3.0, model.elements, np.eye(8))
+    computed = []
+    monkeypatch.setattr(loads, "halved_change", lambda *_: computed.append("halved") or 0.01)
+    monkeypatch.setattr(loads, "softened_change", lambda *_: computed.append("body") or 0.02)
+    plain = loads.resonance_curve
+
+    def run(error):
+        def with_error(*arguments):
+            curve = plain(*arguments)
+            return replace(curve, settings=replace(curve.settings, error=error))
+
+        monkeypatch.setattr(loads, "resonance_curve", with_error)
+        settings = first_for(20)
+        return curve_of(scene, case, lambda _: family_of(model), settings, softer=object())
+
+    unknown = run(np.inf)
+    assert computed == [] and np.isinf(unknown.error)
+    assert run(0.004).error == pytest.approx(0.034)
+    assert computed == ["halved", "body"]
 
 
 def test_settings_tell_how_many_contact_points_there_are():

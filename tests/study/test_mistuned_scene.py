@@ -3,10 +3,10 @@ before long work.
 """
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from mistuned import COARSE_MISTUNED, MISTUNED
 
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
@@ -41,20 +41,10 @@ from bladefem.study.pipeline.utilisation import (
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.solve import free_wheel, solve_wheel
 
-SCENE = Path(__file__).parents[2] / "scenes" / "mistuned.toml"
-COARSE = [
-    "mesh.size=16 mm",
-    "mesh.seat_elements=2",
-    "study.loads=80 N",
-    "contact.points=2",
-    "model.modes=6",
-    "model.static=uncoupled",
-]
-
 
 @pytest.fixture(scope="module")
 def reduced():
-    scene = load_scene(SCENE, COARSE)
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
     run = pipeline.run(scene, None, until="reduction")
     patches = list(run.contact.problem.patches)
     sector = reduce_wheel(Bodies(scene, run.mesh), patches, 6, run.clamped, 3)
@@ -153,7 +143,7 @@ def folder(tmp_path_factory):
 
 def test_a_second_run_finds_the_wheel(folder):
     """The sector in all nodal diameters and the wheel's response are kept like other stages."""
-    scene = load_scene(SCENE, COARSE)
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
     first = with_whole_wheel(pipeline.run(scene, folder))
     again = with_whole_wheel(pipeline.run(scene, folder))
     for name in ("wheel_sector", "whole_wheel"):
@@ -183,7 +173,7 @@ def test_a_second_run_finds_the_wheel(folder):
 
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     """Four wheels, the lowest and the highest also in full; a second call finds them."""
-    scene = load_scene(SCENE, COARSE)
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
     scene = vary(scene, mistuning__level="damper law", mistuning__wheels=4, mistuning__checks=2)
     run = pipeline.run(scene, folder)
     found = scatter_of_run(run)
@@ -212,7 +202,7 @@ def test_statistics_by_the_damper_law_are_checked_in_full(folder):
 def test_bad_input_is_refused_before_long_work(overrides, message):
     """What 'bladefem check' calls, and every command before its first stage."""
     with pytest.raises(InputError, match=message):
-        refuse_run(load_scene(SCENE, overrides))
+        refuse_run(load_scene(MISTUNED, overrides))
 
 
 @pytest.mark.parametrize(
@@ -228,10 +218,10 @@ def test_bad_pattern_file_is_refused_before_long_work(rows, message, tmp_path):
     file = tmp_path / "pattern.csv"
     file.write_text("\n".join(["blade, 1F", *rows]))
     with pytest.raises(InputError, match=message):
-        refuse_run(load_scene(SCENE, [f"mistuning.pattern={file}"]))
+        refuse_run(load_scene(MISTUNED, [f"mistuning.pattern={file}"]))
 
 
 def test_scatter_of_several_masses_is_refused_before_long_work():
-    scene = load_scene(SCENE, ["study.masses=10 g, 20 g"])
+    scene = load_scene(MISTUNED, ["study.masses=10 g, 20 g"])
     with pytest.raises(InputError, match="study.masses: 2 damper masses, expected one"):
         refuse_scatter(scene)

@@ -1,42 +1,33 @@
 """'bladefem scatter' on two ranks: the files of one rank."""
 
-import os
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from mistuned import COARSE_MISTUNED, MISTUNED
+from processes import clean_environment, on_ranks
 
-SCENE = Path(__file__).parents[2] / "scenes" / "mistuned.toml"
-COARSE = [
-    "mesh.size=16 mm",
-    "mesh.seat_elements=2",
-    "study.loads=80 N",
-    "contact.points=2",
-    "model.modes=6",
-    "model.static=uncoupled",
-    "mistuning.wheels=3",
-    "mistuning.families=1",
-]
-
-
-def clean_environment():
-    """mpirun refuses to start inside a process that already is a rank."""
-    mpi = ("OMPI_", "PMIX_", "PRTE_", "ORTE_", "PMI_")
-    keep = ("OMPI_ALLOW", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl")
-    return {k: v for k, v in os.environ.items() if not k.startswith(mpi) or k.startswith(keep)}
+FEW_WHEELS = [*COARSE_MISTUNED, "mistuning.wheels=3", "mistuning.families=1"]
 
 
 def scatter(folder, ranks):
-    start = (
-        ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)] if ranks > 1 else []
-    )
-    changes = [part for one in COARSE for part in ("--set", one)]
-    command = [sys.executable, "-m", "bladefem.cli.main", "scatter", str(SCENE), "-o", str(folder)]
+    changes = [part for one in FEW_WHEELS for part in ("--set", one)]
+    command = [
+        sys.executable,
+        "-m",
+        "bladefem.cli.main",
+        "scatter",
+        str(MISTUNED),
+        "-o",
+        str(folder),
+    ]
     done = subprocess.run(
-        [*start, *command, *changes], capture_output=True, text=True, env=clean_environment()
+        on_ranks(ranks, [*command, *changes]),
+        capture_output=True,
+        text=True,
+        env=clean_environment(),
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -1,11 +1,11 @@
 """Wheels dealt out over ranks: the statistics are those of one rank, whatever their number."""
 
-import os
 import subprocess
 import sys
 
 import numpy as np
 import pytest
+from processes import clean_environment, on_ranks
 
 # the smallest wheel, and fewer wheels than some numbers of ranks
 PROGRAM = """
@@ -34,19 +34,11 @@ if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
 """
 
 
-def clean_environment():
-    """mpirun refuses to start inside a process that already is a rank."""
-    mpi = ("OMPI_", "PMIX_", "PRTE_", "ORTE_", "PMI_")
-    keep = ("OMPI_ALLOW", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl")
-    return {k: v for k, v in os.environ.items() if not k.startswith(mpi) or k.startswith(keep)}
-
-
 def statistics_on(ranks, folder):
     """What the last of some ranks knows."""
     file = folder / f"{ranks}.npz"
-    start = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(ranks)]
     done = subprocess.run(
-        [*start, sys.executable, "-c", PROGRAM, str(file)],
+        on_ranks(ranks, [sys.executable, "-c", PROGRAM, str(file)]),
         capture_output=True,
         text=True,
         env=clean_environment(),

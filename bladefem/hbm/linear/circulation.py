@@ -12,7 +12,7 @@ import numpy as np
 
 from ..model import ReducedModel
 from .mean_motion import with_springs
-from .packed_bodies import Bodies
+from .packed_bodies import Bodies, joined_blocks
 from .woodbury import bodies_of
 
 
@@ -44,15 +44,7 @@ def mean_modal_flexibility(own: np.ndarray, S: np.ndarray) -> np.ndarray:
 def joined_circulation(model: ReducedModel, H: int) -> np.ndarray:
     """(1 or H+1, M, M) S of all bodies, the damper's modes after the blades' [1/s^2]."""
     stacks = bodies_of(model, H)
-    parts = [stack.circulatory for stack in stacks if stack.circulatory is not None]
-    count = sum(stack.omega.shape[1] for stack in stacks)
-    joined = np.zeros((max(map(len, parts)), count, count), dtype=complex)
-    start = 0
-    for stack in stacks:
-        own = slice(start, start := start + stack.omega.shape[1])
-        if stack.circulatory is not None:
-            joined[:, own, own] = stack.circulatory
-    return joined
+    return joined_blocks(stacks, [stack.circulatory for stack in stacks])
 
 
 def _circulatory_parts(

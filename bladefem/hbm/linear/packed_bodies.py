@@ -128,7 +128,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
             own,
             viscous,
             hysteretic,
-            _coupled_damping(bodies, own.shape[1]),
+            joined_blocks(bodies, [body.coupled for body in bodies]),
             *(np.ascontiguousarray(part, dtype=complex) for part in parts),
             *one,
             common_motions(model, H),
@@ -176,19 +176,19 @@ def _excitation(
     return (loads[:, None] @ shapes.conj())[:, 0], direct, straight
 
 
-def _coupled_damping(bodies: Sequence[Stack], count: int) -> np.ndarray:
-    """(S, M, M) viscous damping that couples the M = count modes of each body; (0, M, M) where none
-    does.
+def joined_blocks(bodies: Sequence[Stack], blocks: Sequence[np.ndarray | None]) -> np.ndarray:
+    """(S, M, M) what couples the modes of each body, (1 or S, m, m) or None for one whose modes
+    nothing couples, the modes of the bodies one after the other; (0, M, M) where all are None.
     """
-    parts = [body.coupled for body in bodies if body.coupled is not None]
-    most = max((len(part) for part in parts), default=0)
-    coupled = np.zeros((most, count, count), dtype=complex)
+    count = sum(body.omega.shape[1] for body in bodies)
+    most = max((len(block) for block in blocks if block is not None), default=0)
+    joined = np.zeros((most, count, count), dtype=complex)
     start = 0
-    for body in bodies:
+    for body, block in zip(bodies, blocks, strict=True):
         own = slice(start, start := start + body.omega.shape[1])
-        if body.coupled is not None:
-            coupled[:, own, own] = body.coupled
-    return coupled
+        if block is not None:
+            joined[:, own, own] = block
+    return joined
 
 
 def _mean_flexibility(
