@@ -21,9 +21,8 @@ from ..contact.state_table import quasi_static
 from ..data import ModeSet
 from ..hbm.parallel import share_work
 from ..io.run_folder import take_folder
-from ..io.stage_cache import on_root, write_results, write_table
+from ..io.stage_cache import on_root
 from ..scene.tables import Scene
-from ..scene.toml import dump_scene
 from ..scene.units import show
 from ..study.mistuning.stage import with_whole_wheel
 from ..study.mistuning.validate import check_mistuning, is_mistuned
@@ -47,32 +46,25 @@ from ..view.live_curves import live_diameters, live_loops, live_optimum, live_re
 from ..view.live_shapes import live_motion, live_shapes
 from ..view.motion import draw_motion
 from .best_load import best_load_table
-from .datasets import datasets, table_dataset
 from .fatigue import (
-    save_fatigue_vtu,
     utilisation_drawing,
     utilisation_table,
     worst_utilisation,
 )
 from .headlines import Headline
 from .influences import influence_sentence, influence_table
-from .linear import harmonic_table, linear_sentence
+from .linear import linear_sentence
 from .nodes import (
-    SEAT_WORDS,
     cycles_of,
     draw_hysteresis,
     draw_wear,
-    loop_table,
-    node_table,
-    save_cycles_vtu,
     seat_loops,
     wear_sentence,
     wear_table,
 )
-from .pressure import PICTURE, draw_seats, pressure_table, write_points
+from .pressure import PICTURE, draw_seats, pressure_table
 from .resonance_table import resonance_table
-from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
-from .tables import units_of, write_tables
+from .run_files import MODE_SHAPES, file_writers
 from .wheel import blade_table, pattern_drawings, pattern_headlines, pattern_table
 from .write import Page, write_report
 
@@ -85,6 +77,10 @@ MESH_ERROR_NOTE = (
     "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
     "(frequencies) and 'bladefem chart --mesh' (resonance)"
 )
+
+
+# what takes a second or more
+SLOWEST_TO_WRITE = ("modes/first_modes", "mesh/mesh", "modes/mode_on_the_wheel", MODE_SHAPES)
 
 
 def report_run(
@@ -112,7 +108,7 @@ def write_run(
 ) -> SolvedRun:
     """Write the folder of a finished run; returns the run with the time that it took.
 
-    Pictures are dealt over the ranks, rank 0 writes the rest.
+    Pictures and files are dealt over the ranks; rank 0 writes the report, which holds the pictures.
     """
     start = time.perf_counter()
     folder = folder_of(result)
@@ -121,12 +117,21 @@ def write_run(
     tables = _all_tables(result, cycles)
     drawings = _all_drawings(result, tables, cycles)
     figures = {name: folder / f"{name.split('/')[1]}.png" for name in drawings}
-
-    def draw(name: str) -> None:
-        drawings[name](figures[name])
-
-    share_work(draw, list(drawings), comm, lambda items: progress(items, "pictures"))
-    on_root(comm, lambda: _write(result, tables, cycles, figures, [*filter(None, [moved])]))
+    jobs: dict[str, Callable[[], object]] = {
+        **{name: partial(draw, figures[name]) for name, draw in drawings.items()},
+        **file_writers(result, tables, cycles),
+    }
+    # the longest first: what follows goes to the rank that is free
+    order = sorted(jobs, key=lambda name: name not in SLOWEST_TO_WRITE)
+    share_work(
+        lambda name: _finished(jobs[name]),
+        order,
+        comm,
+        lambda items: progress(items, "pictures and files"),
+        on_demand=True,
+    )
+    messages = [*filter(None, [moved]), *_report_messages(result, cycles)]
+    on_root(comm, lambda: _write_page(result, tables, cycles, figures, messages))
     return replace(
         result, timings={**result.timings, "pictures and report": time.perf_counter() - start}
     )
@@ -157,45 +162,25 @@ def _all_drawings(
     }
 
 
-def _write(
+def _finished(job: Callable[[], object]) -> None:
+    """What a job returns is of no use to other ranks."""
+    job()
+
+
+def _write_page(
     result: SolvedRun,
     tables: dict[str, pd.DataFrame],
     cycles: list[ContactCycle],
     figures: dict[str, Path],
     messages: list[str],
 ) -> None:
-    """Tables, data sets, files for ParaView and the report."""
-    folder = folder_of(result)
-    patches = list(result.contact.problem.patches)
-    coefficient = result.scene.contact.wear_coefficient
-    for name, table in tables.items():
-        write_tables(table, folder / name.split("/")[1], name.split("/")[1])
-    nodes = node_table(patches, cycles, coefficient)
-    loops = loop_table(cycles)
-    write_table(folder / "nodes.csv", nodes, units_of(nodes))
-    loops.to_csv(folder / "hysteresis.csv", index=False)
-    groups = {
-        **datasets(result, tables),
-        "nodes": table_dataset(nodes, "row"),
-        "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
-        "hysteresis": table_dataset(loops, "row"),
-        "response": curve_arrays(tables["response/points"]),
-        "resonance": resonance_arrays(result.response.curves, result.response.limits),
-        "cycle": node_arrays(nodes),
-        "loops": loop_arrays(cycles, SEAT_WORDS),
-    }
-    write_results(folder / "results.nc", groups, dump_scene(result.scene))
-    mesh.save_vtu(result.mesh, folder / "mesh.vtu")
-    modes.save_modes_vtu(result.mesh, excited_set(result), folder / "modes.vtu")
-    save_fatigue_vtu(result, folder / "fatigue.vtu")
-    write_points(folder, result.contact.maps)
-    save_cycles_vtu(patches, cycles, folder / "friction_work.vtu", coefficient)
+    """The report, once its pictures are there."""
     write_report(
-        folder,
+        folder_of(result),
         result.scene,
         tables,
         figures,
-        [*messages, *_report_messages(result, cycles)],
+        messages,
         result.timings,
         page=Page(_live(result, tables, cycles), more=_wheel_headlines(result)),
     )

@@ -15,8 +15,14 @@ from bladefem.hbm.continuation import follow
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
+from bladefem.io.stage_cache import cached_stage
 from bladefem.report.tables import readable_texts, units_of
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.kept_band import KeptBand
+from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stability import (
     in_one_body,
     ripple_sentence,
@@ -111,6 +117,7 @@ def rippling(kept):
     return SimpleNamespace(
         load=50.0, frequency=np.array([100.0]), bifurcation=np.array(["torus"]), peak=top,
         unstable_peak=top, kept=kept, peak_amplitude=1e-3, peak_frequency=100.0,
+        keeps_unstable=True,
     )  # fmt: skip
 
 
@@ -120,3 +127,20 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     assert unstable_sentence(rippling(near), 0.05) == ""
     assert "keeps between 990 and 1200 um" in unstable_sentence(rippling(far), 0.05)
     assert ripple_sentence([rippling(far)], 0.05) == ""
+
+
+def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
+    """What is read again are copies of the fresh curve's points."""
+    scene = load_scene("scenes/plane.toml", ["accuracy=2 %", "study.band=1150 Hz, 1600 Hz"])
+    model = reference_model(load=3.0, points=2, modes=10, harmonics=31)
+    case = LoadCase(3.0, model.elements, np.eye(4))
+    curve = curve_of(scene, case, lambda _: family_of(model), first_for(10))
+    band = KeptBand(curve.peak_frequency, *(share * curve.peak_amplitude for share in (0.99, 1)), 9)
+    fresh = replace(curve, unstable_peak=curve.peak, kept=band)
+    cached_stage(tmp_path, "curve", "key", lambda: fresh)
+    again, seconds = cached_stage(tmp_path, "curve", "key", lambda: None)
+    assert seconds is not None and fresh.keeps_unstable and again.keeps_unstable
+    assert ripple_sentence([again], 0.05) == ripple_sentence([fresh], 0.05) != ""
+    assert unstable_sentence(again, 0.001) == unstable_sentence(fresh, 0.001) != ""
+    assert not replace(again, unstable_peak=None).keeps_unstable
+    assert not replace(again, unstable_peak=replace(again.peak, omega=1.0)).keeps_unstable

@@ -123,6 +123,15 @@ class Curve:
         return self.settings.error + contact_mesh + body_mesh
 
     @property
+    def keeps_unstable(self) -> bool:
+        """The highest motion is unstable, and given as the resonance all the same.
+
+        Compared by value: a curve that was read from the run folder has copies.
+        """
+        top = self.unstable_peak
+        return top is not None and (top.omega, size(top)) == (self.peak.omega, size(self.peak))
+
+    @property
     def peak_frequency(self) -> float:
         """[Hz]"""
         return self.peak.frequency

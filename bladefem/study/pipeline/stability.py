@@ -249,10 +249,9 @@ def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
 
 
 def _rippled(curve: Curve, accuracy: float) -> bool:
-    top = curve.unstable_peak
-    if top is None or curve.peak is not top or curve.kept is None:
+    if not curve.keeps_unstable or curve.kept is None:
         return False
-    return curve.kept.holds(size(top), accuracy)
+    return curve.kept.holds(size(curve.peak), accuracy)
 
 
 def folded_sentence(curves: Sequence[Curve]) -> str:
@@ -273,9 +272,9 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
-    if curve.peak is top and curve.kept is not None and not curve.kept.reason:
+    if curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
         lost += "; it is given as the resonance"
-    elif curve.peak is top:
+    elif curve.keeps_unstable:
         lost += "; it is given as the resonance, being the larger amplitude"
     else:
         lost += (
