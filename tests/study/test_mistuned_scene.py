@@ -53,6 +53,15 @@ def reduced():
     return scene, run, patches, sector, case, settings
 
 
+def test_elements_that_the_scene_gives_can_be_joined(reduced):
+    """As the error by harmonics asks where contacts lift off; the scene's two become one."""
+    scene, run, patches, _, case, settings = reduced
+    family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+    one = family_member(family, replace(settings, points=1))
+    np.testing.assert_array_equal(one.groups, [0, 0, 1, 1])
+    assert one.model.elements.kt == pytest.approx(case.elements.kt.reshape(2, 2).sum(axis=1))
+
+
 def test_whole_wheel_is_the_tuned_sector(reduced):
     scene, run, patches, sector, case, settings = reduced
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)

@@ -82,7 +82,7 @@ def family_of_case(
         groups = (
             np.arange(nodes)
             if settings.points is None
-            else element_labels(patches, settings.points)
+            else element_labels(patches, settings.points, scene.contact.points)
         )
         return Member(coarsened_elements(model, groups), groups)
 

@@ -220,15 +220,35 @@ def _loop(
     return Loop(T @ (direction @ mean), T @ (direction @ force))
 
 
-def element_labels(patches: Sequence[Patch], points: int | None) -> np.ndarray:
-    """(nodes of all patches,) number of the element that each belongs to, ``points`` elements on
-    each patch.
+def element_labels(
+    patches: Sequence[Patch],
+    points: int | None,
+    finest: int | None = None,
+) -> np.ndarray:
+    """(finest elements of all patches,) number of the element that each belongs to, ``points``
+    elements on each patch.
+
+    Args:
+        finest: elements on each patch that are joined, those of the scene (``contact.points``);
+            None for the nodes.
     """
-    parts = [aggregation_matrix(patch, points) for patch in patches]
+    joined = [_element_patch(patch, finest) for patch in patches]
+    parts = [aggregation_matrix(patch, points) for patch in joined]
     starts = np.cumsum([0] + [part.shape[1] for part in parts])
     return np.concatenate(
         [start + part.indices for start, part in zip(starts, parts, strict=False)]
     )
+
+
+def _element_patch(patch: Patch, points: int | None) -> Patch:
+    """The patch with its elements in place of its nodes, as far as ``aggregation_matrix`` looks at
+    it: mean places and areas.
+    """
+    if points is None or points >= len(patch.area):
+        return patch
+    shares = aggregation_matrix(patch, points)
+    area = np.bincount(shares.indices, patch.area)
+    return replace(patch, points=shares.T @ patch.points, area=area)
 
 
 def _in_all_directions(elements: Elements, w: np.ndarray) -> tuple[Elements, np.ndarray]:
