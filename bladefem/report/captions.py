@@ -36,6 +36,12 @@ CAPTIONS = {
     "of the range in the last columns was open to it.",
     "response/influences": "What the best load depends on: each parameter over its range, by exact "
     "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
+    "response/influences_at_ends": "Best load and its resonance amplitude at both ends of each "
+    "parameter's range: by the exact derivatives, and solved again for the two with the largest "
+    "effect.",
+    "response/influence_table": "What the best load depends on: each parameter, its range in "
+    "multiples of its value, and the exact logarithmic derivatives: 0.5 means that 2 % more of the "
+    "parameter give 1 % more.",
     "response/local_resonances": "Every local maximum of each response: motions found at its "
     "frequency, and by which slow sweep it is reached (isolated: by neither).",
     "response/resonances": "Linear resonances without damper.",

@@ -98,11 +98,23 @@ def _of_search(best: pd.Series) -> dict[str, str]:
         None if np.isnan(best[name]) else float(best[name])
         for name in ("tolerated_from", "tolerated_to")
     )
+    known = low is not None and high is not None
     return {
         "amplitude": _error_text(error),
-        "load": _between_text(low, high, "N"),
-        "mass": _mass_text(low, high, best["load"]),
+        "load": _flatness_text(low, high),
+        "mass": _mass_text(low, high, best["load"]) if known else "as the optimum load",
     }
+
+
+def _flatness_text(low: float | None, high: float | None) -> str:
+    """Between which loads the amplitude keeps within the accuracy, as far as the search looked."""
+    if low is not None and high is not None:
+        return _between_text(low, high, "N")
+    if low is not None:
+        return f"above {low:.4g} N; how far up was not searched"
+    if high is not None:
+        return f"below {high:.4g} N; how far down was not searched"
+    return "how flat the optimum is was not searched"
 
 
 def _error_text(error: float) -> str:

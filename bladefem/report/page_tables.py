@@ -29,6 +29,24 @@ PAGE_COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
             *(f"{name}_{axis}" for name in ("force", "moment") for axis in "xyz"),
         ),
     },
+    "response/influences": {
+        "response/influence_table": (
+            "parameter",
+            "range_from",
+            "low",
+            "high",
+            *(f"{name}_by_parameter" for name in ("load", "amplitude", "frequency")),
+        ),
+        "response/influences_at_ends": (
+            "parameter",
+            *(
+                f"{name}_{end}{solved}"
+                for name in ("load", "amplitude")
+                for end in ("low", "high")
+                for solved in ("", "_solved")
+            ),
+        ),
+    },
     "response/summary": {
         "response/summary": (
             "mass",

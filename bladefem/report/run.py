@@ -222,7 +222,11 @@ def _live(
     }
     return {
         **curves,
-        "response/optimum": live_optimum(tables["response/summary"], result.contact.own),
+        "response/optimum": live_optimum(
+            tables["response/summary"],
+            result.contact.own,
+            searched=tables.get("response/best_load"),
+        ),
         "response/hysteresis": live_loops(seat_loops(cycles)),
         "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
         **({} if shapes is None else {"modes/first_modes": shapes}),

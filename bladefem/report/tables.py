@@ -28,8 +28,8 @@ class Column(NamedTuple):
 RPM = 60 / (2 * np.pi)
 COLUMNS = {
     "load": Column("normal load", "N"),
-    "load_low": Column("from", "N"),
-    "load_high": Column("to", "N"),
+    "load_low": Column("load, low end", "N"),
+    "load_high": Column("load, high end", "N"),
     "frequency": Column("frequency", "Hz"),
     "engine_order": Column("engine order"),
     "amplitude": Column("amplitude", "m", "µm", 1e6),

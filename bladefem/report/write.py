@@ -7,6 +7,7 @@ import hashlib
 import json
 import mimetypes
 import os
+import struct
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
@@ -47,6 +48,8 @@ SECTIONS = {
 }
 # rows of a table on the page; the CSV files hold all
 MAX_PAGE_ROWS = 40
+# width over height from which a picture takes the whole width of the page, to be read
+BROAD_PICTURE = 1.7
 # figures that answer most, the best first; the page begins with the first one there is
 LEAD_FIGURES = (
     "response/forced_response",
@@ -275,7 +278,17 @@ def _figure(
         "caption": caption_of(name),
         "file": Path(file),
         "live": keys.get(name),
+        "broad": name not in keys and _width_over_height(Path(file)) > BROAD_PICTURE,
     }
+
+
+def _width_over_height(file: Path) -> float:
+    """Of a PNG file; 1 of others."""
+    head = file.read_bytes()[:24]
+    if not head.startswith(b"\x89PNG"):
+        return 1.0
+    width, height = struct.unpack(">II", head[16:24])
+    return float(width / height)
 
 
 def page_table(

@@ -9,6 +9,7 @@ import matplotlib.colors
 import numpy as np
 import pandas as pd
 
+from .optimum import exact_optimum
 from .response import load_colours, load_name, pieces_of, smooth_curve
 from .style import COLOURS, FAILED_COLOUR
 
@@ -132,23 +133,30 @@ def live_optimum(
     summary: pd.DataFrame,
     own: float | None = None,
     title: str = "optimum load",
+    searched: pd.DataFrame | None = None,
 ) -> dict[str, Any]:
-    """Resonance amplitude and frequency over load, a curve a damper mass.
+    """Resonance amplitude and frequency over load, a curve a damper mass; a star at the best load.
 
     Args:
         summary: one row a load, SI columns.
         own: load that the damper's mass gives at the operating speed [N].
         title: headline.
+        searched: table of best loads by exact search, a row a mass; the star is then there, in
+            the band of loads whose amplitudes keep within the accuracy of it.
     """
     data: list[dict[str, Any]] = []
+    shapes = _level_lines(summary)
     groups = list(summary.groupby("mass")) if "mass" in summary else [(None, summary)]
     for number, (mass, table) in enumerate(groups):
         finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
         name = "resonance" if mass is None else f"damper of {1e3 * mass:.4g} g"
-        data += _optimum_curve(finite, name, COLOURS[number % len(COLOURS)])
-    shapes = _level_lines(summary)
+        colour = COLOURS[number % len(COLOURS)]
+        exact = exact_optimum(searched, mass)
+        data += _optimum_curve(finite, name, colour, exact)
+        if exact is not None:
+            shapes += _tolerated_band(exact, colour)
     if own is not None:
-        shapes.append(_level_line("x", own, "dot", f"own load {own:.4g} N"))
+        shapes.append(_level_line("x", own, "dot", f"own load {own:.4g} N", "end"))
     finite = summary[np.isfinite(summary["load"]) & (summary["load"] > 0)]
     loads = _log_axis(finite["load"])
     layout = {
@@ -164,6 +172,7 @@ def live_optimum(
         },
         "yaxis": {
             **_log_axis(MICRO * summary["peak_amplitude"]),
+            "range": _log_range(MICRO * summary["peak_amplitude"]),
             "domain": [0.42, 1],
             "title": {"text": "resonance amplitude [µm]"},
         },
@@ -177,8 +186,11 @@ def _optimum_curve(
     finite: pd.DataFrame,
     name: str,
     colour: str,
+    exact: pd.Series | None,
 ) -> list[dict[str, Any]]:
-    """Amplitude with its estimated error above, frequency below."""
+    """Amplitude with its estimated error above, frequency below, in both the best load as a star;
+    hollow where the error is not known.
+    """
     amplitude = MICRO * finite["peak_amplitude"].to_numpy(float)
     error = finite["error"].to_numpy(float) if "error" in finite else np.full(len(finite), np.nan)
     common = {
@@ -189,16 +201,18 @@ def _optimum_curve(
         "x": json_numbers(finite["load"]),
         "line": {"color": colour},
     }
-    best = int(np.argmin(amplitude))
-    symbols = ["star" if i == best else "circle" for i in range(len(amplitude))]
-    sizes = [14 if i == best else 7 for i in range(len(amplitude))]
+    unknown = np.isinf(error)
+    symbols = ["circle-open" if doubt else "circle" for doubt in unknown]
+    colours = [FAILED_COLOUR if doubt else colour for doubt in unknown]
+    hover = ["error unknown" if doubt else "" for doubt in unknown]
     bars = np.where(np.isfinite(error), error * amplitude, 0.0)
     upper = {
         **common,
         "y": json_numbers(amplitude),
-        "marker": {"symbol": symbols, "size": sizes},
+        "marker": {"symbol": symbols, "size": 7, "color": colours},
         "error_y": {"type": "data", "array": json_numbers(bars), "thickness": 1},
-        "hovertemplate": "%{x:.4g} N, %{y:.4g} µm<extra></extra>",
+        "text": hover,
+        "hovertemplate": "%{x:.4g} N, %{y:.4g} µm<br>%{text}<extra></extra>",
     }
     lower = {
         **common,
@@ -208,17 +222,76 @@ def _optimum_curve(
         "showlegend": False,
         "hovertemplate": "%{x:.4g} N, %{y:.6g} Hz<extra></extra>",
     }
-    return [upper, lower]
+    best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
+    return [upper, lower, *_optimum_stars(best, name, colour)]
+
+
+def _optimum_stars(best: pd.Series, name: str, colour: str) -> list[dict[str, Any]]:
+    """The best load in both panels.
+
+    Args:
+        best: load, peak_amplitude, peak_frequency; SI.
+    """
+    star = {
+        "type": "scatter",
+        "mode": "markers",
+        "name": f"best load, {name}",
+        "legendgroup": name,
+        "showlegend": False,
+        "x": json_numbers([best["load"]]),
+        "marker": {"symbol": "star", "size": 15, "color": colour, "line": {"width": 1}},
+    }
+    words = "best load %{x:.4g} N, "
+    return [
+        {
+            **star,
+            "y": json_numbers([MICRO * best["peak_amplitude"]]),
+            "hovertemplate": words + "%{y:.4g} µm<extra></extra>",
+        },
+        {
+            **star,
+            "y": json_numbers([best["peak_frequency"]]),
+            "xaxis": "x2",
+            "yaxis": "y2",
+            "hovertemplate": words + "%{y:.6g} Hz<extra></extra>",
+        },
+    ]
+
+
+def _tolerated_band(exact: pd.Series, colour: str) -> list[dict[str, Any]]:
+    """The loads whose amplitudes keep within the accuracy of the optimum, in both panels; none
+    where an end is not known.
+    """
+    low, high = exact.get("tolerated_from", np.nan), exact.get("tolerated_to", np.nan)
+    if not (np.isfinite(low) and np.isfinite(high)):
+        return []
+    band = {
+        "type": "rect",
+        "x0": float(low),
+        "x1": float(high),
+        "y0": 0,
+        "y1": 1,
+        "fillcolor": colour,
+        "opacity": 0.12,
+        "line": {"width": 0},
+        "layer": "below",
+    }
+    return [
+        {**band, "xref": "x", "yref": "y domain"},
+        {**band, "xref": "x2", "yref": "y2 domain"},
+    ]
 
 
 def _level_lines(summary: pd.DataFrame) -> list[dict[str, Any]]:
     """The blade without damper and in full stick."""
     lines = []
+    # the two often lie close together: their names are at both ends
+    places = dict(zip(DASHES, ("start", "end"), strict=True))
     for load, dash in DASHES.items():
         row = summary[summary["load"] == load]
         if len(row):
             value = MICRO * float(row["peak_amplitude"].iloc[0])
-            lines.append(_level_line("y", value, dash, load_name(load)))
+            lines.append(_level_line("y", value, dash, load_name(load), places[load]))
     return lines
 
 
@@ -227,6 +300,7 @@ def _level_line(
     value: float,
     dash: str,
     label: str,
+    place: str = "start",
 ) -> dict[str, Any]:
     """A line across the upper panel."""
     other = "y" if axis == "x" else "x"
@@ -241,7 +315,10 @@ def _level_line(
         "line": {"color": "#555555", "dash": dash, "width": 1},
         "label": {
             "text": label,
-            "textposition": "start",
+            "textposition": place,
+            # inside of the panel: above a level line at its start, below at its end
+            "xanchor": "left" if place == "start" else "right",
+            "yanchor": "bottom" if place == "start" else "top",
             "textangle": 0,
             "font": {"size": 10},
         },
@@ -254,13 +331,16 @@ def live_loops(
     """Hysteresis of each seat, all loads in one chart; a click on a name hides a load.
 
     Args:
-        cases: name of the load -> name of the seat -> (displacement (k,) [m], force (k,) [N]).
+        cases: name of the load -> name of the seat -> (displacement (k,) [m], force (k,) [N]), in
+            the order of the loads.
     """
     data = []
+    colours = load_colours(np.arange(1.0, len(cases) + 1.0))
     dashes = ("solid", "dash")
     names = next(iter(cases.values()), {})
     dash_note = ", ".join(f"{dash}: {seat}" for dash, seat in zip(dashes, names, strict=False))
-    for number, (load, seats) in enumerate(cases.items()):
+    for number, (load, seats) in enumerate(cases.items(), 1):
+        colour = matplotlib.colors.to_hex(colours[number])
         pairs = zip(dashes, seats.items(), strict=False)
         for first, (dash, (seat, (x, force))) in enumerate(pairs):
             closed = np.append(np.arange(len(x)), 0)
@@ -274,13 +354,13 @@ def live_loops(
                     "showlegend": first == 0,
                     "x": json_numbers(MICRO * np.asarray(x)[closed]),
                     "y": json_numbers(np.asarray(force)[closed]),
-                    "line": {"color": COLOURS[number % len(COLOURS)], "dash": dash, "width": 1.6},
+                    "line": {"color": colour, "dash": dash, "width": 1.6},
                     "hovertemplate": f"%{{x:.4g}} µm, %{{y:.4g}} N<extra>{load}, {seat}</extra>",
                 }
             )
     layout = {
         "title": _escape_title("hysteresis loops"),
-        "xaxis": {"title": {"text": f"relative displacement [µm]  ({dash_note})"}},
+        "xaxis": {"title": {"text": f"relative displacement [µm]<br>{dash_note}"}},
         "yaxis": {"title": {"text": "friction force [N]"}},
         "hovermode": "closest",
     }
@@ -332,6 +412,17 @@ def _log_axis(values: Any) -> dict[str, Any]:
     steps = (1, 2, 3, 4, 5, 6, 8) if high - low < 2 else (1, 2, 5) if high - low < 5 else (1,)
     ticks = [step * 10.0**decade for decade in range(low, high + 1) for step in steps]
     return {"type": "log", "tickvals": ticks, "ticktext": [f"{tick:g}" for tick in ticks]}
+
+
+def _log_range(values: Any) -> list[float | None] | None:
+    """Decades from the least to the largest value with room for marks and names."""
+    array = np.asarray(values, dtype=float)
+    array = array[np.isfinite(array) & (array > 0)]
+    if not len(array):
+        return None
+    low, high = np.log10(array.min()), np.log10(array.max())
+    room = 0.08 * (high - low) + 0.02
+    return json_numbers([low - room, high + 1.5 * room])
 
 
 def json_numbers(values: Any) -> list[float | None]:

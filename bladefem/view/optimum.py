@@ -53,7 +53,7 @@ def draw_optimum(
         groups = summary.groupby("mass") if "mass" in summary else [(None, summary)]
         for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
             label = None if mass is None else f"damper of {1e3 * mass:.4g} g"
-            draw_optimum_curve(axes, table, colour, label, _exact_optimum(searched, mass))
+            draw_optimum_curve(axes, table, colour, label, exact_optimum(searched, mass))
         draw_limits(axes, summary)
         draw_cut(axes, summary, points)
         if own is not None:
@@ -128,7 +128,7 @@ def draw_optimum_curve(
     )
 
 
-def _exact_optimum(searched: pd.DataFrame | None, mass: float | None) -> pd.Series | None:
+def exact_optimum(searched: pd.DataFrame | None, mass: float | None) -> pd.Series | None:
     """The best load of a damper mass as a row with the names of the summary; None where no search
     succeeded.
     """

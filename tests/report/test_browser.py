@@ -11,6 +11,7 @@ import html
 import json
 import os
 import re
+import struct
 import subprocess
 import sys
 from pathlib import Path
@@ -23,7 +24,7 @@ from bladefem.data import ModeSet
 from bladefem.report.pdf import browser_command, print_pdf
 from bladefem.report.write import Page, write_report
 from bladefem.scene.tables import Scene
-from bladefem.view.live_curves import live_optimum, live_responses
+from bladefem.view.live_curves import live_loops, live_optimum, live_responses
 from bladefem.view.live_shapes import live_motion, live_shapes
 from geometry.mesh import Mesh
 
@@ -308,6 +309,49 @@ def test_own_load_and_limits_are_lines_of_the_optimum():
     spec = live_optimum(synthetic.summary(), 120.0)
     labels = [shape["label"]["text"] for shape in spec["layout"]["shapes"]]
     assert labels == ["0 (no damper)", "∞ (full stick)", "own load 120 N"]
-    best = spec["data"][0]["marker"]["symbol"].index("star")
-    assert spec["data"][0]["x"][best] == 200.0
+    assert [trace["x"] for trace in _stars(spec)] == [[200.0], [200.0]]
     assert isinstance(pd.Series(spec["data"][0]["y"]).min(), float)
+
+
+def _stars(spec):
+    return [trace for trace in spec["data"] if trace.get("marker", {}).get("symbol") == "star"]
+
+
+def test_the_star_of_the_optimum_is_where_the_search_found_it():
+    """As on the picture: not at the best of the loads studied, and in the band of equal ones."""
+    summary = synthetic.summary().assign(error=0.01)
+    summary.loc[summary["load"] == 800.0, "error"] = np.inf
+    row = {"load": 170.0, "amplitude": 3e-6, "frequency": 870.0}
+    searched = pd.DataFrame([{**row, "tolerated_from": 150.0, "tolerated_to": 190.0}])
+    spec = live_optimum(summary, searched=searched)
+    assert [(trace["x"], trace["y"]) for trace in _stars(spec)] == [
+        ([170.0], [3.0]),
+        ([170.0], [870.0]),
+    ]
+    bands = [(s["x0"], s["x1"]) for s in spec["layout"]["shapes"] if s["type"] == "rect"]
+    assert bands == [(150.0, 190.0)] * 2
+    symbols = dict(zip(spec["data"][0]["x"], spec["data"][0]["marker"]["symbol"], strict=True))
+    assert [load for load, symbol in symbols.items() if symbol == "circle-open"] == [800.0]
+    top = 10 ** spec["layout"]["yaxis"]["range"][1]
+    assert top > 1e6 * summary["peak_amplitude"].max()
+
+
+def test_loops_and_responses_share_the_colours_of_the_loads():
+    points = synthetic.points()
+    loads = [load for load in np.unique(points["load"]) if 0 < load < np.inf]
+    loop = (np.zeros(4), np.zeros(4))
+    loops = live_loops({f"{load:g} N": {"right": loop, "left": loop} for load in loads})
+    colours = {t["name"]: t["line"]["color"] for t in live_responses(points)["data"] if "line" in t}
+    assert {t["name"]: t["line"]["color"] for t in loops["data"]} == {
+        f"{load:g} N": colours[f"{load:g} N"] for load in loads
+    }
+
+
+def test_broad_pictures_take_the_width_of_the_page(page, tmp_path):
+    assert 'class="broad"' not in page.read_text(encoding="utf-8")
+    file = tmp_path / "influences.png"
+    header = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sII", 13, b"IHDR", 1900, 900)
+    file.write_bytes(header)
+    figures = {"response/influences": file}
+    written, _ = write_report(tmp_path, Scene(), {}, figures)
+    assert 'class="broad"' in written.read_text(encoding="utf-8")

@@ -147,6 +147,26 @@ def test_answer_says_which_mass_would_press_best():
     assert found[-1][1] == "8.49 g"
 
 
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        (150.0, 190.0, "between 150 and 190 N"),
+        (150.0, np.nan, "above 150 N; how far up was not searched"),
+        (np.nan, np.nan, "how flat the optimum is was not searched"),
+    ],
+)
+def test_a_searched_optimum_says_how_flat_it_is(low, high, said):
+    """Never by the number of loads studied, which are not what the search looked at."""
+    summary, points = synthetic.summary().assign(error=0.01), synthetic.points()
+    row = {"load": 170.0, "amplitude": 3e-6, "frequency": 870.0, "error": 0.01, "tolerance": 1e-3}
+    row |= {"tolerated_from": low, "tolerated_to": high, "reason": ""}
+    searched = pd.DataFrame([row])
+    found = response_answer(summary, points, None, None, searched)
+    numbers = headlines(found, summary, points, searched)
+    assert numbers[0].value == "170 N"
+    assert numbers[0].uncertainty == said
+
+
 def test_a_speed_that_does_not_drive_the_resonance_is_named():
     """Engine order 9 needs 60 f / 9 rpm."""
     summary = pd.DataFrame(

@@ -247,7 +247,7 @@ def _element_patch(patch: Patch, points: int | None) -> Patch:
     if points is None or points >= len(patch.area):
         return patch
     shares = aggregation_matrix(patch, points)
-    area = np.bincount(shares.indices, patch.area)
+    area = np.bincount(shares.indices, patch.area).astype(float)
     return replace(patch, points=shares.T @ patch.points, area=area)
 
 
