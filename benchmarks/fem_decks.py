@@ -3,8 +3,9 @@
     python benchmarks/fem_decks.py          writes tests/fem/ccx_decks.json
 
 Modes of three nodal diameters of a ring sector, one of twelve: C3D20, C3D20R, C3D15 with C3D20,
-C3D10, and C3D4 promoted to C3D10; clamped bars of a cubic crystal and an orthotropic solid; and a
-bar between walls whose properties are tables of temperature, heated evenly and unevenly.
+C3D10, and C3D4 promoted to C3D10; clamped bars of a cubic crystal and an orthotropic solid; a bar
+that turns about its axis, with Coriolis forces; and a bar between walls whose properties are tables
+of temperature, heated evenly and unevenly.
 """
 
 from __future__ import annotations
@@ -91,6 +92,27 @@ def heated(kind: str, folder: Path) -> dict[str, object]:
     return out
 
 
+def turning(folder: Path) -> dict[str, list[float]]:
+    """Frequencies [Hz] of a bar that turns about its axis, without and with Coriolis forces."""
+    import decks
+
+    from bladefem.scene.tables import Material
+
+    (folder / "job.inp").write_text(decks.turning_job(Material()))
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    subprocess.run(
+        ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+    )
+    out: dict[str, list[float]] = {"real": [], "complex": []}
+    for line in (folder / "job.dat").read_text().splitlines():
+        row = line.split()
+        if len(row) in (4, 5) and row[0].isdigit() and int(row[0]) <= decks.TURNING_MODES:
+            name = "real" if len(row) == 5 else "complex"
+            if len(out[name]) == int(row[0]) - 1:
+                out[name].append(float(row[3] if len(row) == 5 else row[2]))
+    return out
+
+
 def main() -> None:
     """Write the reference file."""
     sys.path[:0] = [str(TESTS), str(HERE), str(HERE.parent)]
@@ -104,6 +126,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         out = {case: reference(*how, Path(name)) for case, how in cases.items()}
         out["crystals"] = {kind: crystal(kind, Path(name)) for kind in ("cubic", "orthotropic")}
+        out["turning"] = turning(Path(name))
         out["heated"] = {kind: heated(kind, Path(name)) for kind in ("uniform", "field")}
     GOLDEN.write_text(json.dumps(out, indent=1) + "\n")
 

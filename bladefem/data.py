@@ -67,7 +67,8 @@ class PortModel:
     nodal_diameter: int | None = None
     # (p,) displacement under the static loads (n = 0 only) [m]
     static_offset: RealOrComplex | None = None
-    # (m,) or coupled (m, m) viscous modal damping, in addition to the model's [1/s]
+    # (m,) or coupled (m, m) viscous modal damping, in addition to the model's [1/s]; its
+    # skew-Hermitian part are gyroscopic and Coriolis forces
     damping: RealOrComplex | None = None
     # (m, m) forces of the displacements that have no energy, by unsymmetric stiffness [1/s^2]
     circulatory: RealOrComplex | None = None

@@ -230,6 +230,13 @@ def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
     )
 
 
+def counting_sense(mesh: Mesh) -> int:
+    """+1 where sectors are counted in the sense of a positive rotation about z, else -1."""
+    if mesh.sector is None or not mesh.sector.count:
+        return 1
+    return 1 if mesh.sector.rotation[1, 0] >= 0 else -1
+
+
 def _fitted(problem: ContactProblem) -> ContactProblem:
     """The same bodies with faces that fit each other whatever the rotation."""
     none = np.zeros_like(problem.clearance)

@@ -53,7 +53,8 @@ def forced_motion(
         loads: (n_points*dim, k) complex amplitudes [N].
         omega: (k,) circular frequency of each load [rad/s]; 0 for a static one, negative for the
             conjugate motion.
-        damping: (m,) viscous damping of the modes kept [1/s], 2 zeta omega_r for a damping ratio.
+        damping: (m,) viscous damping of the modes kept [1/s], 2 zeta omega_r for a damping ratio;
+            (m, m) where it couples them, as Coriolis forces do.
 
     Raises:
         NotSolvedError: the series does not converge: a mode below a frequency is missing.
@@ -70,8 +71,7 @@ def forced_motion(
     def without_modes(v: np.ndarray) -> np.ndarray:
         return v - X @ inner_products(comm, MX, v)
 
-    dynamic = natural[:, None] ** 2 - omega**2 + 1j * omega * damping[:, None]
-    u = X @ (inner_products(comm, X, force) / dynamic)
+    u = X @ _modal_motion(natural, inner_products(comm, X, force), omega, damping)
     term = without_modes(compliance(flex, force))
     size = np.ones(len(omega))
     for count in range(SERIES_TERMS + 1):
@@ -92,6 +92,22 @@ def forced_motion(
         f"modes up to {natural[-1] / (2 * np.pi):.5g} Hz (last term {size[worst]:.1e}): expected "
         "modes beyond the frequency"
     )
+
+
+def _modal_motion(
+    natural: np.ndarray,
+    force: np.ndarray,
+    omega: np.ndarray,
+    damping: np.ndarray,
+) -> np.ndarray:
+    """(m, k) modal amplitudes under modal forces (m, k)."""
+    single = natural[:, None] ** 2 - omega**2
+    if damping.ndim == 1:
+        return force / (single + 1j * omega * damping[:, None])
+    impedance = 1j * omega[:, None, None] * damping
+    modes = np.arange(len(natural))
+    impedance[:, modes, modes] += single.T
+    return np.linalg.solve(impedance, force.T[:, :, None])[:, :, 0].T
 
 
 def _column_norms(comm: MPI.Comm, v: np.ndarray) -> np.ndarray:

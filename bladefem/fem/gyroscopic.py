@@ -19,10 +19,19 @@ import numpy as np
 
 from ..data import ModeSet
 from ..errors import InputError
-from .body import Body, body_properties, cells_of, degrees
-from .compat import PETSc, assemble_matrix, dolfinx, ufl
+from .body import Body
+from .constraint import Constrained, expand_to_mesh
 from .linalg import apply_block, inner_products
 from .rotation import AXIS
+
+
+@dataclass(frozen=True)
+class Spin:
+    """A steady rotation of the frame in which bodies vibrate."""
+
+    axis: tuple[float, float, float]
+    # [rad/s], positive where the sectors are counted in the sense of the rotation
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -52,34 +61,43 @@ class Waves:
         return self.forward + shift, self.backward - shift
 
 
-def coriolis(body: Body, axis: tuple[float, float, float] = AXIS) -> PETSc.Mat:
-    """G [kg]: times the speed [rad/s] it multiplies velocities in the rotating frame; skew."""
-    degree = degrees(body.mesh, cells_of(body), "exact", body.heat)
-    _, rho, depth = body_properties(body, degree)
-    a = np.asarray(axis, float) / np.linalg.norm(axis)
-    turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
-    v = ufl.TestFunction(body.space)
-    u = ufl.TrialFunction(body.space)
-    # a constant, since a matrix of zeros (a plane that holds the axis) would leave no form
-    cross = dolfinx.fem.Constant(body.space.mesh, np.ascontiguousarray(turn))
-    form = 2 * depth * rho * ufl.inner(v, cross * u)
-    return assemble_matrix(form * ufl.dx(metadata={"quadrature_degree": degree[1]}))
-
-
 def coupling(
     body: Body,
     modes: ModeSet,
-    G: PETSc.Mat | None = None,
     axis: tuple[float, float, float] = AXIS,
 ) -> np.ndarray:
     """(m, m) skew-Hermitian g = Phi^H G Phi [1], real where the modes are.
 
     Args:
         modes: mass-normalised shapes on the nodes of the body's mesh.
-        G: from :func:`coriolis`, to use again.
     """
-    X = own_rows(body, modes.shapes)
-    g = inner_products(body.comm, X, apply_block(coriolis(body, axis) if G is None else G, X))
+    return project_coriolis(body, own_rows(body, modes.shapes), axis)
+
+
+def constrained_coupling(
+    con: Constrained,
+    X: np.ndarray,
+    axis: tuple[float, float, float] = AXIS,
+) -> np.ndarray:
+    """(m, m) the same of fields given by this rank's unknowns (n_own, m) of a constrained body."""
+    shapes = np.moveaxis(expand_to_mesh(con, X), 2, 0)
+    return project_coriolis(con.body, own_rows(con.body, shapes), axis)
+
+
+def project_coriolis(
+    body: Body,
+    X: np.ndarray,
+    axis: tuple[float, float, float] = AXIS,
+) -> np.ndarray:
+    """(m, m) X^H G X of this rank's rows (n_own, m), skew-Hermitian.
+
+    The mass of a node is the same in all directions, so that G = 2 M (a x): no matrix of its own.
+    """
+    a = np.asarray(axis, float) / np.linalg.norm(axis)
+    turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
+    nodal = X.reshape(-1, body.dim, X.shape[1])
+    crossed = np.asfortranarray(np.einsum("ij,njm->nim", turn, nodal).reshape(X.shape))
+    g = 2 * inner_products(body.comm, X, apply_block(body.M, crossed))
     return (g - g.conj().T) / 2
 
 
@@ -122,19 +140,6 @@ def waves(
     turned = [(np.abs(w[part]) / (2 * np.pi), _normalise_columns(Z[m:, part])) for part in order]
     (forward, ahead), (backward, behind) = turned if sense > 0 else turned[::-1]
     return Waves(modes.nodal_diameter, speed, forward, backward, ahead, behind)
-
-
-def wave_shifts(modes: ModeSet, g: np.ndarray, speed: float) -> np.ndarray:
-    """(m,) by how much the waves that the modes become differ from their frequencies [1], the
-    larger of forward and backward; 0 of rigid modes.
-
-    Args:
-        g, speed: as in :func:`waves`.
-    """
-    found = waves(modes, g, speed)
-    f = modes.frequencies
-    away = np.maximum(np.abs(found.forward - f), np.abs(found.backward - f))
-    return np.divide(away, f, out=np.zeros_like(f), where=f > 0)
 
 
 def _normalise_columns(Z: np.ndarray) -> np.ndarray:

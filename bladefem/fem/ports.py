@@ -19,12 +19,15 @@ from .constraint import Constrained, Opened, Transformation, restrict_load
 from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
+from .gyroscopic import Spin, constrained_coupling
 from .linalg import apply_block, inner_products
 from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
 
 # ports in one sweep
 PORTS_PER_SOLVE = 64
 REDUCTION_KINDS = ("rubin", "craig-bampton")
+# largest Coriolis coupling of two modes of mass 1, which is at most 2, that is rounding
+NO_COUPLING = 1e-12
 
 
 def port_model(
@@ -36,6 +39,7 @@ def port_model(
     kind: str = "rubin",
     flex: Flexibility | None = None,
     solver: Eigensolver = SLEPC,
+    spin: Spin | None = None,
 ) -> PortModel:
     """Reduce a constrained body to its ports.
 
@@ -46,6 +50,8 @@ def port_model(
         static_load: (n_points*dim,) [N], its displacement at the ports is the static offset.
         kind: "rubin" or "craig-bampton" (count is then the number of fixed-interface modes).
         flex: factorisation to use again.
+        spin: rotation whose Coriolis forces couple the modes kept, as damping without work; those
+            of the modes left out are left out.
 
     Raises:
         InputError: P does not fit the mesh, or knows no such kind.
@@ -68,8 +74,17 @@ def port_model(
     )
     X = X[:, : F.shape[1]]
     reduce = _rubin_modes if kind == "rubin" else _craig_bampton
-    omega, shapes, residual = reduce(flex, F, X, count, solver)
-    return PortModel(omega, shapes, residual, names, con.nodal_diameter, offset)
+    omega, V, residual = reduce(flex, F, X, count, solver)
+    shapes = inner_products(con.body.comm, F, V)
+    return PortModel(
+        omega,
+        shapes,
+        residual,
+        names,
+        con.nodal_diameter,
+        offset,
+        damping=_coriolis_damping(con, V, spin),
+    )
 
 
 def port_models(
@@ -82,6 +97,7 @@ def port_models(
     kind: str = "rubin",
     solver: Eigensolver = SLEPC,
     kept: KeptPairs | None = None,
+    spin: Spin | None = None,
 ) -> Iterator[tuple[int, PortModel]]:
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
@@ -92,13 +108,14 @@ def port_models(
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
         kept: modes of the same body that are known; they are used up.
+        spin: as for :func:`port_model`.
     """
     shared = (
         _interior_flexibility(t.opened, P, static_load)
         if t.opened is not None and kind == "rubin"
         else None
     )
-    model = _Ports(P, names, count, static_load, kind, solver, shared)
+    model = _Ports(P, names, count, static_load, kind, solver, shared, spin)
     if kept is not None and kept.serves(diameters, count):
         for n in diameters:
             yield n, _port_model(model, kept.pairs.pop(n))
@@ -131,6 +148,7 @@ class _Ports:
     solver: Eigensolver
     # see ``_interior_flexibility``
     shared: tuple[np.ndarray, np.ndarray] | None
+    spin: Spin | None
 
 
 def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
@@ -141,7 +159,7 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     rim = p.flex.factor.parts
     if model.shared is None or not isinstance(rim, Rim) or p.flex.R.shape[1]:
         return port_model(
-            p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver
+            p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver, model.spin
         )
     _check_ports(p.con, P)
     G, offset = _closed_flexibility(model.shared, rim)
@@ -157,7 +175,16 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
         model.names,
         n,
         None if load is None else offset,
+        damping=_coriolis_damping(p.con, vectors, model.spin),
     )
+
+
+def _coriolis_damping(con: Constrained, V: np.ndarray, spin: Spin | None) -> np.ndarray | None:
+    """(m, m) skew-Hermitian speed times Phi^H G Phi [1/s] of modes given by their unknowns."""
+    if spin is None or spin.speed == 0:
+        return None
+    g = constrained_coupling(con, V, spin.axis)
+    return spin.speed * g if abs(g).max(initial=0.0) > NO_COUPLING else None
 
 
 def port_flexibility(
@@ -223,13 +250,14 @@ def _rubin_modes(
     count: int,
     solver: Eigensolver,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Free modes, and what the modes left out give to the static flexibility (Rubin 1975,
-    doi:10.2514/3.60497).
+    """Circular frequencies, free modes by their unknowns, and what the modes left out give to the
+    static flexibility (Rubin 1975, doi:10.2514/3.60497).
     """
     comm = flex.con.body.comm
-    lam, V = proven_pairs(flex, count, solver=solver)
-    shapes = inner_products(comm, F, canonical(flex.con, lam, V))
-    return np.sqrt(lam), shapes, _residual_flexibility(inner_products(comm, F, X), lam, shapes)
+    lam, found = proven_pairs(flex, count, solver=solver)
+    V = canonical(flex.con, lam, found)
+    shapes = inner_products(comm, F, V)
+    return np.sqrt(lam), V, _residual_flexibility(inner_products(comm, F, X), lam, shapes)
 
 
 def _residual_flexibility(
@@ -268,7 +296,7 @@ def _craig_bampton(
     lam[: flex.R.shape[1]] = 0.0
     return (
         np.sqrt(np.maximum(lam, 0)),
-        inner_products(comm, F, V) @ W @ Z,
+        V @ (W @ Z),
         np.zeros((F.shape[1],) * 2, F.dtype),
     )
 

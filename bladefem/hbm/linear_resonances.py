@@ -8,13 +8,47 @@ from scipy import linalg
 from ..data import RigidBody
 from .model import ReducedModel
 
+# circular frequencies below this share of the highest are those of rigid modes
+RIGID_SHARE = 1e-9
+
 
 def free_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
     """(m,) circular frequencies omega at which harmonic h meets a mode of the blades without
     contact [rad/s].
     """
-    omega = model.side(h).omega
+    side = model.side(h)
+    omega = side.omega
+    if side.damping is not None and side.damping.ndim == 2:
+        omega = wave_frequencies(omega, side.damping)
     return omega[omega > 0] / h
+
+
+def wave_frequencies(omega: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """(m,) circular frequencies [rad/s] of the waves e^{j w t}, w > 0, that modes become under
+    Coriolis forces, ascending; 0 of rigid modes.
+
+    Args:
+        omega: (m,) without Coriolis forces [rad/s].
+        damping: (m, m) modal damping, of which the skew-Hermitian part acts here [1/s].
+    """
+    return _gyroscopic_modes(omega, damping)[0]
+
+
+def _gyroscopic_modes(omega: np.ndarray, damping: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies (m,) as `wave_frequencies`, and the waves (m, m) in the modes, columns of
+    length 1.
+
+    (L - w^2 + j w S) z = 0, S skew-Hermitian, is Hermitian in (root(L) z / w, z): all w are real.
+    """
+    m = len(omega)
+    skew = (damping - damping.conj().T) / 2
+    root = np.diag(omega)
+    w, vectors = np.linalg.eigh(np.block([[np.zeros((m, m)), root], [root, 1j * skew]]))
+    upper = vectors[m:, m:]
+    size = np.maximum(np.linalg.norm(upper, axis=0), np.finfo(float).tiny)
+    # a mode without frequency or coupling comes as a pair about zero
+    found = np.where(w[m:] > RIGID_SHARE * w[-1], w[m:], 0.0)
+    return found, upper / size
 
 
 def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
@@ -66,4 +100,10 @@ def _stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
     K = np.diag(np.concatenate(stiffness)) + relative.conj().T @ contact @ relative
     values, shapes = linalg.eigh((K + K.conj().T) / 2, linalg.block_diag(*masses))
     elastic = values > 1e-9 * values[-1]
-    return np.sqrt(values[elastic]) / h, shapes[:, elastic]
+    omega = np.sqrt(values[elastic])
+    shapes = shapes[:, elastic]
+    if side.damping is not None and side.damping.ndim == 2:
+        own = shapes[: len(side.omega)]
+        omega, waves = _gyroscopic_modes(omega, own.conj().T @ side.damping @ own)
+        shapes = shapes @ waves
+    return omega / h, shapes

@@ -18,6 +18,8 @@ from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
 
 Result = TypeVar("Result")
+# Hermitian part of modal damping, relative, that is rounding
+SKEW_ROUNDING_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ class ReducedModel:
         """The blades lose work by themselves."""
         own = self.damping
         return any(np.any(x) for x in (own.ratio, own.structural, own.mass, own.stiffness)) or any(
-            side.damping is not None for side in self.sides
+            side.damping is not None and _has_loss(side.damping) for side in self.sides
         )
 
     @cached_property
@@ -268,6 +270,13 @@ def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:
     rows = np.arange(len(residual))[side.ports["contact"]]
     residual[rows, rows] += compliance.ravel()
     return replace(side, residual=residual)
+
+
+def _has_loss(damping: np.ndarray) -> bool:
+    """Some motion loses work: Coriolis forces alone, skew-Hermitian, take none."""
+    if damping.ndim == 1:
+        return bool(damping.any())
+    return bool(abs(damping + damping.conj().T).max() > SKEW_ROUNDING_SHARE * abs(damping).max())
 
 
 def _first(

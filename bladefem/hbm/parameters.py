@@ -85,7 +85,11 @@ def _scale_load(model: ReducedModel, factor: float) -> ReducedModel:
 
 def _scale_damping(model: ReducedModel, factor: float) -> ReducedModel:
     def scaled(body: PortModel) -> PortModel:
-        return body if body.damping is None else replace(body, damping=factor * body.damping)
+        if body.damping is None or body.damping.ndim == 1:
+            return body if body.damping is None else replace(body, damping=factor * body.damping)
+        # Coriolis forces are no damping
+        loss = (body.damping + body.damping.conj().T) / 2
+        return replace(body, damping=body.damping + (factor - 1) * loss)
 
     ours, theirs = (
         Damping(factor * d.ratio, factor * d.structural, factor * d.mass, factor * d.stiffness)

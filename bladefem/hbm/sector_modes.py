@@ -184,10 +184,10 @@ def _ring(
             shapes = size * (phase * stack.shapes[row, rows]).reshape(-1, len(own))
             found.extend([shapes.real] + [shapes.imag] * double)
         stiffness.extend([own**2] * (1 + double))
-        loss.append(_real_form(viscous) if double else viscous.real)
-        turning.append(_real_form(moved) if double else moved.real)
+        loss.append(real_form(viscous) if double else viscous.real)
+        turning.append(real_form(moved) if double else moved.real)
         handed_on = np.exp(-2j * np.pi * j / r) * np.eye(len(own))
-        turned.append(_real_form(handed_on) if double else handed_on.real)
+        turned.append(real_form(handed_on) if double else handed_on.real)
     return SectorModes(
         r,
         np.concatenate(stiffness),
@@ -213,6 +213,6 @@ def _ring_residual(stack: Stack, r: int, rows: slice) -> np.ndarray:
     return found.transpose(0, 2, 1, 3).reshape(r * shape[0], r * shape[1])
 
 
-def _real_form(matrix: np.ndarray) -> np.ndarray:
+def real_form(matrix: np.ndarray) -> np.ndarray:
     """A complex matrix on amplitudes x - i y as a real one on (x, y)."""
     return np.block([[matrix.real, matrix.imag], [-matrix.imag, matrix.real]])

@@ -31,6 +31,7 @@ from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
 from ..study.pipeline import pipeline
 from ..study.pipeline.contact_cycle import ContactCycle
+from ..study.pipeline.coriolis import CORIOLIS_SHARE, has_coriolis
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve, design_table
 from ..study.pipeline.run_records import SolvedRun, folder_of
@@ -70,8 +71,6 @@ from .write import Page, write_report
 
 # the figure of the blade's motion under the best load
 MOTION_FIGURE = "response/damped_motion"
-# of the accuracy: shift of a frequency by Coriolis forces that responses may leave out
-CORIOLIS_SHARE = 0.1
 MESH_ERROR_NOTE = (
     "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
     "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
@@ -279,7 +278,7 @@ def _static_contact(result: SolvedRun) -> str:
 
 
 def _coriolis(result: SolvedRun) -> list[str]:
-    """Whether Coriolis forces, which are left out of the responses, may stay out."""
+    """Whether responses have Coriolis forces, and what they do."""
     shift = result.strength.coriolis
     if not shift > 0:
         return []
@@ -287,12 +286,15 @@ def _coriolis(result: SolvedRun) -> list[str]:
         f"Coriolis forces move the waves of mode {result.strength.mode} by {100 * shift:.2g} % of "
         "its frequency"
     )
+    if has_coriolis(result.reduced):
+        return [method(f"{share}; responses have them.")]
     if shift <= CORIOLIS_SHARE * result.scene.accuracy:
         return [method(f"{share}; they are left out of the responses.")]
     return [
         warning(
-            f"{share}, and are left out of the responses: resonances lie that much lower or "
-            "higher, and amplitudes may differ; 'bladefem modes --campbell' has both waves."
+            f"{share}, and are left out of the responses by operation.coriolis = false: resonances "
+            "lie that much lower or higher, and amplitudes may differ; 'bladefem modes --campbell' "
+            "has both waves."
         )
     ]
 

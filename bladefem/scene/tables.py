@@ -196,6 +196,11 @@ class Operation:
         choices=("linear", "nonlinear"),
         help="state that the modes vibrate about: first-order, or with large displacements",
     )
+    coriolis: bool | None = quantity(
+        None,
+        help="Coriolis forces in responses; auto: where they move the mode studied by more than a "
+        "tenth of the accuracy",
+    )
     damping: float = quantity(
         0.001, "1", 0.0, 0.5, "modal damping ratio of all modes without friction"
     )

@@ -21,7 +21,7 @@ from ..errors import InputError, NotSolvedError
 from ..friction.aft import evaluate
 from ..friction.law_table import select_elements
 from ..reduction.assemble import folded_diameter
-from ..util.arrays import ComplexArray, RealArray
+from ..util.arrays import ComplexArray, RealArray, RealOrComplex
 from .law_kernel import GHOST_POINTS, evaluate_law
 from .model import Wheel
 from .tuned import travelling_order
@@ -46,7 +46,7 @@ class Family:
     # (N,) nodal diameters 0..N-1: circular frequency [rad/s], viscous damping [1/s], loss term
     # [1/s^2], reading of the mode and its shape at the probe over that reading
     omega: RealArray
-    viscous: RealArray
+    viscous: RealOrComplex
     hysteretic: RealArray
     reading: RealArray
     probe: ComplexArray
@@ -155,8 +155,7 @@ def _mode_of(
     shape = shape / shape[blade[read]]
     viscous = np.broadcast_to(wheel.damping.viscous(body.omega), body.omega.shape)[number]
     if body.damping is not None:
-        own = body.damping if body.damping.ndim == 1 else np.diag(body.damping).real
-        viscous = viscous + own[number]
+        viscous = viscous + _own_damping(body, mirrored)[number]
     omega = body.omega[number]
     return {
         "number": np.array(number),
@@ -168,6 +167,14 @@ def _mode_of(
         "load": shape[everything[body.ports["load"]]],
         "probe": np.array(shape[everything[body.ports["probe"]][0]]),
     }
+
+
+def _own_damping(body: PortModel, mirrored: bool) -> np.ndarray:
+    """(m,) damping of each mode by itself [1/s]; imaginary where Coriolis forces move its wave."""
+    if body.damping is None:
+        return np.zeros(len(body.omega))
+    own = body.damping if body.damping.ndim == 1 else np.diag(body.damping)
+    return own.conj() if mirrored else own
 
 
 def _blade_motions(
@@ -199,7 +206,8 @@ def _everything_else(
 ) -> np.ndarray:
     """(m, m) flexibility at the contacts of all modes but one, and of the damper [m/N]."""
     rows = np.arange(len(body.residual))[body.ports["contact"]][wheel.rows]
-    Z = body.omega**2 - omega**2 + 1j * omega * wheel.damping.viscous(body.omega)
+    own = wheel.damping.viscous(body.omega) + _own_damping(body, mirrored)
+    Z = body.omega**2 - omega**2 + 1j * omega * own
     others = np.arange(len(Z)) != left_out
     shapes = body.shapes[rows][:, others]
     residual = body.residual[np.ix_(rows, rows)]

@@ -11,6 +11,7 @@ from ..data import PortModel, RigidBody
 from ..errors import InputError
 from ..hbm.linear.bodies import Damping
 from ..hbm.model import ReducedModel
+from ..hbm.sector_modes import real_form
 from ..reduction.assemble import join_bodies
 from .model import Pattern, Wheel, pattern_elements
 
@@ -42,7 +43,11 @@ def one_body_model(
     values, V = _mistuned_modes(pattern, omega, shapes, residual, rows["blade"])
     if values.min() < 0:
         raise InputError("pattern: deviations make a blade unstable, expected smaller ones")
-    C = (V.T * viscous) @ V
+    C = V.T @ viscous @ V
+    # Coriolis forces couple the modes of a pair whatever the scatter
+    whole = coupled_damping or any(
+        body.damping is not None and body.damping.ndim == 2 for body in wheel.sectors.values()
+    )
     order = np.concatenate([rows[name] for name in ("contact", "load", "probe")])
     ends = np.cumsum([0] + [len(rows[name]) for name in ("contact", "load", "probe")])
     ports = {
@@ -54,7 +59,7 @@ def one_body_model(
         shapes[order] @ V,
         residual[np.ix_(order, order)],
         ports,
-        damping=C if coupled_damping else np.diag(C).copy(),
+        damping=C if whole else np.diag(C).copy(),
     )
     return ReducedModel(
         (body,),
@@ -88,7 +93,9 @@ def _port_rows(wheel: Wheel) -> dict[str, np.ndarray]:
 
 
 def _real_modes(wheel: Wheel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Shapes (N P, N k), circular frequencies and damping (N k,) of the tuned wheel, real."""
+    """Shapes (N P, N k), circular frequencies (N k,) and damping (N k, N k) of the tuned wheel,
+    real.
+    """
     count = wheel.count
     columns = []
     omega = []
@@ -98,15 +105,13 @@ def _real_modes(wheel: Wheel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         wave = (turn[:, None, None] * body.shapes).reshape(-1, len(body.omega)) / np.sqrt(count)
         single = 2 * d % count == 0
         parts = [wave.real] if single else [np.sqrt(2) * wave.real, np.sqrt(2) * wave.imag]
-        damping = wheel.damping.viscous(body.omega)
+        damping = np.diag(np.broadcast_to(wheel.damping.viscous(body.omega), body.omega.shape))
         if body.damping is not None:
-            if body.damping.ndim == 2:
-                raise InputError("sectors: coupled modal damping, expected one number a mode")
-            damping = damping + body.damping
+            damping = damping + (np.diag(body.damping) if body.damping.ndim == 1 else body.damping)
         columns += parts
         omega += [body.omega] * len(parts)
-        viscous += [damping] * len(parts)
-    return np.hstack(columns), np.concatenate(omega), np.concatenate(viscous)
+        viscous.append(damping.real if single else real_form(damping))
+    return np.hstack(columns), np.concatenate(omega), linalg.block_diag(*viscous)
 
 
 def _real_residual(wheel: Wheel) -> np.ndarray:

@@ -207,6 +207,36 @@ def bar():
     )
 
 
+# about its axis [rad/s], and the modes that are coupled
+TURNING_SPEED = 800.0
+TURNING_MODES = 12
+
+
+def turning_bar():
+    """A nearly square bar along z, held at its foot, that turns about its axis."""
+    return box((2, 2, 4), (0.02, 0.021, 0.2), "tetra10", origin=(-0.01, -0.0105, 0.0))
+
+
+def turning_job(material):
+    """Its frequencies without and with Coriolis forces for CalculiX."""
+    mesh = turning_bar()
+    foot = {"foot": np.unique(mesh.faces["z0"])}
+    model = Model(mesh.points, [("tetra10", mesh.bodies["blade"])], foot, mesh.faces)
+    pull = ["*DLOAD", f"EALL, CENTRIF, {TURNING_SPEED**2:.12e}, 0., 0., 0., 0., 0., 1."]
+    return "\n".join(
+        [
+            *flat_deck(model, {}),
+            *["*BOUNDARY", "foot, 1, 3", "*MATERIAL, NAME=M", "*ELASTIC"],
+            *[f"{material.E:.6e}, {material.nu}", "*DENSITY", f"{material.rho:.6e}"],
+            "*SOLID SECTION, ELSET=EALL, MATERIAL=M",
+            *["*STEP", "*STATIC", *pull, "*END STEP"],
+            *["*STEP, PERTURBATION", "*FREQUENCY, STORAGE=YES", str(TURNING_MODES), "*END STEP"],
+            *["*STEP, PERTURBATION", "*COMPLEX FREQUENCY, CORIOLIS", str(TURNING_MODES)],
+            *[*pull, "*END STEP\n"],
+        ]
+    )
+
+
 # reference temperature [K], and rows of temperature [K]: E, nu, expansion, density
 REFERENCE = 293.15
 ROWS = {

@@ -48,12 +48,22 @@ def test_slender_blade_without_contraction():
 
 
 @pytest.mark.parametrize(
-    "shift, count, words", [(0.0, 0, ""), (1e-4, 1, "left out of"), (0.02, 1, "2 %.*--campbell")]
+    "shift, damping, count, words",
+    [
+        (0.0, None, 0, ""),
+        (1e-4, None, 1, "left out of"),
+        (0.02, None, 1, "2 %.*coriolis = false.*--campbell"),
+        (0.02, np.eye(2), 1, "2 %.*responses have them"),
+    ],
 )
-def test_what_is_said_of_coriolis_forces(shift, count, words):
-    """Nothing at rest, a note where they are small against the accuracy, else a warning."""
+def test_what_is_said_of_coriolis_forces(shift, damping, count, words):
+    """Nothing at rest, a note where they are small against the accuracy or counted, else a
+    warning.
+    """
     found = SimpleNamespace(
-        strength=SimpleNamespace(coriolis=shift, mode=1), scene=SimpleNamespace(accuracy=0.02)
+        strength=SimpleNamespace(coriolis=shift, mode=1),
+        scene=SimpleNamespace(accuracy=0.02),
+        reduced=SimpleNamespace(sector={0: SimpleNamespace(damping=damping)}),
     )
     said = _coriolis(found)
     assert len(said) == count and all(re.search(words, text) for text in said)

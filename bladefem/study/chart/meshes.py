@@ -31,6 +31,7 @@ from ..adaptive.choice import covered_band
 from ..adaptive.family import family_member
 from ..adaptive.settings import Settings
 from ..pipeline.case_models import EXACT_HARMONICS, family_of_case, load_cases
+from ..pipeline.coriolis import with_coriolis
 from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
 from ..pipeline.run_records import Seating
 from ..pipeline.stages import (
@@ -179,7 +180,7 @@ def _resonance(
         maps = seat_by_history(scene, rough, load).maps
     case = load_cases(scene, mesh, Seating(problem, {load: maps}))[0]
     diameters = harmonic_diameters(scene, mesh, EXACT_HARMONICS)
-    reduced = reduce_sector(bodies, patches, diameters, settings.modes)
+    reduced = with_coriolis(scene, reduce_sector(bodies, patches, diameters, settings.modes))
     model = family_member(family_of_case(scene, mesh, reduced, patches, case), settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, SEARCH_ACCURACY)
     top = peak_of(points)

@@ -17,11 +17,11 @@ import numpy as np
 from geometry.mesh import sector_of
 
 from ...data import ModeSet, Patch
-from ...hbm.model import Damping
 from ...util.arrays import ComplexArray
 from ...wheel.model import Pattern, Wheel
 from ...wheel.solve import WheelSolution, deviation_forces
 from ..pipeline.assemble_model import LoadCase
+from ..pipeline.coriolis import response_damping
 from ..pipeline.damped_motion import (
     MAX_FREQUENCY_RATIO,
     DampedMotion,
@@ -101,8 +101,8 @@ def blade_motion(
     count, H, _ = forces.shape
     fields = np.zeros((H, len(bodies.mesh.points), bodies.mesh.dimension), complex)
     factorised = lru_cache(maxsize=1)(bodies.factorised)
-    damping = Damping(ratio=bodies.scene.operation.damping)
-    for found in shapes.modes:
+    dampings = response_damping(bodies, shapes.modes)
+    for found, damping in zip(shapes.modes, dampings, strict=True):
         n = found.nodal_diameter or 0
         highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
         # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
@@ -119,8 +119,7 @@ def blade_motion(
         loads = ports.matrix @ np.where(mirrored, loads.conj(), loads)
         omega = np.array([(h + 1) * solution.omega for h, _ in waves])
         omega = omega * np.where(mirrored, -1.0, 1.0)
-        viscous = damping.viscous(2 * np.pi * found.frequencies)
-        u = forced_motion(factorised(n), found, loads, omega, viscous).displacement
+        u = forced_motion(factorised(n), found, loads, omega, damping).displacement
         u = np.where(mirrored, u.conj(), u)
         for k, (h, d) in enumerate(waves):
             fields[h] += u[..., k] * np.exp(2j * np.pi * d * blade / count) / count

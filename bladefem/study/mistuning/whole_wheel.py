@@ -21,6 +21,7 @@ from ..adaptive.family import coarsened_elements
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.contact_cycle import element_labels
+from ..pipeline.coriolis import with_coriolis
 from ..pipeline.stages import Bodies, Reduced, reduce_sector, with_damper_mass
 from .validate import read_orders
 
@@ -95,7 +96,7 @@ def whole_wheel(
     Mean displacements are held in the preload state: dampers that slip throughout drift each to a
     place of its own on nearly no force, which takes long to find and moves the vibration little.
     """
-    reduced = with_damper_mass(sector.reduced, case.mass)
+    reduced = with_coriolis(scene, with_damper_mass(sector.reduced, case.mass))
     count = reduced.sectors
     sides = tuple(
         pair_model(

@@ -17,7 +17,7 @@ import numpy as np
 import pandas as pd
 from scipy.linalg import eigh
 
-from geometry.mesh import Mesh, sector_of
+from geometry.mesh import sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -114,8 +114,7 @@ def campbell_table(
     """
     if len(speeds) < 2 or min(speeds) < 0 or not np.isfinite(speeds).all():
         raise InputError(f"speeds are {list(speeds)} rad/s, expected at least two, not negative")
-    from ...contact.seating import spin_axis
-    from ...fem.gyroscopic import coriolis
+    from ...contact.seating import counting_sense, spin_axis
 
     squares = np.linspace(0.0, max(speeds) ** 2, 3)
     at = [bodies.blade_at(float(np.sqrt(s))) for s in squares]
@@ -123,9 +122,11 @@ def campbell_table(
         _modes_at_speed(bodies, body, diameters, count + GUARD_MODES)
         for body in bodies.progress(at, "speeds")
     ]
-    G = coriolis(bodies.still_blade, spin_axis(bodies.mesh))
+    axis = spin_axis(bodies.mesh)
     rows = [
-        _frequency_lines(at, [s[i] for s in sets], squares, speeds, G, sense_of(bodies.mesh))
+        _frequency_lines(
+            at, [s[i] for s in sets], squares, speeds, axis, counting_sense(bodies.mesh)
+        )
         for i in range(len(sets[0]))
     ]
     return pd.concat(rows, ignore_index=True)
@@ -166,13 +167,6 @@ def read_speeds(text: str) -> list[float]:
     return out
 
 
-def sense_of(mesh: Mesh) -> int:
-    """+1 where sectors are counted in the sense of a positive rotation about z, else -1."""
-    if mesh.sector is None or not mesh.sector.count:
-        return 1
-    return 1 if mesh.sector.rotation[1, 0] >= 0 else -1
-
-
 def _modes_at_speed(
     bodies: Bodies,
     body: Body,
@@ -194,7 +188,7 @@ def _frequency_lines(
     sets: list[ModeSet],
     squares: np.ndarray,
     speeds: Sequence[float],
-    G: Any,
+    axis: tuple[float, float, float],
     sense: int,
 ) -> pd.DataFrame:
     """All speeds of one nodal diameter, in the space of the modes at three speeds; the guards are
@@ -202,7 +196,7 @@ def _frequency_lines(
     """
     count = len(sets[0].frequencies)
     shown = slice(0, count - GUARD_MODES)
-    K, M, g = _project_speeds(at, sets, G)
+    K, M, g = _project_speeds(at, sets, axis)
     outer = np.r_[0:count, 2 * count : 3 * count]
     frames = []
     for speed in speeds:
@@ -231,21 +225,17 @@ def _frequency_lines(
 def _project_speeds(
     at: list[Any],
     sets: list[ModeSet],
-    G: Any,
+    axis: tuple[float, float, float],
 ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     """Stiffness of each speed, mass and Coriolis matrix on the modes of all three."""
-    from ...fem.gyroscopic import own_rows
+    from ...fem.gyroscopic import own_rows, project_coriolis
     from ...fem.linalg import apply_block, inner_products
 
     comm = at[0].comm
     X = own_rows(at[0], np.concatenate([s.shapes for s in sets]))
     K = [_hermitian_part(inner_products(comm, X, apply_block(body.K, X))) for body in at]
-    g = inner_products(comm, X, apply_block(G, X))
-    return (
-        K,
-        _hermitian_part(inner_products(comm, X, apply_block(at[0].M, X))),
-        (g - g.conj().T) / 2,
-    )
+    M = _hermitian_part(inner_products(comm, X, apply_block(at[0].M, X)))
+    return K, M, project_coriolis(at[0], X, axis)
 
 
 def _lowest_frequencies(

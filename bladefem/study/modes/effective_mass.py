@@ -16,8 +16,8 @@ import pandas as pd
 
 from geometry.mesh import sector_of
 
+from ...contact.seating import counting_sense
 from ...data import ModeSet
-from .campbell import sense_of
 from .comparison import rigid_motion
 
 if TYPE_CHECKING:
@@ -72,7 +72,9 @@ def _mass_rows(
 
     points = body.mesh.points
     if direction == "x, y":
-        rigid = rigid_motion(points, "x") + 1j * sense_of(body.mesh) * rigid_motion(points, "y")
+        rigid = rigid_motion(points, "x") + 1j * counting_sense(body.mesh) * rigid_motion(
+            points, "y"
+        )
     else:
         rigid = rigid_motion(points, direction)
     inside = (body.rows >= 0)[:, None]

@@ -19,9 +19,11 @@ from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
+from ...hbm.linear_resonances import wave_frequencies
 from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
 from ...util.arrays import RealArray, RealOrComplex
+from ..pipeline.coriolis import coriolis_in_response
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies, is_wheel
 
@@ -46,6 +48,13 @@ class Forced:
     rest: RealOrComplex
     damping: Damping
     nodal_diameter: int | None
+    # (m, m) Coriolis forces [1/s], as the wave runs; None where they are left out
+    coriolis: RealOrComplex | None = None
+
+    @property
+    def waves(self) -> RealArray:
+        """(m,) circular frequencies at which the excited wave resonates without damping [rad/s]."""
+        return self.omega if self.coriolis is None else wave_frequencies(self.omega, self.coriolis)
 
 
 def excitation_load(bodies: Bodies) -> np.ndarray:
@@ -115,6 +124,7 @@ def linear_response(
     rest = _static_motion(flex, seen) - np.tensordot(modal / omega**2, found.shapes, 1)
     parts = (found.shapes, modal, rest)
     shapes, modal, rest = (np.conj(part) for part in parts) if mirrored else parts
+    coriolis = coriolis_in_response(bodies, found)
     return Forced(
         order,
         omega,
@@ -123,6 +133,7 @@ def linear_response(
         rest,
         damping or Damping(ratio=scene.operation.damping),
         n if is_wheel(mesh) else None,
+        coriolis.conj() if mirrored and coriolis is not None else coriolis,
     )
 
 
@@ -168,7 +179,7 @@ def find_linear_peak(
 
     if not 1 <= mode <= len(response.omega):
         raise InputError(f"mode is {mode}, expected 1 to {len(response.omega)}")
-    w = response.omega[mode - 1]
+    w = response.waves[mode - 1]
     width = np.clip(6 * half_widths(response)[mode - 1], 1e-6, 0.05)
     f = w / (2 * np.pi)
     best = minimize_scalar(
@@ -204,7 +215,10 @@ def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
 def _modal_amplitudes(response: Forced, frequency: float) -> np.ndarray:
     """(m,) modal amplitudes."""
     w = 2 * np.pi * frequency
-    return response.modal_load / (response.omega**2 - w**2 + _damping_terms(response, w))
+    single = response.omega**2 - w**2 + _damping_terms(response, w)
+    if response.coriolis is None:
+        return response.modal_load / single
+    return np.linalg.solve(np.diag(single) + 1j * w * response.coriolis, response.modal_load)
 
 
 def _damping_terms(response: Forced, w: float) -> np.ndarray:

@@ -86,7 +86,7 @@ def forced_response_answer(
     ports = blade_ports(bodies.mesh, [], excitation)
     vector = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     count = min(count, len(found.omega))
-    natural = found.omega[:count] / (2 * np.pi)
+    natural = found.waves[:count] / (2 * np.pi)
     best = np.array([find_linear_peak(found, vector, mode)[0] for mode in range(1, count + 1)])
     peaked = abs(best / natural - 1) < np.maximum(4 * half_widths(found)[:count], 1e-6)
     best = np.where(peaked, best, natural)
@@ -230,7 +230,7 @@ def _response_curve(
     count: int,
 ) -> pd.DataFrame:
     """Points over the band, close together at the resonances."""
-    f = found.omega[:count] / (2 * np.pi)
+    f = found.waves[:count] / (2 * np.pi)
     width = half_widths(found)[:count]
     near = (
         f

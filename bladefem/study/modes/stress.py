@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...contact.seating import spin_axis
 from ...data import ModeSet
 from ...util.arrays import RealArray
+from ..pipeline.coriolis import mode_shift
 from ..pipeline.ports import blade_ports
 from ..pipeline.stages import Bodies
 from .linear_response import static_offset
@@ -34,8 +34,7 @@ class Strength:
     steady_at: RealArray
     # (n_points,) of rotation and heat at the nodes, as signed von Mises stress [Pa]
     mean: RealArray
-    # by how much Coriolis forces, which responses leave out, move the frequency of the mode's
-    # waves; relative, 0 at rest
+    # by how much Coriolis forces move the frequency of the mode's waves; relative, 0 at rest
     coriolis: float
 
 
@@ -64,20 +63,8 @@ def mode_strength(bodies: Bodies, modes: ModeSet) -> Strength:
         steady, place = _worst_place(bodies, offset, heated=True)
         mean = signed_von_mises(nodal_stress(bodies.still_blade, offset, heated=True))
     return Strength(
-        excitation.mode, alternating, there, steady, place, mean, _coriolis_shift(bodies, modes)
+        excitation.mode, alternating, there, steady, place, mean, mode_shift(bodies, [modes])
     )
-
-
-def _coriolis_shift(bodies: Bodies, modes: ModeSet) -> float:
-    """Relative difference of the waves of the mode that the scene studies from its frequency."""
-    from ...fem.gyroscopic import coupling, wave_shifts
-
-    speed = bodies.scene.operation.speed
-    if not speed > 0:
-        return 0.0
-    g = coupling(bodies.still_blade, modes, axis=spin_axis(bodies.mesh))
-    shifts = wave_shifts(modes, g, speed)
-    return float(shifts[min(bodies.scene.excitation.mode, len(shifts)) - 1])
 
 
 def _worst_place(bodies: Bodies, u: np.ndarray, heated: bool = False) -> tuple[float, np.ndarray]:

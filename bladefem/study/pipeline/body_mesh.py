@@ -74,7 +74,7 @@ def softened_sector(reduced: Reduced, errors: ModeErrors) -> Reduced | None:
     error is as large as the stiffness.
     """
     model = reduced.sector.get(errors.diameter)
-    if model is None or model.damping is not None:
+    if model is None or (model.damping is not None and model.damping.ndim == 1):
         return None
     softer = _softened_model(model, errors)
     if softer is None:
@@ -106,7 +106,12 @@ def _softened_model(model: PortModel, errors: ModeErrors) -> PortModel | None:
     omega[:count] = np.sqrt(squares)
     shapes = model.shapes.copy()
     shapes[:, :count] = kept @ vectors
-    return replace(model, omega=omega, shapes=shapes)
+    damping = model.damping
+    if damping is not None:
+        turn = np.eye(len(omega), dtype=vectors.dtype)
+        turn[:count, :count] = vectors
+        damping = turn.conj().T @ damping @ turn
+    return replace(model, omega=omega, shapes=shapes, damping=damping)
 
 
 def frequency_ratio(

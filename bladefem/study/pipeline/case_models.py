@@ -25,6 +25,7 @@ from .assemble_model import LoadCase, joint_model
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
 from .changed_cases import seated_case
 from .contact_cycle import element_labels
+from .coriolis import with_coriolis
 from .liftoff import naming_the_load
 from .run_records import Seating
 from .stage_inputs import stage_key
@@ -139,7 +140,10 @@ def reduced_sector(
     while True:
         count = judged_modes(scene, settings)
         key = stage_key("reduction", scene, np.array(diameters), count)
-        reduced = keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count))
+        reduced = with_coriolis(
+            scene,
+            keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count)),
+        )
         if not settings.chosen:
             return settings, reduced
         family = family_of_case(scene, bodies.mesh, reduced, patches, case)

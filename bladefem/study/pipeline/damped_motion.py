@@ -18,7 +18,6 @@ from geometry.mesh import Mesh, sector_of
 from ...contact.patch import rigid_motions, rigid_ports
 from ...data import Elements, ModeSet, Patch, RigidBody
 from ...friction.fourier import to_complex
-from ...hbm.model import Damping
 from ...hbm.solution import Solution
 from ...reduction.assemble import folded_diameter
 from ...scene.support import area_springs, held_letters
@@ -26,6 +25,7 @@ from ...util.arrays import ComplexArray, RealArray
 from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .contact_cycle import element_labels
+from .coriolis import response_damping
 from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
@@ -100,10 +100,9 @@ def damped_motion(
     ports = blade_ports(mesh, list(patches), scene.excitation)
     loads = blade_loads(bodies, patches, case, solution, points)
     seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
-    damping = Damping(ratio=scene.operation.damping)
     waves = [_diameter(bodies, h) for h in range(1, solution.harmonics + 1)]
     fields = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
-    for found in modes:
+    for found, damping in zip(modes, response_damping(bodies, modes), strict=True):
         # harmonics of the same nodal diameter are solved together
         highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
         own = [
@@ -117,9 +116,8 @@ def damped_motion(
         flex = (factorised or bodies.factorised)(found.nodal_diameter or 0)
         # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
         omega = (np.array(own) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
-        viscous = damping.viscous(2 * np.pi * found.frequencies)
         seen_loads = np.where(mirrored, loads[own].conj().T, loads[own].T)
-        u = forced_motion(flex, found, seen_loads, omega, viscous).displacement
+        u = forced_motion(flex, found, seen_loads, omega, damping).displacement
         fields[own] = np.where(mirrored, u.conj(), u).transpose(2, 0, 1)
     probe = np.array([seen @ u.reshape(-1) for u in fields])
     known = solution.probe[1:, 0]

@@ -123,7 +123,7 @@ STAGE_INPUTS = {
     ),
     "damped motion": StageInputs(
         after=("contact", "reduction"),
-        fields=("operation", "excitation", "damper.axial"),
+        fields=("accuracy", "operation", "excitation", "damper.axial"),
         code=("bladefem.study",),
     ),
     # many drawn wheels under one load

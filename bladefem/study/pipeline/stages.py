@@ -13,7 +13,7 @@ from geometry.mesh import Mesh, sector_of
 
 from ...contact.interface_elements import pair_ratio, with_interface_law
 from ...contact.patch import make_patch, normal_ports, port_matrix
-from ...contact.seating import ContactProblem, spin_axis
+from ...contact.seating import ContactProblem, counting_sense, spin_axis
 from ...data import ModeSet, Patch, PortModel
 from ...errors import InputError, suggestion
 from ...io.stage_cache import on_root
@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from ...fem.constraint import Transformation
     from ...fem.eigensolver import Eigensolver
     from ...fem.flexibility import Flexibility
+    from ...fem.gyroscopic import Spin
     from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
@@ -217,7 +218,8 @@ def blade_dofs(mesh: Mesh) -> int:
 class Reduced:
     """Blade and damper seen from their ports, before they are joined for an engine order."""
 
-    # nodal diameter to the blade's side; key 0 alone for blades clamped at the root
+    # nodal diameter to the blade's side; key 0 alone for blades clamped at the root; its damping is
+    # that of the Coriolis forces, which do no work
     sector: dict[int, PortModel]
     # floating: rigid modes have omega = 0
     damper: PortModel
@@ -227,6 +229,16 @@ class Reduced:
     sectors: int
     # of the damper [kg]
     mass: float
+
+
+def rotation_of(bodies: Bodies) -> Spin:
+    """The frame of the bodies as it turns: in the sense in which the sectors are counted, so that
+    a blade meets a load at rest in space later than the next one does.
+    """
+    from ...fem.gyroscopic import Spin
+
+    speed = counting_sense(bodies.mesh) * bodies.scene.operation.speed
+    return Spin(spin_axis(bodies.mesh), speed)
 
 
 def with_damper_mass(reduced: Reduced, mass: float | None) -> Reduced:
@@ -483,7 +495,14 @@ def reduce_sector(
         def blade_model(some: Bodies) -> PortModel:
             flex = some.factorised(0)
             return port_model(
-                flex.con, ports.matrix, ports.names, modes, kind=kind, flex=flex, solver=solver
+                flex.con,
+                ports.matrix,
+                ports.names,
+                modes,
+                kind=kind,
+                flex=flex,
+                solver=solver,
+                spin=rotation_of(some),
             )
 
         sector = {0: on_one_rank(bodies, blade_model)}
@@ -531,6 +550,7 @@ def _reduced_diameters(
             kind=scene.model.reduction,
             solver=solver,
             kept=some_bodies.kept.pop(KEPT_MODES, None),
+            spin=rotation_of(some_bodies),
         )
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
 
