@@ -32,14 +32,16 @@ def elements(count, kn, n0=0.6, mu=0.4):
     return Elements(kt, np.full(count, kn), np.full(count, mu), np.full(count, n0), tangents=1)
 
 
-def sector_bodies():
-    """Nodal diameter to the sector's model, damped by its modes."""
+def sector_bodies(C=None):
+    """Nodal diameter to the sector's model, damped by its modes, or also by the matrix of a blade
+    with its disc.
+    """
     bodies = {}
     for n in range(N // 2 + 1):
         turn = np.exp(2j * np.pi * n / N)
         K = OWN + turn * LINK + turn.conj() * LINK.T
         K = K.real if 2 * n % N == 0 else K
-        bodies[n] = port_model_from_matrices(MASS, K, PORTS, nodal_diameter=n)
+        bodies[n] = port_model_from_matrices(MASS, K, PORTS, C=C, nodal_diameter=n)
     return bodies
 
 
@@ -48,10 +50,10 @@ def forces(amplitudes):
     return {h: engine_order(N, h * EO, np.array([f])) for h, f in amplitudes.items()}
 
 
-def ring_wheel(own, damper, excitation, damping=DAMPING, **others):
+def ring_wheel(own, damper, excitation, damping=DAMPING, C=None, **others):
     """The wheel by nodal diameters."""
     return tuned_wheel(
-        N, sector_bodies(), slice(2, 4), own, excitation, damping=damping, damper=damper, **others
+        N, sector_bodies(C), slice(2, 4), own, excitation, damping=damping, damper=damper, **others
     )
 
 

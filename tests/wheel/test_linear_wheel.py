@@ -6,9 +6,11 @@ from rings import BLADE, EO, LINK, LOAD, MASS, OWN, PROBE, N, elements, forces, 
 from scipy import linalg
 
 from bladefem.errors import InputError
+from bladefem.hbm.linear.bodies import port_receptance
 from bladefem.hbm.model import Damping
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.model import Pattern, engine_order, frequency_pattern
+from bladefem.wheel.one_body import one_body_model
 from bladefem.wheel.solve import free_wheel, solve_wheel
 
 
@@ -35,6 +37,33 @@ def test_free_wheel_is_the_dense_ring():
             F = np.kron(np.eye(N), LOAD.T) @ engine_order(N, h * EO, np.array([force]))[:, 0]
             expected = np.kron(np.eye(N), PROBE) @ np.linalg.solve(K - w**2 * M + 1j * w * C, F)
             np.testing.assert_allclose(found[:, h, 0], expected, atol=1e-12 * abs(expected).max())
+
+
+def test_free_wheel_with_coriolis_forces_is_the_dense_ring():
+    """A skew matrix of each blade with its disc; by nodal diameters, and as one real body."""
+    G = np.array([[0.0, -0.5, 0.1], [0.5, 0.0, 0.3], [-0.1, -0.3, 0.0]])
+    dK = np.random.default_rng(3).normal(size=(N, 2, 2))
+    dK = dK + dK.swapaxes(1, 2)
+    damping = Damping(mass=0.01)
+    wheel = ring_wheel(elements(2, 0.0), None, forces({1: 1.0}), damping, G)
+    pattern = Pattern(dK, np.zeros_like(dK))
+    body = one_body_model(wheel, pattern).sides[0]
+    following = np.roll(np.eye(N), 1, axis=1)
+    K = np.kron(np.eye(N), OWN) + np.kron(following, LINK) + np.kron(following.T, LINK.T)
+    M = np.kron(np.eye(N), MASS)
+    C = 0.01 * M + np.kron(np.eye(N), G)
+    for b in range(N):
+        part = slice(3 * b, 3 * b + 3)
+        K[part, part] += BLADE.T @ dK[b] @ BLADE
+    F = np.kron(np.eye(N), LOAD.T)
+    force = engine_order(N, EO, np.array([1.0]))[:, 0]
+    for w in (0.7, 2.1, 2.9):
+        dense = np.kron(np.eye(N), PROBE) @ np.linalg.solve(K - w**2 * M + 1j * w * C, F @ force)
+        found = free_wheel(wheel, w, 1, pattern)[:, 1, 0]
+        np.testing.assert_allclose(found, dense, atol=1e-12 * abs(dense).max())
+        rows = [np.arange(len(body.residual))[body.ports[name]] for name in ("probe", "load")]
+        seen = port_receptance(body, Damping(), w, *rows) @ force
+        np.testing.assert_allclose(seen, dense, atol=1e-10 * abs(dense).max())
 
 
 def test_frequency_deviations_move_blade_alone_frequencies():
