@@ -92,6 +92,33 @@ def heated(kind: str, folder: Path) -> dict[str, object]:
     return out
 
 
+def heated_crystal(folder: Path) -> dict[str, object]:
+    """Largest displacement [m] and frequencies [Hz] of a bar that expands along its crystal's
+    axes.
+    """
+    import decks
+
+    from bladefem.fem.temperature import crystal_rotation
+
+    given = decks.CRYSTALS["orthotropic"]
+    _, m = decks.bar()
+    hot = decks.temperature(m.points)
+    axes = crystal_rotation(given["angles"])
+    job = decks.heated_crystal_job(m, given["orthotropic"], axes, given["rho"], hot, COUNT)
+    (folder / "job.inp").write_text(job)
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    subprocess.run(
+        ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+    )
+    static, _, vibration = (folder / "job.dat").read_text().partition("E I G E N V A L U E")
+    rows = [line.split() for line in static.splitlines()]
+    moved = [[float(v) for v in row[1:]] for row in rows if len(row) == 4 and row[0].isdigit()]
+    lines = [line.split() for line in vibration.splitlines()]
+    found = [float(row[3]) for row in lines if len(row) == 5 and row[0].isdigit()]
+    last = max(moved, key=lambda u: sum(v * v for v in u))
+    return {"largest": last, "frequencies": found[:COUNT]}
+
+
 def turning(folder: Path) -> dict[str, list[float]]:
     """Frequencies [Hz] of a bar that turns about its axis, without and with Coriolis forces."""
     import decks
@@ -126,6 +153,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         out = {case: reference(*how, Path(name)) for case, how in cases.items()}
         out["crystals"] = {kind: crystal(kind, Path(name)) for kind in ("cubic", "orthotropic")}
+        out["heated_crystal"] = heated_crystal(Path(name))
         out["turning"] = turning(Path(name))
         out["heated"] = {kind: heated(kind, Path(name)) for kind in ("uniform", "field")}
     GOLDEN.write_text(json.dumps(out, indent=1) + "\n")

@@ -23,6 +23,7 @@ from .compat import ufl
 from .temperature import (
     Temperatures,
     cell_temperatures,
+    crystal_rotation,
     evaluate_materials,
     form_coefficient,
     material_numbers,
@@ -71,18 +72,6 @@ def stiffness(material: Material, temperature: np.ndarray | None = None) -> np.n
             "give off energy), expected smaller Poisson's ratios"
         )
     return _turn_stiffness(np.linalg.inv(flexibility), crystal_rotation(material.angles))
-
-
-def crystal_rotation(angles: tuple[float, float, float]) -> np.ndarray:
-    """(3, 3) whose columns are the crystal's axes in the blade's axes."""
-    total = np.eye(3)
-    for axis, angle in enumerate(angles):
-        a, b = (axis + 1) % 3, (axis + 2) % 3
-        turn = np.eye(3)
-        turn[a, a] = turn[b, b] = np.cos(angle)
-        turn[a, b], turn[b, a] = -np.sin(angle), np.sin(angle)
-        total = total @ turn
-    return total
 
 
 def elastic_law(

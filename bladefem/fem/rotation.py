@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, NotSolvedError
+from ..scene.material_table import expands_by_axes
 from ..util.newton import Outcome, StepError, iterate_newton
 from . import shape_functions as shape
 from .body import Body, body_properties, cells_of, degrees
@@ -37,6 +38,7 @@ from .temperature import (
     form_coefficient,
     material_numbers,
     strain_at,
+    strain_tensor_at,
 )
 
 AXIS = (0.0, 0.0, 1.0)
@@ -114,7 +116,7 @@ def thermal_force(body: Body, quadrature: str = "exact") -> np.ndarray:
     stress, _, depth = body_properties(body, degree)
     v = ufl.TestFunction(body.space)
     measure = ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": degree[0]})
-    hot = stress(_thermal_strain(body, degree[0]) * ufl.Identity(body.dim))
+    hot = stress(_thermal_strain(body, degree[0]))
     form = compile_form(depth * ufl.inner(hot, ufl.sym(ufl.grad(v))) * measure)
     return _in_mesh_numbering(body, assemble_vector(form).array).ravel()
 
@@ -144,19 +146,34 @@ def _static_displacement(flex: Flexibility, load: np.ndarray, reason: str) -> np
 
 
 def _thermal_strain(body: Body, degree: int) -> Any:
-    """Thermal strain [1] at the quadrature points of a degree, as a function of forms; 0 without
-    temperatures.
+    """(dim, dim) thermal strain [1] at the quadrature points of a degree, as a function of forms; 0
+    without temperatures.
     """
     domain = body.space.mesh
     heat = body.heat
     temperature = cell_temperatures(body.mesh, body.material, domain, heat, degree)
     if heat is None or temperature is None or not heat.strains:
-        return dolfinx.fem.Constant(domain, 0.0)
+        return dolfinx.fem.Constant(domain, 0.0) * ufl.Identity(body.dim)
     owner = material_numbers(body.mesh, body.material, domain)
-    values = evaluate_materials(
-        body.material, owner, temperature, lambda m, t: strain_at(m, heat, np.asarray(t))
+    if not any(expands_by_axes(material) for material in body.material.values()):
+        values = evaluate_materials(
+            body.material, owner, temperature, lambda m, t: strain_at(m, heat, np.asarray(t))
+        )
+        return form_coefficient(domain, values, degree) * ufl.Identity(body.dim)
+    tensors = evaluate_materials(
+        body.material,
+        owner,
+        temperature,
+        lambda m, t: strain_tensor_at(m, heat, np.asarray(t), body.dim),
     )
-    return form_coefficient(domain, values, degree)
+    axes = range(body.dim)
+    parts = {
+        (i, j): form_coefficient(domain, tensors[..., i, j], degree)
+        for i in axes
+        for j in axes
+        if i <= j
+    }
+    return ufl.as_tensor([[parts[min(i, j), max(i, j)] for j in axes] for i in axes])
 
 
 def linear_tangent(
@@ -424,9 +441,9 @@ def _potential_forms(
     heating = dolfinx.fem.Constant(domain, 0.0)
     # F^T F - 1 would cancel small strains
     E = ufl.sym(ufl.grad(u)) + ufl.grad(u).T * ufl.grad(u) / 2
-    # of free expansion: ((1 + strain)^2 - 1) / 2
+    # of free expansion: ((1 + strain)^2 - 1) / 2, of symmetric matrices
     free = heating * _thermal_strain(body, degree[0])
-    E = E - (free + free**2 / 2) * ufl.Identity(body.dim)
+    E = E - (free + free * free / 2)
     place = _across_axis(body, axis) * (ufl.SpatialCoordinate(domain) + u)
     elastic, inertial = _integral_measures(body, degree)
     potential = (

@@ -15,7 +15,7 @@ from ..errors import InputError
 from . import shape_functions as shape
 from .body import Body
 from .elasticity import lame_parameters, stress_of
-from .temperature import point_temperatures, strain_at
+from .temperature import point_temperatures, strain_tensor_at
 
 VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
@@ -252,8 +252,9 @@ def _of_cells(
         strain = strain + slope.swapaxes(2, 3) @ slope / 2
     temperature = point_temperatures(body.heat, cells, values)
     if heated and body.heat is not None and temperature is not None:
-        thermal = strain_at(body.material[name], body.heat, temperature)
-        strain = strain - thermal[..., None, None] * np.eye(d)
+        thermal = strain_tensor_at(body.material[name], body.heat, temperature, d)
+        # Green's strain of free expansion, as in the nonlinear preload
+        strain = strain - (thermal + thermal @ thermal / 2 if large else thermal)
     stress = stress_of(body.material[name], strain, body.plane, temperature)
     across = None
     if d == 2 and body.plane == "strain":

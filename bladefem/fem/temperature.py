@@ -16,7 +16,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ..errors import InputError
-from ..scene.material_table import property_at
+from ..scene.material_table import expands_by_axes, property_at
 from ..scene.tables import Material
 from ..util.arrays import IntegerArray, RealArray
 from . import shape_functions as shape
@@ -41,6 +41,18 @@ class Temperatures:
     def strains(self) -> bool:
         """Some node is not at reference temperature."""
         return bool((self.nodal != self.reference).any())
+
+
+def crystal_rotation(angles: tuple[float, float, float]) -> RealArray:
+    """(3, 3) whose columns are the crystal's axes in the blade's axes."""
+    total = np.eye(3)
+    for axis, angle in enumerate(angles):
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        turn = np.eye(3)
+        turn[a, a] = turn[b, b] = np.cos(angle)
+        turn[a, b], turn[b, a] = -np.sin(angle), np.sin(angle)
+        total = total @ turn
+    return total
 
 
 def material_numbers(
@@ -132,7 +144,7 @@ def strain_at(
     heat: Temperatures,
     temperature: RealArray,
 ) -> RealArray:
-    """Thermal strain [1] at temperatures (...) [K].
+    """(...) thermal strain [1], the same in all directions, at temperatures (...) [K].
 
     Raises:
         InputError: the material's expansion is not known.
@@ -142,3 +154,27 @@ def strain_at(
         raise InputError("material: its expansion is missing, expected it with a temperature")
     strain = expansion * (temperature - heat.reference)
     return np.broadcast_to(strain, temperature.shape)
+
+
+def strain_tensor_at(
+    material: Material,
+    heat: Temperatures,
+    temperature: RealArray,
+    dim: int,
+) -> RealArray:
+    """(..., dim, dim) thermal strain [1] in the blade's axes at temperatures (...) [K].
+
+    Raises:
+        InputError: the material's expansion is not known, or that of axes in a plane mesh.
+    """
+    temperature = np.asarray(temperature)
+    if not expands_by_axes(material):
+        return strain_at(material, heat, temperature)[..., None, None] * np.eye(dim)
+    if dim == 2:
+        raise InputError(
+            "material.expansion_axes: a plane mesh has no axes of a crystal, expected expansion"
+        )
+    axes = crystal_rotation(material.angles)
+    own = property_at(material, "expansion_axes", temperature)
+    own = own * (temperature - heat.reference)[..., None]
+    return np.asarray((axes * own[..., None, :]) @ axes.T)

@@ -21,7 +21,7 @@ from .temperature_file import read_temperatures
 from .units import parse
 
 # properties that a row may give
-ROW_PROPERTIES = ("E", "nu", "rho", "G", "expansion", "orthotropic")
+ROW_PROPERTIES = ("E", "nu", "rho", "G", "expansion", "expansion_axes", "orthotropic")
 # of the range of a table: temperatures that much outside are rounding
 ROUNDING = 1e-9
 
@@ -32,13 +32,14 @@ class PropertyTable:
 
     # (k,) [K], rising
     temperatures: RealArray
-    # property to (k,) values, (k, 9) of "orthotropic" [SI]
+    # property to (k,) values, (k, 9) of "orthotropic" and (k, 3) of "expansion_axes" [SI]
     values: dict[str, RealArray]
 
 
 def property_at(material: Material, name: str, temperature: RealArray | None) -> RealArray:
-    """A property at temperatures (...) [K]: (...) values, (..., 9) of "orthotropic"; the
-    material's own constant without a temperature, or where its table has no such column.
+    """A property at temperatures (...) [K]: (...) values, (..., 9) of "orthotropic" and (..., 3) of
+    "expansion_axes"; the material's own constant without a temperature, or where its table has no
+    such column.
 
     Raises:
         InputError: a temperature outside the table.
@@ -65,8 +66,9 @@ def material_at(material: Material, temperature: float) -> Material:
     found: dict[str, Any] = {
         name: property_at(material, name, at).tolist() for name in property_table(material).values
     }
-    if "orthotropic" in found:
-        found["orthotropic"] = tuple(found["orthotropic"])
+    for name in ("orthotropic", "expansion_axes"):
+        if name in found:
+            found[name] = tuple(found[name])
     return replace(material, table=None, **found)
 
 
@@ -155,9 +157,20 @@ def operating_materials(scene: Scene) -> tuple[Material, Material]:
 
 def expands(material: Material) -> bool:
     """The thermal expansion of a material is known."""
-    if material.expansion is not None:
-        return True
-    return material.table is not None and "expansion" in property_table(material).values
+    return (
+        material.expansion is not None
+        or expands_by_axes(material)
+        or _has_row(material, "expansion")
+    )
+
+
+def expands_by_axes(material: Material) -> bool:
+    """The thermal expansion of a material is that of its axes."""
+    return material.expansion_axes is not None or _has_row(material, "expansion_axes")
+
+
+def _has_row(material: Material, name: str) -> bool:
+    return material.table is not None and name in property_table(material).values
 
 
 def _inside(table: PropertyTable, temperature: RealArray) -> RealArray:

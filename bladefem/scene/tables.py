@@ -61,6 +61,13 @@ class Material:
         "thermal expansion, mean coefficient from temperature.reference; needed where the "
         "temperature is another one",
     )
+    expansion_axes: tuple[float, float, float] | None = quantity(
+        None,
+        "1/K",
+        -1e-4,
+        1e-3,
+        "thermal expansion along the three axes of the crystal, in place of expansion",
+    )
     table: tuple[str, ...] | None = quantity(
         None,
         help="rows of properties over temperature, such as '600 degC: E=180 GPa; nu=0.31; "

@@ -196,6 +196,32 @@ def crystal_job(m, constants, axes, rho, count):
     )
 
 
+# thermal expansion along the axes of the orthotropic crystal [1/K]
+EXPANSIONS = (1.6e-5, 0.9e-5, -0.4e-5)
+
+
+def heated_crystal_job(m, constants, axes, rho, hot, count):
+    """The bar of the orthotropic solid for CalculiX, unevenly heated, which expands along its axes;
+    then its modes about that state.
+    """
+    lines = crystal_job(m, constants, axes, rho, count).splitlines()
+    step = lines.index("*STEP")
+    spread = [f"*EXPANSION, TYPE=ORTHO, ZERO={REFERENCE}", ", ".join(map(str, EXPANSIONS))]
+    density = lines.index("*DENSITY")
+    return "\n".join(
+        [
+            *lines[:density],
+            *spread,
+            *lines[density:step],
+            *["*INITIAL CONDITIONS, TYPE=TEMPERATURE", f"NALL, {REFERENCE}"],
+            *["*STEP", "*STATIC", "*TEMPERATURE"],
+            *[f"{i}, {T:.12e}" for i, T in enumerate(hot, 1)],
+            *["*NODE PRINT, NSET=NALL", "U", "*END STEP"],
+            *["*STEP, PERTURBATION", "*FREQUENCY", str(count), "*END STEP\n"],
+        ]
+    )
+
+
 def bar():
     """A clamped bar of 10-node tetrahedra, its mesh and its model."""
     mesh = box((8, 2, 2), (0.12, 0.03, 0.02), "tetra10")

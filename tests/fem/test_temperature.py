@@ -12,6 +12,7 @@ import pytest
 from structured import box, sector, wheel
 
 from bladefem.errors import InputError, NotSolvedError
+from bladefem.fem import rotation
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, in_step
@@ -26,11 +27,12 @@ from bladefem.fem.rotation import (
     thermal_displacement,
 )
 from bladefem.fem.stress import gauss_stress, von_mises
-from bladefem.fem.temperature import Temperatures
+from bladefem.fem.temperature import Temperatures, crystal_rotation
 from bladefem.fem.temperature_field import interpolate_temperatures
 from bladefem.scene.tables import Material
 
-GOLDEN = json.loads((Path(__file__).parent / "ccx_decks.json").read_text())["heated"]
+DECKS = json.loads((Path(__file__).parent / "ccx_decks.json").read_text())
+GOLDEN = DECKS["heated"]
 COLD = 300.0
 STEEL = Material(E=2e11, nu=0.0, rho=8000.0, expansion=1.2e-5)
 
@@ -227,6 +229,78 @@ def test_cut_faces_are_equally_hot():
     interpolate_temperatures(mesh, mesh.points, 300 + 100 * radius)
     with pytest.raises(InputError, match="cut faces.* differ"):
         interpolate_temperatures(mesh, mesh.points, 300 + 100 * angle)
+
+
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize("table", [False, True])
+def test_a_free_crystal_expands_along_its_axes(large, table):
+    """Evenly heated it takes the shape R (1 + a dT) R^T x and stays free of stress, also after large
+    displacements.
+    """
+    spread = (2e-4 if large else 2e-5) * np.array([1.0, 0.4, -0.3])
+    angles = (0.3, -0.5, 0.9)
+    mesh = box((2, 2, 1), (0.1, 0.06, 0.05), "tetra10")
+    corner = np.flatnonzero(np.linalg.norm(mesh.points, axis=1) < 1e-9)
+    material = Material(E=1.28e11, nu=0.38, G=1.3e11, angles=angles, expansion_axes=tuple(spread))
+    if table:
+        text = ", ".join(f"{a} 1/K" for a in spread)
+        rows = (f"290 K: expansion_axes={text}", f"900 K: expansion_axes={text}")
+        material = replace(material, expansion_axes=None, table=rows)
+    heat = Temperatures(np.full(len(mesh.points), COLD + 250.0), COLD)
+    body = assemble(mesh, "blade", material, heat=heat)
+    axes = crystal_rotation(angles)
+    exact = mesh.points @ (axes * (250.0 * spread)) @ axes.T
+    stress = gauss_stress(body, exact, large=large, heated=True).stress
+    assert abs(stress).max() < 1e-9 * material.E * abs(spread).max() * 250.0
+    if large:
+        # the residual of the nonlinear balance is zero in that shape
+        force = unbalanced_force(body, exact)
+        cold = unbalanced_force(body, np.zeros_like(exact))
+        assert abs(force).max() < 1e-9 * abs(cold).max()
+    else:
+        con = constrain(replace(body, hold=""), None)
+        moved = thermal_displacement(flexible(con))
+        strain = (moved - moved[corner]) - (exact - exact[corner])
+        turned, *_ = np.linalg.lstsq(rigid(mesh.points), strain.ravel(), rcond=None)
+        left = strain.ravel() - rigid(mesh.points) @ turned
+        assert abs(left).max() < 1e-8 * abs(exact).max()
+
+
+def unbalanced_force(body, u):
+    """(n_points*dim,) of the whole heat, at rest."""
+    forms = rotation._potential_forms(body, (0.0, 0.0, 1.0), "exact")
+    forms.heating.value = 1.0
+    return rotation._unbalanced_force(body, forms, u, 0.0)
+
+
+def rigid(points):
+    """(n_points*3, 6) rigid motions."""
+    columns = [np.tile(np.eye(3)[i], len(points)) for i in range(3)]
+    columns += [np.cross(np.eye(3)[i], points).ravel() for i in range(3)]
+    return np.stack(columns, axis=1)
+
+
+def test_an_unevenly_heated_crystal_is_that_of_calculix():
+    """Expansion along the axes of an orthotropic solid: static displacement and modes about it."""
+    mesh, m = decks.bar()
+    given = decks.CRYSTALS["orthotropic"]
+    material = Material(**given, expansion_axes=decks.EXPANSIONS)
+    heat = Temperatures(decks.temperature(m.points), decks.REFERENCE)
+    body = assemble(mesh, "blade", material, quadrature="ccx", heat=heat)
+    moved = thermal_displacement(flexible(constrain(body)), quadrature="ccx")
+    size = np.linalg.norm(moved, axis=1)
+    golden = DECKS["heated_crystal"]
+    np.testing.assert_allclose(moved[size.argmax()], golden["largest"], atol=2e-6 * size.max())
+    K = linear_tangent(body, moved, 0.0, quadrature="ccx")
+    ours = modes(constrain(replace(body, K=K)), 6).frequencies
+    np.testing.assert_allclose(ours, golden["frequencies"], rtol=1e-6)
+
+
+def test_crystal_axes_need_a_solid():
+    flat = box((1, 1), (0.1, 0.06), "triangle6")
+    body = assemble(flat, "blade", Material(expansion_axes=(1e-5,) * 3), heat=uniform(flat, 800.0))
+    with pytest.raises(InputError, match="expansion_axes: a plane mesh"):
+        thermal_displacement(flexible(constrain(body)))
 
 
 def test_missing_expansion():
