@@ -352,7 +352,14 @@ def _raw_mesh(root: _Scope) -> RawMesh:
         sets | _node_surfaces(root, sets, place),
         {name: _surface_facets(root, lines, place) for name, lines in root.surfaces.items()},
         notes,
+        _node_numbers(root),
     )
+
+
+def _node_numbers(root: _Scope) -> np.ndarray | None:
+    """(n,) numbers of the nodes; None where two instances have nodes of one number."""
+    numbers = np.array([number for _, number in root.nodes], dtype=int)
+    return numbers if len(np.unique(numbers)) == len(numbers) else None
 
 
 def _node_surfaces(

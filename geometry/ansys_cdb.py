@@ -76,6 +76,7 @@ def read_cdb(file: Path) -> RawMesh:
         _element_components(archive, where),
         _node_components(archive, place),
         notes=notes,
+        numbers=np.asarray(archive.nnum, dtype=int),
     )
 
 

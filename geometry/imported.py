@@ -28,7 +28,7 @@ from .finalise_mesh import Motion
 from .jacobian import straight_jacobian
 from .joined_files import joined_files
 from .matching import match_faces, snap_slaves
-from .mesh import Mesh, Pair, Sector
+from .mesh import Mesh, Pair, Sector, padded_numbers
 from .named_facets import named_facets
 from .numbered_faces import face_corners, numbered_faces
 from .parameters import MeshSize, Wedge
@@ -236,6 +236,7 @@ def _split_bodies(
         solids.cell_type,
         {n: _positive_cells(solids.points, c, solids.cell_type, source) for n, c in bodies.items()},
         parts=parts,
+        numbers=padded_numbers(raw.numbers, len(solids.points)),
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from bladefem.errors import InputError
 
+from .mesh import padded_numbers
 from .raw_mesh import RawMesh, read_raw
 from .topology import DIMENSION, FAMILY
 
@@ -49,7 +50,9 @@ def _as_body(raw: RawMesh, body: str) -> RawMesh:
 
 
 def _join_meshes(one: RawMesh, other: RawMesh) -> RawMesh:
-    """Nodes and cells of both; nothing is merged, bodies stay apart."""
+    """Nodes and cells of both; nothing is merged, bodies stay apart. Numbers of nodes are those of
+    the first.
+    """
     nodes = len(one.points)
     count = len(one.blocks)
     groups = {name: list(parts) for name, parts in one.groups.items()}
@@ -68,4 +71,5 @@ def _join_meshes(one: RawMesh, other: RawMesh) -> RawMesh:
         sets,
         surfaces,
         (*one.notes, *other.notes),
+        padded_numbers(one.numbers, nodes + len(other.points)),
     )

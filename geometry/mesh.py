@@ -5,8 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from bladefem.errors import InputError
 from bladefem.util.arrays import IntegerArray, RealArray
+
+# of a node that a user's file does not have
+NO_NUMBER = -1
 
 
 @dataclass(frozen=True)
@@ -71,6 +76,8 @@ class Mesh:
     report: dict[str, Any] = field(default_factory=dict)
     # named volumes of the blade -> rows of bodies["blade"]
     parts: dict[str, IntegerArray] = field(default_factory=dict)
+    # (n,) numbers of the nodes in the user's file, NO_NUMBER of added ones; None without such
+    numbers: IntegerArray | None = None
 
     def __repr__(self) -> str:
         bodies = ", ".join(f"{name} {len(cells)} cells" for name, cells in self.bodies.items())
@@ -83,6 +90,13 @@ class Mesh:
     def dimension(self) -> int:
         """2 for plane meshes, 3 for solids."""
         return 2 if self.cell_type.startswith(("triangle", "quad")) else 3
+
+
+def padded_numbers(numbers: IntegerArray | None, count: int) -> IntegerArray | None:
+    """(count,) numbers of nodes of which the last have none."""
+    if numbers is None:
+        return None
+    return np.concatenate([numbers, np.full(count - len(numbers), NO_NUMBER)])
 
 
 def sector_of(mesh: Mesh) -> Sector:

@@ -59,6 +59,8 @@ class RawMesh:
     surfaces: dict[str, list[np.ndarray]] = field(default_factory=dict)
     # what the file holds and was left out, one sentence each
     notes: tuple[str, ...] = ()
+    # (n,) numbers of the points in the file; None where its reader does not know them
+    numbers: np.ndarray | None = None
 
 
 def read_raw(file: Path) -> RawMesh:
@@ -145,7 +147,7 @@ def from_gmsh_model(gmsh: ModuleType) -> RawMesh:
             for b in of_entity.get((dim, int(e)), [])
         ]
         groups[name] = [(b, np.arange(len(blocks[b][1]))) for b in parts]
-    return RawMesh(xyz.reshape(-1, 3), blocks, groups, sets)
+    return RawMesh(xyz.reshape(-1, 3), blocks, groups, sets, numbers=tags.astype(int))
 
 
 def read_by_meshio(file: Path) -> RawMesh:

@@ -72,6 +72,8 @@ def refine_uniformly(mesh: Mesh) -> Mesh:
     refined = replace(
         mesh,
         points=points,
+        # most nodes are new ones
+        numbers=None,
         bodies=dict(zip(mesh.bodies, np.split(new_cells, ends), strict=True)),
         faces={name: facets(some) for name, some in mesh.faces.items()},
         nodes={

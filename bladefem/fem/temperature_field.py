@@ -9,7 +9,9 @@ from scipy.spatial import QhullError
 from geometry.mesh import Mesh
 
 from ..errors import InputError
-from ..util.arrays import RealArray
+from ..scene.temperature_file import GivenTemperatures
+from ..util.arrays import IntegerArray, RealArray
+from . import shape_functions as shape
 
 # a node outside of the given places takes the nearest one's temperature up to this distance, as a
 # share of the mesh's size
@@ -18,6 +20,82 @@ MAX_DISTANCE = 0.05
 MAX_EXTENT = 50.0
 # difference of the two cut faces, of the range of temperatures
 MAX_CUT_DIFFERENCE = 0.05
+
+
+def mesh_temperatures(mesh: Mesh, given: GivenTemperatures) -> RealArray:
+    """(n_points,) temperatures [K] from those of places, or of nodes of the user's own mesh.
+
+    Nodes that no temperature is given for, such as those in the middle of edges, take what lies
+    between the others of their cells.
+
+    Raises:
+        InputError: as `interpolate_temperatures`, a number that the mesh does not have, nodes
+            without temperature, or a mesh without numbers.
+    """
+    if given.places is not None:
+        return interpolate_temperatures(mesh, given.places, given.values)
+    nodes = np.asarray(given.nodes)
+    if mesh.numbers is None:
+        raise InputError(
+            "temperature.file: it gives temperatures of nodes, but the mesh file's numbers are not "
+            "known (its reader drops them, instances repeat them, or the mesh was refined), "
+            "expected places x, y, z"
+        )
+    order = np.argsort(mesh.numbers, kind="stable")
+    row = np.searchsorted(mesh.numbers, nodes, sorter=order)
+    row = order[np.minimum(row, len(order) - 1)]
+    unknown = mesh.numbers[row] != nodes
+    if unknown.any():
+        raise InputError(
+            f"temperature.file: the mesh has no node {nodes[unknown][0]} "
+            f"({unknown.sum()} of {len(unknown)} are unknown), expected the numbers of "
+            "imported.file"
+        )
+    found = np.full(len(mesh.points), np.nan)
+    found[row] = given.values
+    found = _filled_cells(mesh, found)
+    bodies = _body_nodes(mesh)
+    missing = bodies[np.isnan(found[bodies])]
+    if len(missing):
+        named = mesh.numbers[missing[mesh.numbers[missing] >= 0]]
+        which = f", such as {named[0]}" if len(named) else ""
+        raise InputError(
+            f"temperature.file: {len(missing)} nodes of the bodies have no temperature{which}, "
+            "expected those of all corners of the cells at least"
+        )
+    # reference nodes and the like: nothing hangs on them
+    found[np.isnan(found)] = given.values[0]
+    _check_cut(mesh, found)
+    return found
+
+
+def _filled_cells(mesh: Mesh, known: RealArray) -> RealArray:
+    """Temperatures (n_points,), NaN where unknown, with those of nodes whose cells know enough
+    others: by a polynomial of second order in the cell, or of first order where only few are known.
+    """
+    place = shape.reference_nodes(mesh.cell_type)
+    first = np.column_stack([np.ones(len(place)), place])
+    pairs = np.triu_indices(place.shape[1])
+    second = np.column_stack([first, place[:, pairs[0]] * place[:, pairs[1]]])
+    total = np.zeros(len(known))
+    count = np.zeros(len(known))
+    for cells in mesh.bodies.values():
+        unknown = np.isnan(known[cells])
+        for pattern in np.unique(unknown[unknown.any(axis=1)], axis=0):
+            some = cells[(unknown == pattern).all(axis=1)]
+            # a fit needs more values than coefficients
+            basis = second if (~pattern).sum() > second.shape[1] else first
+            if (~pattern).sum() < basis.shape[1]:
+                continue
+            weights = basis[pattern] @ np.linalg.pinv(basis[~pattern])
+            np.add.at(total, some[:, pattern], known[some[:, ~pattern]] @ weights.T)
+            np.add.at(count, some[:, pattern], 1.0)
+    with np.errstate(invalid="ignore"):
+        return np.where(np.isnan(known), total / count, known)
+
+
+def _body_nodes(mesh: Mesh) -> IntegerArray:
+    return np.unique(np.concatenate([cells.ravel() for cells in mesh.bodies.values()]))
 
 
 def interpolate_temperatures(mesh: Mesh, places: RealArray, values: RealArray) -> RealArray:
@@ -52,6 +130,10 @@ def interpolate_temperatures(mesh: Mesh, places: RealArray, values: RealArray) -
             "throughout the body"
         ) from None
     outside = np.isnan(found)
+    # points that no body has, such as reference nodes of a deck, may lie anywhere
+    stray = np.setdiff1d(np.arange(len(found)), _body_nodes(mesh))
+    outside[stray] = False
+    found[stray] = np.where(np.isnan(found[stray]), values[0], found[stray])
     if outside.any():
         found[outside] = _nearest(mesh.points[outside], at[outside], given, values, size)
     _check_cut(mesh, found)

@@ -144,7 +144,7 @@ def operating_temperature(scene: Scene) -> float:
     """
     given = scene.temperature
     if given.file:
-        return float(read_temperatures(given.file)[1].mean())
+        return float(read_temperatures(given.file).values.mean())
     return given.reference if given.uniform is None else given.uniform
 
 

@@ -8,6 +8,7 @@ the geometry.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from geometry.check_parameters import check_names, check_parameters
 
@@ -97,7 +98,13 @@ def _check_temperature(scene: Scene) -> Iterator[str]:
         yield "temperature.file: expected either a file or temperature.uniform, not both"
     hottest = coldest = operating_temperature(scene)
     if given.file:
-        values = read_temperatures(given.file)[1]
+        read = read_temperatures(given.file)
+        values = read.values
+        if read.nodes is not None and not _has_node_numbers(scene):
+            yield (
+                "temperature.file: it gives temperatures of nodes, expected those of places (x, y, "
+                "z) where the mesh is no file of its own"
+            )
         coldest, hottest = float(values.min()), float(values.max())
     if kind_named(scene.kind).name == "imported":
         named |= {f"imported.materials, {name}": m for name, m in part_materials(scene).items()}
@@ -111,6 +118,13 @@ def _check_temperature(scene: Scene) -> Iterator[str]:
                 f"temperature.reference = {show(given.reference, 'K')}, expected the material's "
                 "thermal expansion such as 1.2e-5 1/K (0 for none)"
             )
+
+
+def _has_node_numbers(scene: Scene) -> bool:
+    """The mesh is a user's own."""
+    kind = kind_named(scene.kind).name
+    drawings = (".step", ".stp")
+    return kind == "imported" and Path(scene.imported.file).suffix.lower() not in drawings
 
 
 def refuse_response(scene: Scene) -> None:

@@ -18,7 +18,10 @@ from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import at_diameter, transformation
 from bladefem.fem.modes import modes
+from bladefem.fem.refinement import refine_uniformly
+from bladefem.fem.temperature_field import mesh_temperatures
 from bladefem.scene.tables import Material
+from bladefem.scene.temperature_file import GivenTemperatures
 from geometry.imported import read_mesh
 from geometry.topology import facet_nodes
 
@@ -120,6 +123,54 @@ def test_parts_and_instances_of_cae(tmp_path):
     mesh = agrees(tmp_path / "a.inp", "c3d10", 1e-6, 1e-6)
     assert "1 elements of type SPRING1 were left out" in mesh.report["notes"]
     assert set(mesh.parts) == {"set-1"}
+
+
+@pytest.mark.parametrize("kind, linear", [("c3d20", "refuse"), ("c3d4", "promote")])
+def test_temperatures_by_the_numbers_of_the_deck(kind, linear, tmp_path):
+    """Exact on the nodes of the file, whose numbers start at 1001 here, and between them on those that
+    the reader adds.
+    """
+    model = decks.model(kind)
+    lines = []
+    for line in decks.flat_deck(model, {}):
+        head, *rest = line.split(",")
+        if line.startswith("*"):
+            of_nodes = line.upper().startswith(("*NODE", "*NSET"))
+            of_cells = line.upper().startswith("*ELEMENT")
+        elif of_nodes:
+            tags = [v for v in line.split(",") if v.strip()]
+            many = len(tags) if lines_of_sets(lines) else 1
+            line = ",".join([str(int(v) + 1000) for v in tags[:many]] + tags[many:])
+        elif of_cells:
+            line = ",".join(v if not v.strip() else str(int(v) + 1000) for v in line.split(","))
+        lines.append(line)
+    (tmp_path / "a.inp").write_text("\n".join(lines))
+    mesh = read_mesh(tmp_path / "a.inp", sectors=decks.SECTORS, linear=linear)
+
+    def field(x):
+        # the sector is turned about z when it is read
+        return 400.0 + 300.0 * x[:, 2] + 800.0 * (x[:, 0] ** 2 + x[:, 1] ** 2)
+
+    nodes = np.arange(1001, 1001 + len(model.points))
+    given = GivenTemperatures(field(model.points), None, nodes)
+    found = mesh_temperatures(mesh, given)
+    own = mesh.numbers >= 0
+    np.testing.assert_allclose(found[own], field(mesh.points[own]), rtol=1e-9)
+    assert own.sum() == len(model.points) < len(mesh.points)
+    np.testing.assert_allclose(found, field(mesh.points), atol=2.0)
+    with pytest.raises(InputError, match="or the mesh was refined"):
+        mesh_temperatures(refine_uniformly(mesh), given)
+    with pytest.raises(
+        InputError, match=r"nodes of the bodies have no temperature, such as 1\d\d\d"
+    ):
+        mesh_temperatures(mesh, GivenTemperatures(given.values[:9], None, nodes[:9]))
+    with pytest.raises(InputError, match="has no node 5"):
+        mesh_temperatures(mesh, GivenTemperatures(field(model.points), None, nodes - 996))
+
+
+def lines_of_sets(lines):
+    """The last keyword is one of node sets."""
+    return next(x for x in reversed(lines) if x.startswith("*")).upper().startswith("*NSET")
 
 
 def test_sixteen_bit_text(tmp_path):

@@ -102,9 +102,20 @@ def test_what_does_not_go_together(tmp_path):
 def test_a_file(tmp_path):
     file = tmp_path / "t.csv"
     file.write_text("\ufeffT [degC], x [mm], y [mm], z [mm], note\n20, 1, 2, 3, a\n\n30,4,5,6,b\n")
-    places, values = read_temperatures(str(file))
-    np.testing.assert_allclose(places, [[1e-3, 2e-3, 3e-3], [4e-3, 5e-3, 6e-3]])
-    np.testing.assert_allclose(values, [293.15, 303.15])
+    found = read_temperatures(str(file))
+    np.testing.assert_allclose(found.places, [[1e-3, 2e-3, 3e-3], [4e-3, 5e-3, 6e-3]])
+    np.testing.assert_allclose(found.values, [293.15, 303.15])
+
+
+def test_a_file_of_nodes(tmp_path):
+    file = tmp_path / "t.csv"
+    file.write_text("Node, T [degC]\n7, 20\n12, 30\n")
+    found = read_temperatures(str(file))
+    assert found.places is None
+    assert found.nodes.tolist() == [7, 12]
+    np.testing.assert_allclose(found.values, [293.15, 303.15])
+    with pytest.raises(InputError, match="expected those of places"):
+        scene({"expansion": "1e-5 1/K"}, file=str(file))
 
 
 @pytest.mark.parametrize(
@@ -115,6 +126,10 @@ def test_a_file(tmp_path):
         ("x,y,z,T\n0,0,0,hot", "row 2 is not four numbers"),
         ("x,y,z,T\n0,0,0,1\n0,0,1", "row 3 is not four numbers"),
         ("x,y,z,T\n0,0,0,nan", "not finite"),
+        ("node,T\n1,400\n1,500", "node 1 comes 2 times"),
+        ("node,T\n1.5,400", "a node is 1.5"),
+        ("node,T\n1,", "row 2 is not two numbers, expected node and T"),
+        ("node\n1", "column 'T' is missing"),
         ("x,y,z,T [mm]\n0,0,0,1", "not a unit of this field"),
         ("x,y,z,T [degC]\n0,0,0,-300", "at least 0 K"),
     ],

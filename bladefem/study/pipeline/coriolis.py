@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...data import ModeSet, PortModel
+from ...data import ModeSet
 from ...hbm.linear_resonances import wave_frequencies
 from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
@@ -49,11 +49,13 @@ def coriolis_shift(omega: np.ndarray, damping: np.ndarray, mode: int) -> float:
 
 
 def with_coriolis(scene: Scene, reduced: Reduced) -> Reduced:
-    """The reduced sector with Coriolis forces where responses are to have them, else without."""
-    if has_coriolis(reduced) and not counts_coriolis(scene, _reduced_shift(scene, reduced)):
-        still = {n: replace(body, damping=None) for n, body in reduced.sector.items()}
-        return replace(reduced, sector=still)
-    return reduced
+    """The reduced sector with Coriolis forces where responses are to have them."""
+    if not reduced.coriolis or not counts_coriolis(scene, _reduced_shift(scene, reduced)):
+        return reduced
+    sector = {
+        n: replace(body, damping=reduced.coriolis.get(n)) for n, body in reduced.sector.items()
+    }
+    return replace(reduced, sector=sector)
 
 
 def has_coriolis(reduced: Reduced) -> bool:
@@ -62,18 +64,14 @@ def has_coriolis(reduced: Reduced) -> bool:
 
 
 def _reduced_shift(scene: Scene, reduced: Reduced) -> float:
-    body = _excited_side(scene, reduced)
-    if body.damping is None:
-        return 0.0
-    return coriolis_shift(body.omega, body.damping, scene.excitation.mode)
-
-
-def _excited_side(scene: Scene, reduced: Reduced) -> PortModel:
-    """The sector in the nodal diameter that the engine order excites, or the nearest one."""
+    """`coriolis_shift` in the nodal diameter that the engine order excites, or the nearest one."""
     wanted = 0
     if reduced.sectors:
         wanted, _ = folded_diameter(1, scene.excitation.engine_order, reduced.sectors)
-    return reduced.sector[min(reduced.sector, key=lambda n: abs(n - wanted))]
+    n = min(reduced.sector, key=lambda known: abs(known - wanted))
+    if n not in reduced.coriolis:
+        return 0.0
+    return coriolis_shift(reduced.sector[n].omega, reduced.coriolis[n], scene.excitation.mode)
 
 
 def response_damping(bodies: Bodies, sets: Sequence[ModeSet]) -> list[np.ndarray]:

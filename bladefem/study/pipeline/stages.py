@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -25,6 +25,7 @@ from ...scene.part_materials import part_materials
 from ...scene.support import area_springs, held_letters
 from ...scene.tables import Material, Scene
 from ...scene.temperature_file import read_temperatures
+from ...util.arrays import RealOrComplex
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from .ports import Ports, blade_ports, damper_ports
@@ -109,9 +110,9 @@ class Bodies:
     @cached_property
     def temperatures_of_file(self) -> np.ndarray:
         """(n_points,) [K]."""
-        from ...fem.temperature_field import interpolate_temperatures
+        from ...fem.temperature_field import mesh_temperatures
 
-        return interpolate_temperatures(self.mesh, *read_temperatures(self.scene.temperature.file))
+        return mesh_temperatures(self.mesh, read_temperatures(self.scene.temperature.file))
 
     @cached_property
     def still_blade(self) -> Body:
@@ -218,8 +219,7 @@ def blade_dofs(mesh: Mesh) -> int:
 class Reduced:
     """Blade and damper seen from their ports, before they are joined for an engine order."""
 
-    # nodal diameter to the blade's side; key 0 alone for blades clamped at the root; its damping is
-    # that of the Coriolis forces, which do no work
+    # nodal diameter to the blade's side; key 0 alone for blades clamped at the root
     sector: dict[int, PortModel]
     # floating: rigid modes have omega = 0
     damper: PortModel
@@ -229,6 +229,9 @@ class Reduced:
     sectors: int
     # of the damper [kg]
     mass: float
+    # nodal diameter to (m, m) Coriolis forces as damping of the modes [1/s], where there are some:
+    # `coriolis.with_coriolis` puts them in
+    coriolis: dict[int, RealOrComplex] = field(default_factory=dict)
 
 
 def rotation_of(bodies: Bodies) -> Spin:
@@ -517,11 +520,12 @@ def reduce_sector(
     floating, damper_mass = on_one_rank(bodies, damper_model)
     first = len(patches[0].area) * mesh.dimension
     return Reduced(
-        sector,
+        {n: replace(body, damping=None) for n, body in sector.items()},
         floating,
         slice(first, first + len(patches[1].area) * mesh.dimension),
         sector_of(mesh).count if is_wheel(mesh) else 0,
         damper_mass,
+        {n: body.damping for n, body in sector.items() if body.damping is not None},
     )
 
 
