@@ -11,6 +11,7 @@ from models import rebounding, wedge_between_masses
 from plain import marched_wedge
 
 from bladefem.data import Elements, RigidBody
+from bladefem.friction.fourier import to_complex
 from bladefem.hbm.history_interval import history_interval
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.model import Damping, ReducedModel
@@ -63,6 +64,27 @@ def test_F30_a_converged_motion_that_time_leaves(omega, verdict, name):
         assert abs(seen[-1] - seen[-3]).max() < 0.02 * np.ptp(seen[-1])
 
 
+def mean_friction(point, kt, limit, step):
+    """Mean friction force [N] of a motion that goes on by a step in each period, by the return map
+    over three of them.
+
+    Args:
+        limit: friction coefficient, mean of the normal load [N] and the factor of its sine [N].
+    """
+    h = np.arange(point.harmonics + 1)
+    phase = 2 * np.pi * np.arange(STEPS) / STEPS
+    w = (np.exp(1j * np.outer(phase, h)) @ to_complex(point.w)[0, 0]).real
+    most = limit[0] * np.maximum(limit[1] + limit[2] * np.sin(phase), 0.0)
+    f = np.zeros(STEPS)
+    slider = w[0]
+    for k in range(3 * STEPS):
+        i = k % STEPS
+        place = w[i] + step * k / STEPS
+        f[i] = np.clip(kt * (place - slider), -most[i], most[i])
+        slider = place - f[i] / kt
+    return f.mean()
+
+
 def test_F31_a_damper_that_walks():
     """Friction pushes one way while the load is high: a free damper never comes back, and a balance
     of periodic motions has no place for it. The step that it makes in each period is an unknown,
@@ -81,6 +103,12 @@ def test_F31_a_damper_that_walks():
     omega = 1.3
     point = solve(model, omega, 31, 2048)
     assert point.converged and point.states["slip"] == 1
+    # the same motion without the step, which stands in the place of the mean, leaves the damper a
+    # mean force that nothing holds
+    alone, walking = (
+        abs(mean_friction(point, 20.0, (0.5, 0.3, -0.25), step)) for step in (0.0, point.w[0, 0, 0])
+    )
+    assert alone > 0.02 * 0.5 * 0.3 > 10 * walking
     dt = 2 * np.pi / omega / STEPS
     blade = np.zeros(2)
     rider = np.zeros(2)

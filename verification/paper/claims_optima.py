@@ -12,7 +12,7 @@ import numpy as np
 
 from bladefem.hbm.model import ReducedModel
 from bladefem.view.paper import draw_peaks
-from verification.paper.blades import load_curve, optimum
+from verification.paper.blades import Peak, judge, load_curve, optimum
 
 from .claim import Claim, verdict
 from .claims_blades import BANDS, LOADS, MASSES, SCENES, dips, model_of
@@ -23,6 +23,9 @@ from .claims_response import slip_share
 WANTED = np.geomspace(0.5, 500, 16)
 # mass of the scene's damper [kg]
 OWN = 0.06
+# harmonics and samples by mode: five times the frequency of mode 1 is that of mode 2, and with
+# three harmonics its least amplitudes come out up to 11 % too high
+BALANCE = {1: (9, 512), 2: (3, 128)}
 MICRO = 1e6
 # contact, mode, mass of the damper [kg]
 Key = tuple[str, int, float]
@@ -34,18 +37,25 @@ def optima(folder: Path) -> Iterator[Claim]:
     tables: dict[Key, np.ndarray] = {}
     # optimum load [N] and amplitude there [m]
     least: dict[Key, tuple[float, float]] = {}
+    # first harmonic there by the exact integration [m]
+    exact: dict[Key, float] = {}
     for contact, mode in BANDS:
         for mass in MASSES:
             key = contact, mode, mass
             made = _maker(contact, mass)
-            found = list(load_curve(((x, made(x)) for x in WANTED), BANDS[contact, mode], 3, 128))
+            found = list(
+                load_curve(((x, made(x)) for x in WANTED), BANDS[contact, mode], *BALANCE[mode])
+            )
             tables[key] = np.array(
                 [
                     (x, p.frequency, p.amplitude, slip_share(p.solution, made(x).elements))
                     for x, p in found
                 ]
             )
-            least[key] = _finest(made, BANDS[contact, mode], tables[key])
+            load, lowest = _finest(made, key, tables[key])
+            least[key] = load, lowest.amplitude
+            if (contact, mode) == ("stiff", 1):
+                exact[key] = _in_time(made(load), lowest)
         loop = _loop_tops() if (contact, mode) == ("soft", 2) else None
         draw_peaks(
             {m: tables[contact, mode, m] for m in MASSES},
@@ -56,7 +66,8 @@ def optima(folder: Path) -> Iterator[Claim]:
             loop,
         )
     for contact, mode in BANDS:
-        yield _masses(contact, mode, [least[contact, mode, m] for m in MASSES])
+        keys = [(contact, mode, m) for m in MASSES]
+        yield _masses(contact, mode, [least[k] for k in keys], [exact.get(k) for k in keys])
     yield _always(tables, least)
     yield from _narrow(tables)
     yield _jump(tables["stiff", 2, OWN], least["stiff", 2, OWN][0])
@@ -77,13 +88,21 @@ def _maker(contact: str, mass: float) -> Callable[[float], ReducedModel]:
 
 
 def _finest(
-    made: Callable[[float], ReducedModel], band: tuple[float, float], table: np.ndarray
-) -> tuple[float, float]:
-    """Optimum load [N] and least amplitude [m] near the lowest point of a table."""
+    made: Callable[[float], ReducedModel], key: Key, table: np.ndarray
+) -> tuple[float, Peak]:
+    """Optimum load [N] and the resonance there, near the lowest point of a table."""
+    contact, mode, _ = key
     best = int(np.argmin(table[:, 2]))
     span = table[max(best - 1, 0), 0], table[min(best + 1, len(table) - 1), 0]
-    load, found = optimum(made, span, band, 3, 128)
-    return load, found.amplitude
+    return optimum(made, span, BANDS[contact, mode], *BALANCE[mode])
+
+
+def _in_time(model: ReducedModel, found: Peak) -> float:
+    """First harmonic [m] at the frequency of a resonance by the exact integration; NaN where that
+    does not close.
+    """
+    exact, tip, _system = judge(model, found.frequency)
+    return float(abs(tip[1])) if exact.converged else np.nan
 
 
 def _loop_tops() -> np.ndarray:
@@ -96,7 +115,12 @@ def _loop_tops() -> np.ndarray:
     )
 
 
-def _masses(contact: str, mode: int, found: list[tuple[float, float]]) -> Claim:
+def _masses(
+    contact: str,
+    mode: int,
+    found: list[tuple[float, float]],
+    exact: list[float | None],
+) -> Claim:
     smaller = all(a[1] > b[1] for a, b in pairwise(found))
     larger = all(a[0] < b[0] for a, b in pairwise(found))
     return Claim(
@@ -105,7 +129,8 @@ def _masses(contact: str, mode: int, found: list[tuple[float, float]]) -> Claim:
         f"{contact} contact)",
         "; ".join(
             f"{1e3 * m:.0f} g {MICRO * h:.4g} µm at {x:.3g} N"
-            for m, (x, h) in zip(MASSES, found, strict=True)
+            + ("" if e is None else f" (exact integration: {MICRO * e:.4g} µm)")
+            for m, (x, h), e in zip(MASSES, found, exact, strict=True)
         ),
         verdict(smaller and larger, smaller or larger),
         (f"fig_17_{contact}_{mode}.png",),

@@ -2,7 +2,7 @@
 paper.md and paper.html.
 
 Pictures, claims (claims.json) and the method map live in the folder ``paper`` beside the page.
-Eleven minutes of CPU; titles of chapters after the folder remake those alone. The method map itself
+Thirteen minutes of CPU; titles of chapters after the folder remake those alone. The method map itself
 is made by benchmarks/paper_maps.py and only read here. Under mpirun rank 0 does the work alone.
 """
 
