@@ -44,6 +44,8 @@ from .modes import (
     mode_set,
     pairs_together,
 )
+from .open_sector import columns_of_part
+from .subdomains import whole_part
 
 # modes beyond those asked for, carried along
 GUARD_MODES = 2
@@ -315,9 +317,11 @@ def _project_columns(
     if t.opened is None:
         stiff = [inner_products(comm, W, apply_block(A, W[:, new])) for A in t.K]
         return stiff, [inner_products(comm, W, apply_block(A, W[:, new])) for A in t.M]
-    T1 = high_part(t)[t.opened.places]
+    shared = t.opened.shared
+    W = W if shared is None else whole_part(shared, W)
+    T1 = columns_of_part(t.opened, high_part(t)[t.opened.places])
     faces = np.flatnonzero(np.diff(T1.indptr))
-    low = t.low[t.opened.places] @ W
+    low = columns_of_part(t.opened, t.low[t.opened.places]) @ W
     high = T1[faces] @ W
     out = []
     both = t.opened.K, t.opened.M
@@ -326,7 +330,8 @@ def _project_columns(
         coupling = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(coupling.indptr))
         LH = low[near].T @ (coupling[near] @ high[:, new])
-        out.append([LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL])
+        own = [LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL]
+        out.append([comm.allreduce(part) for part in own] if comm.size > 1 else own)
     K, M = out
     return K, M
 
@@ -447,13 +452,8 @@ def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
     """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
     if t.opened is None:
         return None
-    return core.eliminate_interior(
-        (t.opened.K - shift * t.opened.M).tocsr(),
-        t.opened.core.rim,
-        definite=False,
-        order=t.opened.core.order,
-        keep=False,
-    )
+    opened = t.opened
+    return core.eliminate_again(opened.core, (opened.K - shift * opened.M).tocsr())
 
 
 def _count_below(
@@ -463,7 +463,7 @@ def _count_below(
 ) -> int:
     if shared is None or not isinstance(con.K, Folded):
         return inertia(combined(con.K, -shift, con.M))
-    return core.count_negative(shared, con.K.C)
+    return core.count_negative(shared, con.K.faces)
 
 
 def _counting_shift(lists: list[np.ndarray]) -> float:

@@ -22,36 +22,13 @@ import scipy.sparse as sp
 from geometry.mesh import Pair, sector_of
 
 from ..errors import InputError, suggestion
-from . import cyclic_schur as core
 from .body import Body
 from .compat import PETSc
 from .cut_faces import repeated_motion, tie_cut_faces
+from .distributed import local_rows, to_petsc
 from .linalg import Doubled, Folded, Matrix, combined
-from .ordering import interior_first
+from .open_sector import Opened, maps_of_part, open_sector
 from .supports import held_directions, polar_elimination
-
-# largest difference of masses of two directions, of the largest mass: rounding
-SAME_MASS = 1e-14
-
-
-@dataclass(frozen=True)
-class Opened:
-    """An open sector on one rank: its cut faces are free of each other, one factorisation serves
-    all diameters.
-    """
-
-    # (n_points*dim, n_open) mesh displacements from open unknowns
-    T: sp.csr_matrix
-    # (n_open,) the displacement in mesh numbering that each open unknown is
-    places: np.ndarray
-    # (n_open, n_open) [N/m]
-    K: sp.csr_matrix
-    # [kg]
-    M: sp.csr_matrix
-    # (n_open/dim,)*2 the mass of one direction; None where directions differ
-    nodal_mass: sp.csr_matrix | None
-    # K with its interior eliminated
-    core: core.Core
 
 
 @dataclass(frozen=True)
@@ -68,7 +45,7 @@ class Transformation:
     # (K0,), or (K0, Kc, Ks); empty when opened
     K: tuple[PETSc.Mat, ...]
     M: tuple[PETSc.Mat, ...]
-    # wheels on one rank
+    # wheels
     opened: Opened | None
     # 0 without cyclic symmetry
     sectors: int
@@ -132,29 +109,26 @@ def transformation(
     """The part of ``constrain`` that serves all nodal diameters.
 
     Args:
-        one_core: eliminate the interior once (one rank only, and the default there) instead of
-            factorising the doubled pencil of each nodal diameter.
+        one_core: eliminate the interior once (the default) instead of factorising the doubled
+            pencil of each nodal diameter.
     """
     pair = _cyclic_pair(body) if cyclic else None
     clamped = _with_partners(clamped_nodes(body, clamp), pair)
     low, high, start = _number_unknowns(body, *_constraint_parts(body, clamped, pair, ties))
     if high is None:
-        T0 = _to_petsc(body, low, start)
+        T0 = to_petsc(body, low, start)
         return Transformation(
             body, low, None, start, (body.K.ptap(T0),), (body.M.ptap(T0),), None, 0
         )
     sectors = sector_of(body.mesh).count
-    if body.comm.size == 1 and one_core is not False:
-        opened = _open_sector(
-            body,
-            _number_unknowns(body, *_constraint_parts(body, clamped, None, ties))[0],
-            low,
-            high,
-        )
+    if one_core is not False:
+        T, _, first = _number_unknowns(body, *_constraint_parts(body, clamped, None, ties))
+        own = slice(int(start[body.comm.rank]), int(start[body.comm.rank + 1]))
+        opened = open_sector(body, T, first, (abs(low) + abs(high)).tocsr(), own)
         if opened is not None:
             return Transformation(body, low, high, start, (), (), opened, sectors)
-    T0 = _to_petsc(body, low, start)
-    T1 = _to_petsc(body, high, start)
+    T0 = to_petsc(body, low, start)
+    T1 = to_petsc(body, high, start)
     return Transformation(
         body,
         low,
@@ -192,9 +166,10 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     phase = np.exp(1j * angle) if not real else 1.0 if n == 0 else -1.0
     T = (t.low + phase * high_part(t)).tocsr()
     if t.opened is not None:
-        C = T[t.opened.places]
-        stiffness = Folded(t.opened.K, C, t.opened.core)
-        mass = Folded(t.opened.M, C, None, t.opened.nodal_mass)
+        C, faces = maps_of_part(t.opened, T)
+        shared = t.opened.shared
+        stiffness = Folded(t.opened.K, C, t.opened.core, None, shared, faces)
+        mass = Folded(t.opened.M, C, None, t.opened.nodal_mass, shared, faces)
         return Constrained(t.body, T, own, stiffness, lambda: mass, n)
     if real:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))
@@ -218,7 +193,7 @@ def in_step(body: Body, clamp: str | None = "clamp") -> Constrained:
         body, _with_partners(clamped_nodes(body, clamp), pair), pair, None
     )
     T, _, start = _number_unknowns(body, low if high is None else (low + high).tocsr(), None)
-    T0 = _to_petsc(body, T, start)
+    T0 = to_petsc(body, T, start)
     rank = body.comm.rank
     return Constrained(
         body,
@@ -490,84 +465,6 @@ def _number_unknowns(
     return kept, moved, np.asarray(start, int)
 
 
-def _to_petsc(
-    body: Body,
-    T: sp.csr_matrix,
-    start: np.ndarray,
-) -> PETSc.Mat:
-    """Rows of T that this rank owns, in PETSc's row order."""
-    first, last = body.K.owner_range
-    rank = body.comm.rank
-    nodes = np.argsort(body.scalar_rows, kind="stable")
-    nodes = nodes[np.count_nonzero(body.scalar_rows < 0) :][first:last]
-    mine = T[nodes]
-    mine.sum_duplicates()
-    size = ((last - first, body.K.size[0]), (int(start[rank + 1] - start[rank]), T.shape[1]))
-    matrix = PETSc.Mat().createAIJ(
-        size,
-        csr=(mine.indptr.astype(PETSc.IntType), mine.indices.astype(PETSc.IntType), mine.data),
-        comm=body.comm,
-    )
-    matrix.assemble()
-    return matrix
-
-
-def _open_sector(
-    body: Body,
-    T: sp.csr_matrix,
-    low: sp.csr_matrix,
-    high: sp.csr_matrix,
-) -> Opened | None:
-    """Matrices of the open sector, None where it is all cut face; zeros between directions of the
-    mass are dropped.
-    """
-    to_open = T[np.argsort(body.scalar_rows)[np.count_nonzero(body.scalar_rows < 0) :]]
-    K, M = (_project_matrix(_local_rows(A), to_open) for A in (body.K, body.M))
-    M.eliminate_zeros()
-    rows = T.tocoo()
-    unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
-    places = np.empty(T.shape[1], int)
-    places[rows.col[unit]] = rows.row[unit]
-    rim = core.rim_of((abs(low) + abs(high))[places].tocsr())
-    if len(rim) == len(places):
-        return None
-    order = interior_first(K, rim, places // body.dim)
-    nodal = _of_one_direction(M, places, body.dim)
-    return Opened(T, places, K, M, nodal, core.eliminate_interior(K, rim, order=order))
-
-
-def _of_one_direction(
-    M: sp.csr_matrix,
-    places: np.ndarray,
-    dim: int,
-) -> sp.csr_matrix | None:
-    """The nodes' part of a mass matrix that is the same in all directions; None for others."""
-    if len(places) % dim or M.nnz % dim:
-        return None
-    whole = places.reshape(-1, dim) - np.arange(dim)
-    if (whole % dim).any() or (whole != whole[:, :1]).any():
-        return None
-    M.sort_indices()
-    nodal = M[::dim, ::dim].tocsr()
-    nodal.sort_indices()
-    again = sp.kron(nodal, sp.identity(dim), "csr")
-    again.sort_indices()
-    same = np.array_equal(again.indptr, M.indptr) and np.array_equal(again.indices, M.indices)
-    if not same or abs(again.data - M.data).max(initial=0.0) > SAME_MASS * abs(M.data).max():
-        return None
-    return nodal
-
-
-def _project_matrix(A: sp.csr_matrix, T: sp.csr_matrix) -> sp.csr_matrix:
-    """T^T A T; a mere selection of unknowns is done by indexing."""
-    if T.nnz == T.shape[1] and (T.data == 1).all():
-        chosen = T.tocsc().indices
-        return A[chosen][:, chosen]
-    out = (T.T @ A @ T).tocsr()
-    out.sum_duplicates()
-    return out
-
-
 def _three_matrices(
     A: PETSc.Mat,
     T0: PETSc.Mat,
@@ -592,8 +489,8 @@ def _doubled_matrix(
     """The real twin of A + j factor B, parts interleaved: kron(A, I) + kron(factor B, [0 -1; 1
     0]).
     """
-    twin = sp.kron(_local_rows(A), np.eye(2), "csr") + factor * sp.kron(
-        _local_rows(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
+    twin = sp.kron(local_rows(A), np.eye(2), "csr") + factor * sp.kron(
+        local_rows(B), np.array([[0.0, -1.0], [1.0, 0.0]]), "csr"
     )
     twin.sum_duplicates()
     (n, N), _ = A.sizes
@@ -604,9 +501,3 @@ def _doubled_matrix(
     )
     out.assemble()
     return Doubled(out)
-
-
-def _local_rows(A: PETSc.Mat) -> sp.csr_matrix:
-    """This rank's rows."""
-    indptr, indices, data = A.getValuesCSR()
-    return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, A.size[1]))

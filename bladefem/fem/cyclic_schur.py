@@ -4,11 +4,13 @@ The unknowns of an open sector are its interior (i) and its two cut faces, the r
 knows the nodal diameter, so the interior is eliminated once, in real arithmetic, down to the Schur
 complement S of the rim; nodal diameter n then costs a dense Cholesky of C_b(n)^H S C_b(n), as large
 as one cut face. A solve takes one sweep down and one up over the interior's factors for each of the
-real and imaginary parts. One rank only.
+real and imaginary parts. Of several ranks each eliminates the interior of its own part
+(subdomains.py); what is between the parts is eliminated next (separators.py).
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,8 +20,17 @@ from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
 
 from ..errors import NotSolvedError
 from .compat import MPI, PETSc
+from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
 from .schur import Bridge, replace_dense_solve, schur_complement, solve_through_boundary
+from .separators import (
+    Separators,
+    eliminate_separators,
+    expand_faces,
+    negative_pivots,
+    reduce_load,
+)
+from .subdomains import SharedBoundary, back_to_ranks, own_part
 
 # complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
 COLUMNS_PER_SOLVE = 32
@@ -43,6 +54,26 @@ class Core:
     bridge: Bridge | None
     # (ni+nb,) place of each unknown in the elimination, to use again; None: MUMPS's own
     order: np.ndarray | None
+    # negative eigenvalues of all that is eliminated, of all ranks
+    negative: int
+    # several ranks: A is this rank's share, rim what its part touches of the boundary, S is left
+    # after the elimination of the separators
+    shared: SharedBoundary | None = None
+    separators: Separators | None = None
+
+
+@dataclass(frozen=True)
+class FaceMap:
+    """How open unknowns depend on the unknowns of one nodal diameter (of this rank's part)."""
+
+    # (ni,) the unknown that each open one inside is
+    inner: np.ndarray
+    # (nm,) unknowns on the low cut face
+    masters: np.ndarray
+    # (ns,) between the ranks' parts
+    between: np.ndarray
+    # (nr, nm) open unknowns of the cut faces from masters
+    C: sp.csr_matrix
 
 
 @dataclass(frozen=True)
@@ -50,12 +81,7 @@ class Rim:
     """One nodal diameter on top of a core."""
 
     core: Core
-    # (ni,) unknowns of the nodal diameter inside
-    inner: np.ndarray
-    # (nm,) and on the low cut face
-    masters: np.ndarray
-    # (nb, nm) rim from masters
-    C: sp.csr_matrix
+    faces: FaceMap
     # Cholesky factor, or LU where indefinite
     dense: tuple[np.ndarray, Any]
     # negative eigenvalues; -1 when Cholesky proved that there are none
@@ -75,9 +101,12 @@ def rim_of(C: sp.csr_matrix) -> np.ndarray:
     return np.flatnonzero(~alone)
 
 
-def masters(C: sp.csr_matrix) -> np.ndarray:
-    """Unknowns of a nodal diameter on the cut face."""
-    return np.unique(C[rim_of(C)].indices)
+def face_map(C: sp.csr_matrix) -> FaceMap:
+    """The map of a sector that one rank holds, from its C (n_open, n_free)."""
+    rim = rim_of(C)
+    inner = np.setdiff1d(np.arange(C.shape[0]), rim)
+    on_face = np.unique(C[rim].indices)
+    return FaceMap(C[inner].indices, on_face, np.empty(0, int), C[rim][:, on_face].tocsr())
 
 
 def eliminate_interior(
@@ -86,15 +115,17 @@ def eliminate_interior(
     definite: bool = True,
     order: np.ndarray | None = None,
     keep: bool = True,
+    shared: SharedBoundary | None = None,
 ) -> Core:
-    """Eliminate the interior.
+    """Eliminate the interior (collective where it is shared).
 
     Args:
         order: see ``ordering.interior_first``.
         keep: keep the factors, for solves; else for :func:`count_negative` alone.
+        shared: of the ranks' parts, where A is this rank's share.
 
     Raises:
-        NotSolvedError: from MUMPS.
+        NotSolvedError: from MUMPS, on any rank.
     """
     matrix = PETSc.Mat().createAIJ(
         A.shape,
@@ -102,10 +133,18 @@ def eliminate_interior(
         csr=(A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data),
     )
     matrix.assemble()
-    factor = factorise_matrix(matrix, definite, rim, order, keep)
+    factor = _factorise_together(
+        lambda: factorise_matrix(matrix, definite, rim, order, keep), shared
+    )
     matrix.destroy()
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
     S = schur_complement(factor, len(rim))
+    negative = factor.negative
+    separators = None
+    if shared is not None:
+        S, separators = eliminate_separators(shared.cut, S, definite)
+        give_back()
+        negative = shared.cut.comm.allreduce(negative) + separators.negative
     return Core(
         factor,
         inner,
@@ -114,31 +153,60 @@ def eliminate_interior(
         A[rim][:, inner].tocsr(),
         replace_dense_solve(factor, len(rim)) if definite else None,
         order,
+        negative,
+        shared,
+        separators,
     )
+
+
+def eliminate_again(core: Core, A: sp.csr_matrix) -> Core:
+    """A shifted matrix of the same pattern with its interior eliminated, for ``count_negative``."""
+    return eliminate_interior(
+        A, core.rim, definite=False, order=core.order, keep=False, shared=core.shared
+    )
+
+
+def _factorise_together(
+    factorise: Callable[[], Factorised],
+    shared: SharedBoundary | None,
+) -> Factorised:
+    """A factorisation that fails on all ranks where it fails on one."""
+    if shared is None:
+        return factorise()
+    factor = None
+    error = None
+    try:
+        factor = factorise()
+    except NotSolvedError as problem:
+        error = problem
+    for failure in shared.cut.comm.allgather(error):
+        if failure is not None:
+            raise failure
+    assert factor is not None
+    return factor
 
 
 def join_cut_faces(
     core: Core,
-    C: sp.csr_matrix,
+    faces: FaceMap,
     definite: bool = True,
     springs: np.ndarray | None = None,
 ) -> Rim:
     """Join the cut faces for one nodal diameter.
 
+    Args:
+        springs: on the diagonal of the unknowns of this rank's part; those on the low cut face
+            count.
+
     Raises:
         NotSolvedError: the sector can still move (definite) or a shift hits an eigenvalue.
     """
-    on_face = masters(C)
-    Cb = C[core.rim][:, on_face].tocsr()
     # S is symmetric
-    S = Cb.conj().T @ (Cb.T @ core.S).T
+    S = faces.C.conj().T @ (faces.C.T @ core.S).T
     if springs is not None:
-        S = S + np.diag(springs[on_face])
-    inner = np.asarray(C[core.inner].indices)
+        S = S + np.diag(springs[faces.masters])
     if not definite:
-        return Rim(
-            core, inner, on_face, Cb, lu_factor(S), core.factor.negative + _count_negative(S)
-        )
+        return Rim(core, faces, lu_factor(S), core.negative + _count_negative(S))
     floats = "the sector's stiffness is not positive definite: it floats, or it has buckled"
     try:
         dense = cho_factor(S, lower=True)
@@ -148,36 +216,29 @@ def join_cut_faces(
     pivots = dense[0].diagonal().real ** 2
     if (pivots < len(S) * np.finfo(float).eps * S.diagonal().real).any():
         raise NotSolvedError(floats)
-    return Rim(core, inner, on_face, Cb, dense, -1)
+    return Rim(core, faces, dense, -1)
 
 
-def count_negative(core: Core, C: sp.csr_matrix) -> int:
+def count_negative(core: Core, faces: FaceMap) -> int:
     """Number of negative eigenvalues of C^H A C, by Sylvester's law of inertia.
 
     Raises:
         NotSolvedError: zero is an eigenvalue.
     """
-    Cb = C[core.rim][:, masters(C)].tocsr()
-    return core.factor.negative + _count_negative(Cb.conj().T @ (Cb.T @ core.S).T)
+    return core.negative + _count_negative(faces.C.conj().T @ (faces.C.T @ core.S).T)
 
 
 def solve_diameter(rim: Rim, B: np.ndarray) -> np.ndarray:
-    """Solve for a block of vectors (n_free, k)."""
-    X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
-    made = rim.core.bridge
+    """Solve for a block of vectors (n_own, k)."""
+    X = np.empty(B.shape, np.result_type(B, rim.faces.C.dtype), order="F")
     for first in range(0, B.shape[1], COLUMNS_PER_SOLVE):
         part = slice(first, first + COLUMNS_PER_SOLVE)
-        if made is None:
-            X[rim.inner, part], X[rim.masters, part] = _solve_two_sweeps(rim, B[:, part])
-        else:
-            ((inside, on_face),) = _solve_one_sweep(made, [(rim, B[:, part])])
-            X[rim.inner, part] = inside
-            X[rim.masters, part] = on_face
+        (X[:, part],) = _solve_batch([(rim, B[:, part])])
     return X
 
 
 def solve_together(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
-    """Solve for a few vectors (n_free, k) in each of several nodal diameters.
+    """Solve for a few vectors (n_own, k) in each of several nodal diameters.
 
     A sweep over the factors of the interior reads them once, whatever the number of vectors: four
     cost hardly more than one.
@@ -185,55 +246,95 @@ def solve_together(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
     Args:
         systems: nodal diameters on the same core, and their loads.
     """
-    made = systems[0][0].core.bridge
     many = sum(B.shape[1] for _, B in systems) > COLUMNS_PER_SOLVE
-    if made is None or many or len(systems) == 1:
+    if many or len(systems) == 1:
         return [solve_diameter(rim, B) for rim, B in systems]
-    out = []
-    for (rim, B), (inside, on_face) in zip(systems, _solve_one_sweep(made, systems), strict=True):
-        X = np.empty(B.shape, np.result_type(B, rim.C.dtype), order="F")
-        X[rim.inner] = inside
-        X[rim.masters] = on_face
-        out.append(X)
-    return out
+    return _solve_batch(systems)
 
 
-def _solve_one_sweep(
-    made: Bridge, systems: list[tuple[Rim, np.ndarray]]
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Solutions inside and on the low cut face, by one sweep down and one up for all systems."""
+def _solve_batch(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
+    """Solutions (n_own, k) of all systems, by one sweep down and one up."""
     core = systems[0][0].core
-    loads = [B.astype(np.result_type(B, rim.C.dtype), copy=False) for rim, B in systems]
-    wide = [_widen_columns(core, B[rim.inner]) for (rim, _), B in zip(systems, loads, strict=True)]
+    shared = core.shared
+    loads = [
+        (B if shared is None else own_part(shared, B)).astype(
+            np.result_type(B, rim.faces.C.dtype), copy=False
+        )
+        for rim, B in systems
+    ]
+    wide = [
+        _widen_columns(core, B[rim.faces.inner]) for (rim, _), B in zip(systems, loads, strict=True)
+    ]
     ends = np.cumsum([W.shape[1] for W in wide]).tolist()
     columns = [slice(*pair) for pair in zip([0, *ends], ends, strict=False)]
-    faces: list[np.ndarray] = []
+    found = [np.zeros(B.shape, B.dtype, order="F") for B in loads]
 
     def answer(r: np.ndarray) -> np.ndarray:
-        moved = []
-        for (rim, _), B, part in zip(systems, loads, columns, strict=True):
-            reduced = rim.C.conj().T @ _join_parts(r[:, part], B)
-            faces.append(face_solve(rim, B[rim.masters] + reduced))
-            moved.append(_split_parts(rim.C @ faces[-1], part.stop - part.start))
-        return np.hstack(moved)
+        return _answer_boundary(systems, loads, columns, found, r)
 
-    X = solve_through_boundary(made, np.hstack(wide) if len(wide) > 1 else wide[0], answer)[
-        core.inner
-    ]
-    insides = [_join_parts(X[:, part], B) for B, part in zip(loads, columns, strict=True)]
-    return list(zip(insides, faces, strict=True))
+    inside = _sweep(core, np.hstack(wide) if len(wide) > 1 else wide[0], answer)
+    for (rim, _), part, X in zip(systems, columns, found, strict=True):
+        X[rim.faces.inner] = _join_parts(inside[:, part], X)
+    return found if shared is None else [back_to_ranks(shared, X) for X in found]
 
 
-def _solve_two_sweeps(rim: Rim, B: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The same by two solves inside."""
-    core = rim.core
-    inside = inner_solve(core, B[rim.inner])
-    on_face = face_solve(
-        rim, B[rim.masters] - rim.C.conj().T @ real_times_complex(core.coupling, inside)
-    )
-    return inside - inner_solve(
-        core, real_times_complex(core.coupling.T.tocsr(), rim.C @ on_face)
-    ), on_face
+def _answer_boundary(
+    systems: list[tuple[Rim, np.ndarray]],
+    loads: list[np.ndarray],
+    columns: list[slice],
+    found: list[np.ndarray],
+    r: np.ndarray,
+) -> np.ndarray:
+    """Displacements of the rim (nb, k) under the loads r (nb, k) that the interior hands on.
+
+    Those of each system's unknowns on the boundary are put into ``found``; collective where ranks
+    share the boundary.
+    """
+    core = systems[0][0].core
+    on_face = [B[rim.faces.masters] for (rim, _), B in zip(systems, loads, strict=True)]
+    whole = r
+    if core.shared is not None and core.separators is not None:
+        widths = [part.stop - part.start for part in columns]
+        direct = np.hstack([_split_parts(B, k) for B, k in zip(on_face, widths, strict=True)])
+        whole = np.zeros((len(core.shared.cut.separator), r.shape[1]))
+        whole[core.shared.cut.touched] = r
+        between = [
+            _split_parts(B[rim.faces.between], k)
+            for (rim, _), B, k in zip(systems, loads, widths, strict=True)
+        ]
+        whole[core.shared.cut.separator] += np.hstack(between)
+        together = np.concatenate([whole, direct])
+        core.shared.cut.comm.Allreduce(MPI.IN_PLACE, together)
+        whole, direct = together[: len(whole)], together[len(whole) :]
+        on_face = [_join_parts(direct[:, p], B) for p, B in zip(columns, on_face, strict=True)]
+    reduced = whole if core.separators is None else reduce_load(core.separators, whole)
+    moved = []
+    for (rim, _), B, part, X in zip(systems, on_face, columns, found, strict=True):
+        faces = rim.faces
+        y = face_solve(rim, B + faces.C.conj().T @ _join_parts(reduced[:, part], X))
+        X[faces.masters] = y
+        moved.append(_split_parts(faces.C @ y, part.stop - part.start))
+    out = np.hstack(moved)
+    if core.shared is None or core.separators is None:
+        return out
+    out = expand_faces(core.separators, whole, out)
+    for (rim, _), part, X in zip(systems, columns, found, strict=True):
+        X[rim.faces.between] = _join_parts(out[core.shared.cut.separator][:, part], X)
+    return out[core.shared.cut.touched]
+
+
+def _sweep(
+    core: Core,
+    B: np.ndarray,
+    answer: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:
+    """Displacements inside (ni, k) under loads (ni+nb, k): down, the boundary's answer, and up."""
+    if core.bridge is not None:
+        return solve_through_boundary(core.bridge, B, answer)[core.inner]
+    first = solve_matrix(core.factor, B)[core.inner]
+    back = np.zeros(B.shape, order="F")
+    back[core.inner] = core.coupling.T @ answer(-(core.coupling @ first))
+    return first - solve_matrix(core.factor, back)[core.inner]
 
 
 def face_solve(rim: Rim, g: np.ndarray) -> np.ndarray:
@@ -283,5 +384,4 @@ def _count_negative(S: np.ndarray) -> int:
     ldu, pivots, info = factorise(S, lower=1, lwork=64 * len(S))
     if info:
         raise NotSolvedError("the shift is an eigenvalue, expected a shift between two")
-    single = pivots > 0
-    return int((ldu.diagonal().real[single] < 0).sum()) + int((~single).sum()) // 2
+    return negative_pivots(ldu, pivots)

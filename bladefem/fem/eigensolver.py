@@ -177,8 +177,12 @@ class _Operator:
 
 def _times_mass(pencil: _Pencil, column: np.ndarray) -> np.ndarray:
     """M x (n_own, 1)."""
-    # of vectors shared out no rank can tell alone
-    factor = _multiple(pencil.last, column) if pencil.con.body.comm.size == 1 else None
+    factor = _multiple(pencil.last, column)
+    comm = pencil.con.body.comm
+    if comm.size > 1:
+        # the same real number on all ranks, or none
+        factors = comm.allgather(factor)
+        factor = factors[0] if _all_equal(factors) else None
     if factor is None or pencil.image is None:
         pencil.image = apply_block(pencil.con.M, column)
     else:
@@ -186,6 +190,14 @@ def _times_mass(pencil: _Pencil, column: np.ndarray) -> np.ndarray:
         pencil.image = factor * pencil.image
     pencil.last = column
     return pencil.image
+
+
+def _all_equal(factors: list[float | None]) -> bool:
+    """Whether all ranks found one number, but for rounding."""
+    first = factors[0]
+    return first is not None and all(
+        f is not None and abs(f - first) <= PARALLEL_TOLERANCE * abs(first) for f in factors
+    )
 
 
 def _multiple(vector: np.ndarray | None, other: np.ndarray) -> float | None:

@@ -13,6 +13,10 @@ from .compat import MPI
 from .memory import available_memory, modal_solve_memory
 
 Result = TypeVar("Result")
+# more ranks on one sector have ever less to do between two exchanges
+MAX_RANKS_PER_SECTOR = 4
+# degrees of freedom of a rank from which its share of a sector pays
+MIN_DOFS_PER_RANK = 10_000
 # tasks of a group up to which none of them helps another
 MAX_UNGROUPED_TASKS = 3
 # share of the free memory that groups may fill
@@ -24,8 +28,8 @@ def group_size(
     dofs: int,
     free: float | None = None,
 ) -> int:
-    """Ranks in a group: as few as memory allows, for a wheel is solved fastest by one rank; divides
-    the ranks.
+    """Ranks in a group: as many as share a sector well, and as many more as memory asks for; a
+    divisor of all ranks.
 
     Args:
         dofs: degrees of freedom of one sector.
@@ -35,14 +39,20 @@ def group_size(
     free = comm.allreduce(available_memory() if free is None else free, MPI.MIN)
     together = comm.allreduce(here.size, MPI.MAX)
     here.Free()
-    for size in range(1, comm.size):
-        if (
-            comm.size % size == 0
-            and modal_solve_memory(dofs, size) * max(together // size, 1)
-            < USABLE_MEMORY_SHARE * free
-        ):
+    sizes = [size for size in range(1, comm.size + 1) if comm.size % size == 0]
+    useful = min(MAX_RANKS_PER_SECTOR, max(dofs // MIN_DOFS_PER_RANK, 1))
+    least = max(size for size in sizes if size <= useful)
+    for size in sizes:
+        memory = modal_solve_memory(dofs, size) * max(together // size, 1)
+        if size >= least and memory < USABLE_MEMORY_SHARE * free:
             return size
     return comm.size
+
+
+def fits_one_rank(comm: MPI.Comm, dofs: int) -> bool:
+    """One rank has memory for a body of so many degrees of freedom (collective)."""
+    free = comm.allreduce(available_memory(), MPI.MIN)
+    return comm.size == 1 or modal_solve_memory(dofs) < USABLE_MEMORY_SHARE * free
 
 
 def shared_out(

@@ -4,8 +4,8 @@ through PETSc).
 - a PETSc matrix: real, distributed;
 - ``Doubled``: the real twin of a complex Hermitian matrix, distributed; real and imaginary part of
   an unknown are adjacent, so that the memory of a complex vector is that of the doubled one;
-- ``Folded``: C^H A C with the real matrix A of an open sector, for one rank; all nodal diameters
-  share one factorisation of A's interior (``core``).
+- ``Folded``: C^H A C with the real matrix A of an open sector, or the sum of such products of the
+  ranks' parts; all nodal diameters share one factorisation of A's interior (``core``).
 
 A block of vectors is a NumPy array (n_own, k), this rank's rows, columns contiguous.
 """
@@ -13,7 +13,7 @@ A block of vectors is a NumPy array (n_own, k), this rank's rows, columns contig
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
@@ -23,6 +23,7 @@ from scipy.linalg import blas
 from . import cyclic_schur as interior
 from .compat import MPI, PETSc
 from .mumps import Factorised, dense_matrix, dense_values, factorise_matrix, solve_matrix
+from .subdomains import SharedBoundary, sum_of_parts, whole_part
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,9 @@ class Doubled:
 
 @dataclass(frozen=True)
 class Folded:
-    """C^H A C: an open sector's matrix seen from the unknowns of one nodal diameter."""
+    """C^H A C: an open sector's matrix seen from the unknowns of one nodal diameter; of several
+    ranks the sum over their parts.
+    """
 
     # (n_open, n_open) real, symmetric
     A: sp.csr_matrix
@@ -45,6 +48,22 @@ class Folded:
     # (n_open/dim,)*2 the same for each direction: A is its Kronecker product with the identity,
     # a third of the numbers to read; None where A couples directions
     nodal: sp.csr_matrix | None = None
+    # several ranks: A and C are those of this rank's part
+    shared: SharedBoundary | None = None
+    # where the boundary's unknowns are; worked out where the rank has all of them
+    given_faces: interior.FaceMap | None = None
+
+    @property
+    def faces(self) -> interior.FaceMap:
+        """How open unknowns depend on those of the nodal diameter."""
+        return self.given_faces or interior.face_map(self.C)
+
+    @property
+    def rim(self) -> np.ndarray:
+        """Open unknowns on the boundary."""
+        if self.shared is None:
+            return interior.rim_of(self.C)
+        return np.arange(len(self.shared.inside), self.A.shape[0])
 
 
 Matrix: TypeAlias = PETSc.Mat | Doubled | Folded
@@ -87,8 +106,10 @@ def factorise(
             MUMPS's INFOG.
     """
     if isinstance(A, Folded):
-        core = A.core or interior.eliminate_interior(A.A, interior.rim_of(A.C), definite)
-        return Factor(interior.join_cut_faces(core, A.C, definite, springs), False)
+        core = A.core or interior.eliminate_interior(A.A, A.rim, definite, shared=A.shared)
+        if springs is not None and A.shared is not None:
+            springs = whole_part(A.shared, springs[:, None])[:, 0]
+        return Factor(interior.join_cut_faces(core, A.faces, definite, springs), False)
     doubled = isinstance(A, Doubled)
     matrix = A.matrix if isinstance(A, Doubled) else A
     if springs is not None:
@@ -122,13 +143,14 @@ def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]
 def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
     """A X for a block of vectors (n_own, k)."""
     if isinstance(A, Folded):
-        open_values = A.C @ X
+        open_values = A.C @ (X if A.shared is None else whole_part(A.shared, X))
         if A.nodal is None:
             image = interior.real_times_complex(A.A, open_values)
         else:
             by_node = open_values.reshape(A.nodal.shape[0], -1)
             image = interior.real_times_complex(A.nodal, by_node).reshape(open_values.shape)
-        return np.asfortranarray(A.C.conj().T @ image)
+        product = np.asfortranarray(A.C.conj().T @ image)
+        return product if A.shared is None else sum_of_parts(A.shared, product)
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
     return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)
@@ -141,7 +163,7 @@ def combined(
 ) -> Matrix:
     """A + factor B."""
     if isinstance(A, Folded) and isinstance(B, Folded):
-        return Folded((A.A + factor * B.A).tocsr(), A.C, None)
+        return replace(A, A=(A.A + factor * B.A).tocsr(), core=None, nodal=None)
     if isinstance(A, Doubled) and isinstance(B, Doubled):
         return Doubled(combined(A.matrix, factor, B.matrix))
     if isinstance(A, Folded | Doubled):
@@ -154,14 +176,19 @@ def combined(
 def mean_diagonal(A: Matrix) -> float:
     """Mean of the diagonal, a measure of size."""
     if isinstance(A, Folded):
-        return float(A.A.diagonal().mean())
+        if A.shared is None:
+            return float(A.A.diagonal().mean())
+        total = A.shared.cut.comm.allreduce(float(A.A.diagonal().sum()))
+        return total / A.shared.open_size
     diagonal = (A.matrix if isinstance(A, Doubled) else A).getDiagonal()
     return diagonal.sum() / diagonal.size
 
 
 def dense_rows(A: Matrix, n: int) -> np.ndarray:
     """Numbers of the unknowns (0 to n-1) where ``factorise`` takes springs."""
-    return interior.masters(A.C) if isinstance(A, Folded) else np.arange(n)
+    if not isinstance(A, Folded):
+        return np.arange(n)
+    return A.faces.masters if A.shared is None else A.shared.columns[A.faces.masters]
 
 
 def inner_products(
@@ -211,8 +238,8 @@ def linear_combinations(V: Block, C: np.ndarray) -> np.ndarray:
 def inertia(A: Matrix) -> int:
     """Number of negative eigenvalues, by Sylvester's law; the factors are not kept."""
     if isinstance(A, Folded):
-        core = interior.eliminate_interior(A.A, interior.rim_of(A.C), definite=False, keep=False)
-        return interior.count_negative(core, A.C)
+        core = interior.eliminate_interior(A.A, A.rim, definite=False, keep=False, shared=A.shared)
+        return interior.count_negative(core, A.faces)
     doubled = isinstance(A, Doubled)
     parts = factorise_matrix(A.matrix if doubled else A, definite=False, keep=False)
     return parts.negative // 2 if doubled else parts.negative

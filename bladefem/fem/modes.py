@@ -17,7 +17,7 @@ from ..errors import InputError, NotSolvedError
 from ..util.lockstep import run_together
 from .compat import MPI
 from .constraint import Constrained, expand_to_mesh, restrict_load
-from .cyclic_schur import count_negative, eliminate_interior
+from .cyclic_schur import count_negative, eliminate_again
 from .eigensolver import Eigensolver, basis_size, krylov_schur
 from .flexibility import Flexibility, compliance, compliances, flexible
 from .lanczos import lowest_eigenpairs
@@ -249,12 +249,8 @@ def count_below(con: Constrained, lam: float) -> int:
     """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
     if isinstance(con.K, Folded) and isinstance(con.M, Folded) and con.K.core is not None:
         # the interior in the order that serves the stiffness too
-        core = con.K.core
         shifted = (con.K.A - lam * con.M.A).tocsr()
-        return count_negative(
-            eliminate_interior(shifted, core.rim, definite=False, order=core.order, keep=False),
-            con.K.C,
-        )
+        return count_negative(eliminate_again(con.K.core, shifted), con.K.faces)
     return inertia(combined(con.K, -lam, con.M))
 
 

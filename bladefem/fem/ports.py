@@ -15,13 +15,16 @@ from scipy.linalg import eigh
 from ..data import PortModel
 from ..errors import InputError, suggestion
 from .all_diameters import Eigenpairs, KeptPairs, eigenpairs, found_again, lost_modes
-from .constraint import Constrained, Opened, Transformation, restrict_load
+from .compat import MPI
+from .constraint import Constrained, Transformation, restrict_load
 from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .gyroscopic import Spin, constrained_coupling
 from .linalg import apply_block, inner_products
 from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
+from .open_sector import Opened
+from .separators import reduce_load, separator_solve
 
 # ports in one sweep
 PORTS_PER_SOLVE = 64
@@ -102,8 +105,8 @@ def port_models(
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
 
-    Where one rank holds the wheel, the static flexibility of all diameters takes one sweep over the
-    ports. In the end the inertia counts the modes; a diameter that lost one comes once more, whole.
+    The static flexibility of all diameters takes one sweep over the ports. In the end the inertia
+    counts the modes; a diameter that lost one comes once more, whole.
 
     Args:
         static_load: (n_points*dim,) [N], of nodal diameter 0.
@@ -165,8 +168,10 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     G, offset = _closed_flexibility(model.shared, rim)
     lam = p.lam[: model.count]
     vectors = canonical(p.con, lam, p.X[:, : model.count])
-    # one rank has all unknowns, and the ports stay sparse: dense they were the peak of memory
-    shapes = sp.csc_matrix(P).T @ (p.con.T @ vectors)
+    # the ports stay sparse: dense they were the peak of memory
+    shapes = (sp.csc_matrix(P).T @ p.con.T)[:, p.con.own] @ vectors
+    comm = p.con.body.comm
+    shapes = comm.allreduce(shapes) if comm.size > 1 else shapes
     ports = P.shape[1]
     return PortModel(
         np.sqrt(lam),
@@ -231,14 +236,24 @@ def _interior_flexibility(
         Y = inner_solve(opened.core, inside[:, part].toarray())
         G[:, part] = inside.T @ Y
         rim[:, part] -= opened.core.coupling @ Y
-    return G, rim
+    separators = opened.core.separators
+    if separators is None:
+        return G, rim
+    comm = separators.cut.comm
+    load = np.zeros((len(separators.cut.separator), F.shape[1]))
+    load[separators.cut.touched] = rim
+    comm.Allreduce(MPI.IN_PLACE, G)
+    comm.Allreduce(MPI.IN_PLACE, load)
+    between = load[separators.cut.separator]
+    G += between.T @ separator_solve(separators, between)
+    return G, reduce_load(separators, load)
 
 
 def _closed_flexibility(
     shared: tuple[np.ndarray, np.ndarray], rim: Rim
 ) -> tuple[np.ndarray, np.ndarray]:
     """The flexibility (p, p) with the cut faces joined, and its last column's real part."""
-    g = rim.C.conj().T @ shared[1]
+    g = rim.faces.C.conj().T @ shared[1]
     G = _hermitian_part(shared[0] + g.conj().T @ face_solve(rim, g))
     return G, G[:-1, -1].real
 

@@ -25,6 +25,8 @@ from .mumps import Factorised, petsc_call, set_operation, solve_matrix
 
 # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
 MATSOLVE = (109, 100)
+# of a dense matrix that is copied, to spare memory
+ROWS_AT_A_TIME = 256
 CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
 Answer = Callable[[np.ndarray], np.ndarray]
 
@@ -46,12 +48,26 @@ class Bridge:
 
 def schur_complement(factor: Factorised, n: int) -> np.ndarray:
     """(n, n) A_bb - A_bi A_ii^-1 A_ib of the rows left out."""
-    S = _use_complement(factor, lambda handle: _dense_array(handle, (n, n)).copy())
-    # a symmetric factorisation fills one triangle
-    lower = np.tril(S, -1)
-    upper = np.triu(S, 1)
-    half = lower if abs(lower).max(initial=0) >= abs(upper).max(initial=0) else upper
-    return half + half.T + np.diag(S.diagonal())
+    return _use_complement(factor, lambda handle: _symmetric_copy(_dense_array(handle, (n, n))))
+
+
+def _symmetric_copy(A: np.ndarray) -> np.ndarray:
+    """A matrix (n, n) of which a symmetric factorisation filled one triangle, as a whole."""
+    n = len(A)
+    # an entry of the lower triangle only is zero where the upper one was filled
+    lower = any(np.any(A[i, :i]) for i in range(1, n))
+    out = np.empty((n, n))
+    for first in range(0, n, ROWS_AT_A_TIME):
+        block = slice(first, first + ROWS_AT_A_TIME)
+        if lower:
+            out[block, : block.stop] = np.tril(A[block, : block.stop], first)
+            out[:first, block] = out[block, :first].T
+        else:
+            out[block, first:] = np.triu(A[block, first:])
+            out[block.stop :, block] = out[block, block.stop :].T
+        corner = out[block, block]
+        corner += (np.tril(corner, -1) if lower else np.triu(corner, 1)).T
+    return out
 
 
 def replace_dense_solve(factor: Factorised, n: int) -> Bridge | None:

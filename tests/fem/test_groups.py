@@ -46,3 +46,9 @@ def test_groups_grow_where_memory_is_short():
     comm = MPI.COMM_WORLD
     assert group_size(comm, 1000, free=1e12) == 1
     assert group_size(comm, 1000, free=0.5 * modal_solve_memory(1000)) == comm.size
+
+
+def test_ranks_share_a_sector_that_is_large_enough():
+    comm = MPI.COMM_WORLD
+    several = {1: 1, 2: 2, 3: 3, 4: 4}[comm.size]
+    assert group_size(comm, 100_000, free=1e12) == several

@@ -73,12 +73,19 @@ class Bodies:
 
     @cached_property
     def fits_one_rank(self) -> bool:
-        """Each rank has memory for the whole bodies (collective)."""
+        """One rank has memory for the whole bodies (collective)."""
+        from ...fem.compat import MPI
+        from ...fem.groups import fits_one_rank
+
+        return fits_one_rank(self.comm or MPI.COMM_WORLD, blade_dofs(self.mesh))
+
+    @cached_property
+    def ranks_of_sector(self) -> int:
+        """Ranks that solve a nodal diameter together (collective)."""
         from ...fem.compat import MPI
         from ...fem.groups import group_size
 
-        comm = self.comm or MPI.COMM_WORLD
-        return comm.size == 1 or group_size(comm, blade_dofs(self.mesh)) == 1
+        return group_size(self.comm or MPI.COMM_WORLD, blade_dofs(self.mesh))
 
     @cached_property
     def alone(self) -> Bodies:
@@ -90,7 +97,11 @@ class Bodies:
         return Bodies(self.scene, self.mesh, MPI.COMM_SELF, self.progress)
 
     def of_group(self, part: Communicator) -> Bodies:
-        """The bodies on a group of ranks."""
+        """The bodies on a group of ranks; these ones where the group has all ranks."""
+        from ...fem.compat import MPI
+
+        if part.size == (self.comm or MPI.COMM_WORLD).size:
+            return self
         return self.alone if part.size == 1 else Bodies(self.scene, self.mesh, part, self.progress)
 
     def heat(self, materials: Iterable[Material]) -> Temperatures | None:
@@ -368,12 +379,13 @@ def wheel_modes(
     Args:
         diameters: 0 to N/2 when left out.
         direct: solve every nodal diameter from scratch.
-        group: ranks in a group; as few as memory allows when left out.
-        reduced: modes that a reduction will need, kept with the bodies where one rank has them.
+        group: ranks in a group; as many as share a sector well when left out.
+        reduced: modes that a reduction will need, kept with the bodies where these have the ranks
+            that the reduction will have.
     """
     from ...fem.all_diameters import KeptPairs, all_diameters
     from ...fem.compat import MPI
-    from ...fem.groups import group_size, shared_out
+    from ...fem.groups import shared_out
 
     comm = bodies.comm or MPI.COMM_WORLD
     sectors = sector_of(bodies.mesh).count
@@ -382,7 +394,7 @@ def wheel_modes(
 
     def of_some(part: Communicator, some: list[int]) -> list[ModeSet]:
         mine = bodies.of_group(part)
-        kept = KeptPairs(reduced) if reduced and part.size == 1 else None
+        kept = KeptPairs(reduced) if reduced and part.size in (1, comm.size) else None
         found = all_diameters(
             mine.frame, count, some, direct, progress=bodies.progress, solver=solver, kept=kept
         )
@@ -391,7 +403,7 @@ def wheel_modes(
 
     if comm.size == 1:
         return of_some(comm, wanted)
-    size = group or (1 if bodies.fits_one_rank else group_size(comm, blade_dofs(bodies.mesh)))
+    size = group or bodies.ranks_of_sector
     return shared_out(comm, wanted, size, of_some, _real_or_complex(sectors))
 
 
@@ -537,7 +549,7 @@ def _reduced_diameters(
 ) -> dict[int, PortModel]:
     """The blade side in each nodal diameter; groups of ranks share them out."""
     from ...fem.compat import MPI
-    from ...fem.groups import group_size, shared_out
+    from ...fem.groups import shared_out
     from ...fem.ports import port_models
 
     scene = bodies.scene
@@ -566,7 +578,7 @@ def _reduced_diameters(
         models = solved(bodies.of_group(part), some)
         return [models[n] for n in some]
 
-    size = 1 if bodies.fits_one_rank else group_size(comm, blade_dofs(bodies.mesh))
+    size = bodies.ranks_of_sector
     cost = _real_or_complex(sector_of(bodies.mesh).count)
     return dict(zip(wanted, shared_out(comm, wanted, size, of_some, cost), strict=True))
 

@@ -1,0 +1,209 @@
+"""A sector whose cut faces are free of each other: one factorisation of its interior serves all
+nodal diameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from . import cyclic_schur as core
+from .body import Body
+from .compat import PETSc
+from .distributed import local_rows, rows_of_rank, to_petsc
+from .memory import give_back
+from .ordering import interior_first
+from .subdomains import SharedBoundary, divide, matrix_share, share_boundary
+
+# largest difference of masses of two directions, of the largest mass: rounding
+SAME_MASS = 1e-14
+
+
+@dataclass(frozen=True)
+class Opened:
+    """An open sector; of several ranks each has its part (subdomains.py), whose open unknowns these
+    are.
+    """
+
+    # (n_points*dim, n_open) mesh displacements from open unknowns; of those on the boundary of
+    # parts one rank only has the column
+    T: sp.csr_matrix
+    # (n_open,) the displacement in mesh numbering that each open unknown is
+    places: np.ndarray
+    # (n_open, n_open) [N/m]; the parts' add up
+    K: sp.csr_matrix
+    # [kg]
+    M: sp.csr_matrix
+    # (n_open/dim,)*2 the mass of one direction; None where directions differ
+    nodal_mass: sp.csr_matrix | None
+    # K with its interior eliminated
+    core: core.Core
+    # (nb,) places of the boundary of all parts; empty on one rank
+    boundary: np.ndarray
+
+    @property
+    def shared(self) -> SharedBoundary | None:
+        """What joins the parts of several ranks."""
+        return self.core.shared
+
+
+def open_sector(
+    body: Body,
+    T: sp.csr_matrix,
+    start: np.ndarray,
+    pattern: sp.csr_matrix,
+    own: slice,
+) -> Opened | None:
+    """Matrices of the open sector, its interior eliminated (collective).
+
+    Args:
+        T: (n_points*dim, n_open) mesh displacements from open unknowns.
+        start: (ranks+1,) first open unknown of each rank.
+        pattern: (n_points*dim, n_free) which unknowns of nodal diameters a displacement has.
+        own: unknowns of this rank.
+
+    Returns:
+        None where the sector is all cut face, or where ranks cannot be parted.
+    """
+    rows = T.tocoo()
+    unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
+    places = np.empty(T.shape[1], int)
+    places[rows.col[unit]] = rows.row[unit]
+    rim = core.rim_of(pattern[places])
+    if len(rim) == len(places):
+        return None
+    if body.comm.size == 1:
+        K, M = _open_matrices(body, T, start)
+        return _eliminated(body, T, places, (K, M), rim, None, np.empty(0, int))
+    part = shared = None
+    shares = []
+    for A in _open_matrices(body, T, start):
+        part = part or divide(body, A, start, places, rim)
+        if part is None:
+            return None
+        shared = shared or share_boundary(part, pattern[places], own)
+        if shared is None:
+            return None
+        shares.append(matrix_share(part, A))
+        del A
+        give_back()
+    assert part is not None and shared is not None
+    K, M = shares
+    members = part.members
+    mine = (members >= part.owned[0]) & (members < part.owned[1])
+    T_part = (T[:, members] @ sp.diags(mine.astype(float))).tocsr()
+    T_part.eliminate_zeros()
+    local_rim = np.arange(len(part.inside), len(members))
+    return _eliminated(
+        body, T_part, places[members], (K, M), local_rim, shared, places[part.boundary]
+    )
+
+
+def columns_of_part(opened: Opened, A: sp.csr_matrix) -> sp.csr_matrix:
+    """(k, n) columns of A (k, n_free) that belong to the unknowns of this rank's part."""
+    return A if opened.shared is None else A[:, opened.shared.columns].tocsr()
+
+
+def maps_of_part(opened: Opened, T: sp.csr_matrix) -> tuple[sp.csr_matrix, core.FaceMap]:
+    """Open unknowns from those of one nodal diameter: of all (n_open, n), and of the boundary.
+
+    Args:
+        T: (n_points*dim, n_free) of the nodal diameter.
+    """
+    shared = opened.shared
+    C = columns_of_part(opened, T[opened.places])
+    if shared is None:
+        return C, core.face_map(C)
+    inner = len(shared.inside)
+    boundary = T[opened.boundary][:, shared.columns[inner:]].tocsr()
+    rim = boundary[~shared.cut.separator]
+    masters = np.unique(rim.indices)
+    return C, core.FaceMap(
+        np.arange(inner),
+        inner + masters,
+        inner + boundary[shared.cut.separator].indices,
+        rim[:, masters].tocsr(),
+    )
+
+
+def _eliminated(
+    body: Body,
+    T: sp.csr_matrix,
+    places: np.ndarray,
+    matrices: tuple[sp.csr_matrix, sp.csr_matrix],
+    rim: np.ndarray,
+    shared: SharedBoundary | None,
+    boundary: np.ndarray,
+) -> Opened:
+    """The record, with the interior eliminated."""
+    K, M = matrices
+    order = interior_first(K, rim, places // body.dim)
+    nodal = _of_one_direction(M, places, body.dim)
+    # what building the matrices took is of no more use
+    give_back()
+    eliminated = core.eliminate_interior(K, rim, order=order, shared=shared)
+    return Opened(T, places, K, M, nodal, eliminated, boundary)
+
+
+def _open_matrices(
+    body: Body,
+    T: sp.csr_matrix,
+    start: np.ndarray,
+) -> Iterator[sp.csr_matrix]:
+    """This rank's rows (n_own, n_open) of stiffness and mass, one after the other; zeros between
+    directions of the mass are dropped.
+    """
+    chosen = T.nnz == T.shape[1] and bool((T.data == 1).all())
+    for A in (body.K, body.M):
+        if chosen:
+            out = _selected(body, A, T, start)
+        elif body.comm.size == 1:
+            local = T[rows_of_rank(body)]
+            out = (local.T @ local_rows(A) @ local).tocsr()
+        else:
+            out = local_rows(A.ptap(to_petsc(body, T, start)))
+        out.sum_duplicates()
+        if A is body.M:
+            out.eliminate_zeros()
+        yield out
+
+
+def _selected(
+    body: Body,
+    A: PETSc.Mat,
+    T: sp.csr_matrix,
+    start: np.ndarray,
+) -> sp.csr_matrix:
+    """T^T A T where T merely selects unknowns, by indexing."""
+    first, last = A.owner_range
+    # open unknowns are numbered as the rows are
+    chosen = body.scalar_rows[T.tocsc().indices]
+    rank = body.comm.rank
+    own = chosen[start[rank] : start[rank + 1]] - first
+    assert not len(own) or (own.min() >= 0 and own.max() < last - first)
+    return local_rows(A)[own][:, chosen].tocsr()
+
+
+def _of_one_direction(
+    M: sp.csr_matrix,
+    places: np.ndarray,
+    dim: int,
+) -> sp.csr_matrix | None:
+    """The nodes' part of a mass matrix that is the same in all directions; None for others."""
+    if len(places) % dim or M.nnz % dim:
+        return None
+    whole = places.reshape(-1, dim) - np.arange(dim)
+    if (whole % dim).any() or (whole != whole[:, :1]).any():
+        return None
+    M.sort_indices()
+    nodal = M[::dim, ::dim].tocsr()
+    nodal.sort_indices()
+    again = sp.kron(nodal, sp.identity(dim), "csr")
+    again.sort_indices()
+    same = np.array_equal(again.indptr, M.indptr) and np.array_equal(again.indices, M.indices)
+    if not same or abs(again.data - M.data).max(initial=0.0) > SAME_MASS * abs(M.data).max():
+        return None
+    return nodal
