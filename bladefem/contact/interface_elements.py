@@ -24,6 +24,8 @@ Layer = TypeVar("Layer", Contact, Seat)
 # stiffness per unit area that represents rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID_STIFFNESS = 1e22
+# of the width of a group of nodes: below it they have one place along a side
+SAME_PLACE = 1e-6
 
 
 def mindlin_ratio(nu: float) -> float:
@@ -353,22 +355,21 @@ def aggregation_matrix(patch: Patch, points: int | None) -> sp.csr_matrix:
     """G (n, m): share of each node in its element by area; the columns sum to 1. The identity when
     points is None.
 
-    Nodes are grouped by halving the patch again and again across its longer side into parts of
-    equal area.
+    Nodes are grouped by halving the patch again and again into parts of equal area: its shorter
+    side first, then in turns, so that the parts have the proportions of the patch. A force leaves
+    the middle sixth of the shorter side first: a damper that rolls lifts off there, and with one
+    point across it would roll freely (4000 N/mm^3 and 80 N on the shipped wedge: 40 um with 8
+    points along a seat, 56.1 um with 2 by 4 and 56.0 um with all 63).
     """
     n = len(patch.area)
     if points is None or points >= n:
         return sp.identity(n, format="csr")
     frame = patch.frame.mean(axis=0)
     label = np.zeros(n, dtype=int)
-    _halve(
-        (patch.points - patch.points.mean(axis=0)) @ frame[1:].T,
-        patch.area,
-        np.arange(n),
-        points,
-        0,
-        label,
-    )
+    x = (patch.points - patch.points.mean(axis=0)) @ frame[1:].T
+    # a little more for the shorter side, which is split first
+    sides = np.where(np.ptp(x, axis=0) < np.ptp(x, axis=0).max(), 1.01, 1.0)
+    _halve(x, sides, patch.area, np.arange(n), points, 0, label)
     share = patch.area / np.bincount(label, patch.area)[label]
     return sp.csr_matrix((share, (np.arange(n), label)), shape=(n, points))
 
@@ -380,21 +381,34 @@ def _members(G: Sequence[sp.csr_matrix]) -> list[sp.csr_matrix]:
 
 def _halve(
     x: np.ndarray,
+    sides: np.ndarray,
     area: np.ndarray,
     nodes: np.ndarray,
     parts: int,
     first: int,
     label: np.ndarray,
 ) -> None:
-    """Label some nodes first .. first + parts - 1."""
+    """Label some nodes first .. first + parts - 1.
+
+    Args:
+        x: (n, sides) places in the patch [m].
+        sides: of these nodes, over those of the patch.
+    """
     if parts == 1:
         label[nodes] = first
         return
-    axis = int(np.argmax(np.ptp(x[nodes], axis=0)))
+    widths = np.ptp(x[nodes], axis=0)
+    axis = int(np.argmax(np.where(widths > SAME_PLACE * widths.max(), sides, 0.0)))
     nodes = nodes[np.lexsort((x[nodes, 1 - axis], x[nodes, axis].round(9)))]
     low = parts // 2
     below = np.cumsum(area[nodes]) - area[nodes] / 2
     cut = int(np.searchsorted(below, area[nodes].sum() * low / parts))
     cut = min(max(cut, low), len(nodes) - (parts - low))
-    _halve(x, area, nodes[:cut], low, first, label)
-    _halve(x, area, nodes[cut:], parts - low, first + low, label)
+    shares = np.array([low / parts, 1 - low / parts])
+    for share, chosen, count, start in (
+        (shares[0], nodes[:cut], low, first),
+        (shares[1], nodes[cut:], parts - low, first + low),
+    ):
+        own = sides.copy()
+        own[axis] *= share
+        _halve(x, own, area, chosen, count, start, label)

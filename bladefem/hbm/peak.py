@@ -66,6 +66,7 @@ def find_peak(
     *,
     near: Peak | Solution | None = None,
     tolerance: float = 1e-4,
+    enough: float = 0.0,
     options: Options = DEFAULT_OPTIONS,
 ) -> Peak:
     """The local maximum uphill of omega [rad/s].
@@ -73,18 +74,25 @@ def find_peak(
     Args:
         near: a peak of a similar model, which spares the first steps, or a solution to start from.
         tolerance: relative accuracy of the height; the frequency follows with its square root.
+        enough: relative gain that is given up where the point that promises it is not solved at
+            once.
 
     Raises:
         InputError: no such probe.
         NotSolvedError: a point was not solved, or no maximum was closed in.
     """
     check_probe(model, options.probe)
-    low = high = last = None
+    low = high = last = best = None
+    gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
-        start = _solved_near(model, omega, H, samples, start, last is None, options)
+        # where the gain is not worth a walk, one try is enough
+        near_enough = best is not None and gain <= enough
+        start = _solved_near(model, omega, H, samples, start, last is None, options, near_enough)
+        if near_enough and not start.converged and best is not None:
+            return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
         frequency = start.frequency
         if not start.converged:
             raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
@@ -125,15 +133,17 @@ def _solved_near(
     start: Solution | None,
     first: bool,
     options: Options,
+    once: bool = False,
 ) -> Solution:
     """The point at a frequency, or the nearest to it that its start leads to.
 
     Args:
         first: of a search, whose start belongs to a similar model: where it leads nowhere, the
             same is tried at RETRY_RATIOS times the frequency, away from folds.
+        once: no more than one try.
     """
     point = solve(model, omega, H, samples, start=start, options=options)
-    if point.converged or start is None:
+    if point.converged or start is None or once:
         return point
     if not first:
         way = walk_in_frequency(model, omega, H, samples, start, options)

@@ -7,6 +7,8 @@ import pytest
 from models import block
 
 from bladefem.data import Elements
+from bladefem.errors import NotSolvedError
+from bladefem.hbm import peak as peak_module
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.parameters import vary
@@ -28,6 +30,25 @@ def test_peak_of_a_fine_sweep(load):
     assert peak.points <= 12
     assert peak.height == pytest.approx(max(heights), rel=2e-4)
     assert abs(peak.omega - fine[np.argmax(heights)]) < HZ * 0.5
+
+
+def test_a_gain_that_is_too_small_for_a_walk_is_given_up(monkeypatch):
+    """Where the next point is not solved: a peak that only judges another one needs no more."""
+    model = reference_model(1e6, 0.06, 1.4, harmonics=3)
+    solved = []
+
+    def fails_later(*args, **options):
+        point = solve(*args, **options)
+        solved.append(point)
+        return point if len(solved) < 5 else replace(point, converged=False)
+
+    monkeypatch.setattr(peak_module, "solve", fails_later)
+    monkeypatch.setattr(peak_module, "walk_in_frequency", lambda *args: [])
+    found = find_peak(model, HZ * 1320, 3, 0, tolerance=1e-9, enough=1.0)
+    assert found.height == max(size(point) for point in solved[:4]) and len(solved) == 5
+    solved.clear()
+    with pytest.raises(NotSolvedError, match="peak search stopped"):
+        find_peak(model, HZ * 1320, 3, 0, tolerance=1e-9)
 
 
 def test_a_tracked_peak_is_the_peak_at_each_load():

@@ -1,6 +1,7 @@
 """A choice that goes down: what is not needed is given up again, and nothing that is needed."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from bladefem.data import PortModel, RigidBody
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.model import Damping
-from bladefem.hbm.peak import find_peak
+from bladefem.hbm.peak import Peak, find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.study.adaptive import cheaper_settings as cheaper_module
 from bladefem.study.adaptive.cheaper_settings import cheaper_settings
@@ -68,6 +69,15 @@ def test_a_step_back_that_costs_more_than_it_saves_is_not_tried(slipping, monkey
     monkeypatch.setattr(cheaper_module, "CURVE_POINTS", 0)
     monkeypatch.setattr(cheaper_module, "peak_from", None)
     assert cheaper_settings(family, *enough, ACCURACY)[0] == enough[0]
+
+
+def test_a_damper_that_lifts_off_keeps_the_contact_points_that_it_needs():
+    eight = replace(RICH, points=8, chosen=("points",))
+    for lift, few in ((0, False), (1, True)):
+        solution = SimpleNamespace(states={"lift": lift})
+        peak = Peak(solution, 1.0, 1)
+        assert cheaper_module._too_few_points(replace(eight, points=4), peak) == few
+        assert not cheaper_module._too_few_points(eight, peak)
 
 
 @pytest.mark.parametrize(("stiffness", "kept"), [(1e10, "rigid"), (3e5, "elastic")])

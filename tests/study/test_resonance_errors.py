@@ -24,6 +24,8 @@ class KnownPeak:
     height: float
     omega: float
     solution: SimpleNamespace
+    # second derivative of 1/height^2; 0: unknown
+    bend: float = 0.0
 
 
 def peak_of_settings(settings):
@@ -114,6 +116,39 @@ def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
     )
     assert settings.points > 4 and settings.harmonics == 7
     assert errors.total < 0.01 and peak.height == pytest.approx(1.6 - 0.1 / 7)
+
+
+@pytest.mark.parametrize("damping", [0.5, 0.005])
+def test_a_flat_top_does_not_determine_the_frequency(damping):
+    """What a shift takes from the height counts where it is less than the weighted shift."""
+    # of one mode with omega = height = 1, next to its peak: 1/height^2 = 1 + (shift / damping)^2
+    peak = KnownPeak(1.0, 1.0, SimpleNamespace(), bend=2 / damping**2)
+    fall = resonance_choice.fall_beside(peak, 0.01)
+    assert fall == pytest.approx(1 - 1 / np.hypot(1, 0.01 / damping))
+    errors = resonance_choice.PeakErrors(
+        {"points": 0.001}, {"points": 0.01}, fall={"points": fall}
+    )
+    assert errors.needs["points"] == (0.05 if damping < 0.01 else max(fall, 0.001))
+
+
+def test_what_is_too_large_with_all_points_is_judged_with_twice_as_many(monkeypatch):
+    """The error is of first order in the points: twice the change."""
+    family = family_of(reference_model(points=64, load=1.4, phase=0.7, modes=10, harmonics=31))
+    settings = replace(first_for(family.modes), harmonics=3, points=8)
+    richer = replace(settings, points=None)
+    point = peak_with(4).solution
+    unknowns = family.build(replace(settings, points=16)).model.springs.size * 7
+    monkeypatch.setattr(resonance_choice, "LIFTING_POINTS_JUDGE", unknowns)
+    found = resonance_choice.compared_settings(family, settings, richer, "points", point)
+    assert found == (settings, replace(settings, points=16), 2.0)
+
+
+def test_a_damper_that_comes_off_is_tried_with_several_points_and_harmonics():
+    first = first_for(10)
+    start = resonance_choice.settings_of_lift_off(first)
+    assert start.harmonics == 3 and start.points == resonance_choice.LIFTING_POINTS
+    given = replace(first, chosen=("harmonics", "samples"))
+    assert resonance_choice.settings_of_lift_off(given).points == first.points
 
 
 def test_an_error_stays_known_where_the_richer_model_is_not_solved_any_more(judged):

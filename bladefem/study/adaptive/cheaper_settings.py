@@ -13,6 +13,7 @@ from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from .family import Family, family_member, lowest_harmonics
 from .resonance_choice import (
+    LIFTING_POINTS,
     SHIFT_WEIGHT,
     SUFFICIENT_SHARE,
     PeakErrors,
@@ -47,7 +48,7 @@ def cheaper_settings(
     left = SUFFICIENT_SHARE * accuracy - sum(errors.needs.values())
     for name, growth in ERROR_GROWTH.items():
         poorer = _one_step_back(family, settings, name)
-        if poorer is None or left <= 0:
+        if poorer is None or left <= 0 or _too_few_points(poorer, peak):
             continue
         expected = (growth - 1) * errors.needs[name]
         if expected > left or not _saves(family, settings, poorer):
@@ -65,6 +66,12 @@ def cheaper_settings(
         peak = found
         left = SUFFICIENT_SHARE * accuracy - sum(errors.needs.values())
     return settings, peak, errors
+
+
+def _too_few_points(settings: Settings, peak: Peak) -> bool:
+    """Contacts lift off, and there would be fewer points than a damper that comes off needs."""
+    few = settings.points is not None and settings.points < LIFTING_POINTS
+    return few and peak.solution.states["lift"] > 0
 
 
 def _one_step_back(family: Family, settings: Settings, name: str) -> Settings | None:

@@ -26,23 +26,34 @@ from .settings import DIRECTIONS, Settings, enriched_settings
 
 # enrichments of one peak before giving up
 MAX_ENRICHMENTS = 8
-# of the accuracy: to which a peak that only estimates an error is found
+# of the accuracy: to which a peak is found, and one that only estimates an error
 PEAK_ACCURACY_SHARE = 0.05
+JUDGE_ACCURACY_SHARE = 0.2
+# the same for one whose search meets a point that is not solved: on the shipped wedge with 4000
+# N/mm^3 and 80 N walks to such points on a flat top took 26 s for a gain of 0.1 %
+JUDGE_ENOUGH_SHARE = 0.2
 # Newton steps of a point of such a peak
 JUDGE_STEPS = 15
 # of the accuracy: errors that are small enough together, and one that need not be lowered
 SUFFICIENT_SHARE = 0.8
 NEGLIGIBLE_SHARE = 0.05
+# of the sum of all errors: one that is less is not worth a richer model
+MINOR_SHARE = 0.125
 # of the accuracy: an error from which on a peak with lift-off is refined only while that helps
 FAR_BEYOND = 4.0
-# unknowns of the largest balance that is chosen where contacts lift off: finer ones cost minutes a
-# curve there
-MAX_LIFTING_UNKNOWNS = 3000
+# unknowns of the largest balance that is chosen; model.harmonics and contact.points may ask for
+# more
+LARGEST_BALANCE = 6000
+# the same where contacts lift off: finer ones cost minutes a curve there
+MAX_LIFTING_UNKNOWNS = 3100
 # the same of a model that only estimates an error there, and of one with more contact points: on
 # the shipped wedge with 400 to 4000 N/mm^3 a peak with 7 harmonics and all 63 points of a seat,
 # 5670 unknowns, takes a second from one with fewer points, with 15 harmonics twelve
-LIFTING_JUDGE = 1500
+LIFTING_JUDGE = 3100
 LIFTING_POINTS_JUDGE = 6000
+# contact points of a seat with which a damper is tried first that comes off: with four, Newton's
+# method took 10 s for 4000 N/mm^3 under 80 N on the shipped wedge, with eight 0.5 s
+LIFTING_POINTS = 8
 # contact points of a seat below which an error that does not fall is one of too few of them
 FEW_POINTS = 32
 # harmonics and contact points of a seat of the models that tell an error in another respect where
@@ -66,6 +77,9 @@ class PeakErrors:
     frequency: Mapping[str, float]
     # the peaks that were found
     better: Mapping[str, Peak] = field(default_factory=dict, repr=False)
+    # relative fall of the height beside the peak by that change of frequency; left out where it is
+    # not known
+    fall: Mapping[str, float] = field(default_factory=dict, repr=False)
 
     @property
     def total(self) -> float:
@@ -74,11 +88,14 @@ class PeakErrors:
 
     @property
     def needs(self) -> Mapping[str, float]:
-        """What decides whether a respect is made richer: height and weighted frequency."""
-        return {
-            name: max(change, SHIFT_WEIGHT * self.frequency[name])
-            for name, change in self.height.items()
+        """What decides whether a respect is made richer: height and weighted frequency, which a
+        flat top does not determine.
+        """
+        shifts = {
+            name: min(SHIFT_WEIGHT * shift, self.fall.get(name, np.inf))
+            for name, shift in self.frequency.items()
         }
+        return {name: max(change, shifts[name]) for name, change in self.height.items()}
 
     @property
     def shift(self) -> float:
@@ -107,17 +124,30 @@ def peak_from(
     after = family_member(family, new)
     start = replace(point, w=carried_displacements(point.w, before, after, new.harmonics))
     options = solver_options(accuracy)
+    share = PEAK_ACCURACY_SHARE
     if not fallbacks:
         options = replace(options, fallbacks=False, iterations=JUDGE_STEPS)
+        share = JUDGE_ACCURACY_SHARE
     return find_peak(
         after.model,
         point.omega,
         new.harmonics,
         new.samples,
         near=start,
-        tolerance=PEAK_ACCURACY_SHARE * accuracy,
+        tolerance=share * accuracy,
+        enough=0.0 if fallbacks else JUDGE_ENOUGH_SHARE * accuracy,
         options=options,
     )
+
+
+def fall_beside(peak: Peak, shift: float) -> float:
+    """Relative fall of the height next to a peak, by a relative change of frequency; infinite where
+    its curvature is not known.
+    """
+    if peak.bend <= 0:
+        return np.inf
+    bent = peak.bend * (shift * peak.omega * peak.height) ** 2 / 2
+    return float(1 - 1 / np.sqrt(1 + bent))
 
 
 def peak_errors(
@@ -142,6 +172,7 @@ def peak_errors(
     heights = dict.fromkeys(DIRECTIONS, 0.0)
     shifts = dict.fromkeys(DIRECTIONS, 0.0)
     better = {}
+    fall = {}
     for name in DIRECTIONS:
         other = None if name in exact else judge_settings(family, settings, name, point)
         if other is None:
@@ -158,7 +189,7 @@ def peak_errors(
         for pair in pairs:
             if pair is None:
                 continue
-            own, judge = pair
+            own, judge, factor = pair
             try:
                 base = peak
                 if own != settings:
@@ -168,28 +199,29 @@ def peak_errors(
                 continue
             if pair is pairs[0]:
                 better[name] = found
-            heights[name] = abs(base.height / found.height - 1)
-            shifts[name] = abs(base.omega / found.omega - 1)
+            heights[name] = factor * abs(base.height / found.height - 1)
+            shifts[name] = factor * abs(base.omega / found.omega - 1)
+            fall[name] = max(fall_beside(base, shifts[name]), fall_beside(found, shifts[name]))
             break
-    return PeakErrors(heights, shifts, better)
+    return PeakErrors(heights, shifts, better, fall)
 
 
 def poorer_settings(
     family: Family,
     settings: Settings,
     name: str,
-) -> tuple[Settings, Settings] | None:
+) -> tuple[Settings, Settings, float] | None:
     """The judged model and one with half as many contact points or fewer harmonics, which is more
     wrong than the judged one: what is compared where the richer model was not solved. None where
     the model has no less.
     """
     if name == "points" and settings.points is not None and settings.points > 1:
-        return settings, replace(settings, points=settings.points // 2)
+        return settings, replace(settings, points=settings.points // 2), 1.0
     if name == "harmonics":
         least = lowest_harmonics(family, settings)
         fewer = max(least, settings.harmonics // 2)
         if fewer < settings.harmonics:
-            return settings, replace(settings, harmonics=fewer)
+            return settings, replace(settings, harmonics=fewer), 1.0
     return None
 
 
@@ -286,13 +318,20 @@ def _with_harmonics_of_lift_off(
     peak: Peak,
     accuracy: float,
 ) -> tuple[Settings, Peak]:
-    """More than one harmonic, and the peak with them, where most contacts lift off."""
+    """``settings_of_lift_off``, and the peak with them, where most contacts lift off."""
     if not lifts_off_widely(settings, peak.solution):
         return settings, peak
-    richer = enriched_settings(settings, "harmonics")
-    if richer is None:
+    richer = settings_of_lift_off(settings)
+    if richer == settings:
         return settings, peak
     return richer, peak_from(family, settings, peak.solution, richer, accuracy)
+
+
+def settings_of_lift_off(settings: Settings) -> Settings:
+    """More than one harmonic, and LIFTING_POINTS contact points, where these may be chosen."""
+    richer = enriched_settings(settings, "harmonics") or settings
+    few = richer.points is not None and richer.points < LIFTING_POINTS
+    return replace(richer, points=LIFTING_POINTS) if few and "points" in richer.chosen else richer
 
 
 def _with_errors_before(
@@ -362,7 +401,7 @@ def _next_settings(
         if (
             name not in settings.chosen
             or name in fixed
-            or needs[name] <= NEGLIGIBLE_SHARE * accuracy
+            or needs[name] <= max(NEGLIGIBLE_SHARE * accuracy, MINOR_SHARE * sum(needs.values()))
         ):
             continue
         need = np.inf if name == first else needs[name] / (SUFFICIENT_SHARE * accuracy)
@@ -372,7 +411,7 @@ def _next_settings(
         for step in (need, 1.0):
             better = enriched_settings(settings, name, step)
             if better is not None and not _too_large(
-                family, better, peak.solution, MAX_LIFTING_UNKNOWNS
+                family, better, peak.solution, MAX_LIFTING_UNKNOWNS, LARGEST_BALANCE
             ):
                 return better
     return None
@@ -384,10 +423,11 @@ def compared_settings(
     other: Settings,
     name: str,
     point: Solution,
-) -> tuple[Settings, Settings] | None:
-    """The two models whose difference tells an error: the judged and the richer one, or both with
-    REDUCED_SETTINGS harmonics, for the error by harmonics with fewer points, where contacts lift
-    off and the richer one is too large; None where that does not help.
+) -> tuple[Settings, Settings, float] | None:
+    """The two models whose difference tells an error, and by which factor: the judged and the
+    richer one; where contacts lift off and that is too large, one with twice as many contact
+    points, whose error of first order is half as large, or both with REDUCED_SETTINGS harmonics,
+    for the error by harmonics with fewer points; None where that does not help.
 
     The respects are taken as independent of each other then: on the shipped wedge with 4000 N/mm^3
     and 320 N, 16 in place of 63 points a seat change the height by 5.2 % with 3 harmonics and by
@@ -395,7 +435,11 @@ def compared_settings(
     """
     limit = LIFTING_POINTS_JUDGE if name == "points" else LIFTING_JUDGE
     if not _too_large(family, other, point, limit):
-        return settings, other
+        return settings, other, 1.0
+    if name == "points" and settings.points is not None:
+        twice = replace(settings, points=2 * settings.points)
+        if not _too_large(family, twice, point, limit):
+            return settings, twice, 2.0
     respect = "points" if name == "harmonics" else "harmonics"
     here = getattr(settings, respect)
     for fewer in REDUCED_SETTINGS[respect]:
@@ -404,7 +448,7 @@ def compared_settings(
         reduced: dict[str, Any] = {respect: fewer}
         richer_one = replace(other, **reduced)
         if not _too_large(family, richer_one, point, limit):
-            return replace(settings, **reduced), richer_one
+            return replace(settings, **reduced), richer_one, 1.0
     return None
 
 
@@ -412,9 +456,15 @@ def _too_large(
     family: Family,
     settings: Settings,
     point: Solution,
-    limit: int,
+    lifting: float,
+    closed: float = np.inf,
 ) -> bool:
-    """Contacts lift off, and the balance would have more unknowns than a limit."""
+    """The balance would have more unknowns than a limit.
+
+    Args:
+        lifting: that limit where contacts lift off.
+        closed: the same where none does.
+    """
     model = family_member(family, settings).model
     unknowns = model.springs.size * (2 * settings.harmonics + 1)
-    return point.states["lift"] > 0 and unknowns > limit
+    return unknowns > (lifting if point.states["lift"] > 0 else closed)

@@ -32,6 +32,7 @@ from .resonance_choice import (
     judge_settings,
     lifts_off_widely,
     peak_from,
+    settings_of_lift_off,
 )
 from .settings import Settings, enriched_settings
 
@@ -63,7 +64,7 @@ def resonance_curve(
     widen = band is None
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     if lifts_off_widely(settings, peak_of(points)):
-        settings = enriched_settings(settings, "harmonics") or settings
+        settings = settings_of_lift_off(settings)
         points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     used = settings
     swept = settings, 1.0
@@ -218,13 +219,13 @@ def _change(
     pair = compared_settings(family, settings, other, name, point)
     if pair is None:
         return np.inf
-    own, judge = pair
+    own, judge, factor = pair
     options = replace(solver_options(1e-2), fallbacks=False, iterations=JUDGE_STEPS)
     base = point if own == settings else moved_solution(family, settings, point, own, options)
     if not base.converged:
         return np.inf
     better = moved_solution(family, own, replace(base, omega=base.omega * shift), judge, options)
-    return abs(size(base) / size(better) - 1) if better.converged else np.inf
+    return factor * abs(size(base) / size(better) - 1) if better.converged else np.inf
 
 
 def _harmonics_missed(

@@ -19,7 +19,7 @@ from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
-from ..adaptive.resonance_choice import choose_at_peak, peak_from
+from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak, peak_from
 from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
 from .assemble_model import LoadCase, joint_model
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
@@ -33,9 +33,10 @@ from .stages import Bodies, Reduced, harmonic_diameters, reduce_sector, with_dam
 
 # higher ones borrow the nodal diameter next to their own
 EXACT_HARMONICS = 3
-# unknowns of the largest balance that the automatic choice solves; model.harmonics may ask
-# for more
-LARGEST_BALANCE = 6000
+# contact points of both seats with which the automatic choice may take the most harmonics; those
+# with more points are refused by their unknowns (adaptive.resonance_choice)
+FEWEST_POINTS = 16
+HARMONICS = (3, 7, 15, 31)
 
 
 def load_cases(
@@ -111,11 +112,12 @@ def softer_body(
 
 
 def affordable_harmonics(case: LoadCase) -> int:
-    """Harmonics that LARGEST_BALANCE allows with all contact points; twice as many judge them, at
-    single points.
+    """Harmonics that LARGEST_BALANCE allows with FEWEST_POINTS contact points; twice as many judge
+    them, at single points.
     """
-    dofs = case.selection.shape[1]
-    return max((h for h in (3, 7, 15, 31) if dofs * (2 * h + 1) <= LARGEST_BALANCE), default=3)
+    directions = 1 + case.elements.tangents
+    dofs = min(case.selection.shape[1], FEWEST_POINTS * directions)
+    return max((h for h in HARMONICS if dofs * (2 * h + 1) <= LARGEST_BALANCE), default=3)
 
 
 def judged_modes(scene: Scene, settings: Settings) -> int:
