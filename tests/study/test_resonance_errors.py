@@ -125,9 +125,7 @@ def test_a_flat_top_does_not_determine_the_frequency(damping):
     peak = KnownPeak(1.0, 1.0, SimpleNamespace(), bend=2 / damping**2)
     fall = resonance_choice.fall_beside(peak, 0.01)
     assert fall == pytest.approx(1 - 1 / np.hypot(1, 0.01 / damping))
-    errors = resonance_choice.PeakErrors(
-        {"points": 0.001}, {"points": 0.01}, fall={"points": fall}
-    )
+    errors = resonance_choice.PeakErrors({"points": 0.001}, {"points": 0.01}, fall={"points": fall})
     assert errors.needs["points"] == (0.05 if damping < 0.01 else max(fall, 0.001))
 
 
