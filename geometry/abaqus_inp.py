@@ -46,6 +46,8 @@ CELL_FACES: dict[str, list[tuple[int, ...]]] = {
     "wedge": [(0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)],
     "pyramid": [(0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)],
 }
+# of one range of a set: more is a slip of the pen, and fills the memory
+MOST_MEMBERS = 50_000_000
 # a node or element: instance ("" outside instances), its number there
 Key = tuple[str, int]
 
@@ -85,7 +87,7 @@ def read_inp(file: Path) -> RawMesh:
             _add_instance(root, parts, keyword)
         elif keyword.name in KEYWORD_READERS:
             KEYWORD_READERS[keyword.name](scope, keyword)
-    return _raw_mesh(root)
+    return _raw_mesh(root, file)
 
 
 def _read_nodes(scope: _Scope, keyword: Keyword) -> None:
@@ -109,6 +111,9 @@ def _read_elements(scope: _Scope, keyword: Keyword) -> None:
     if word is None:
         count = len(keyword.data)
         scope.left_out[kind] = scope.left_out.get(kind, 0) + count
+        if keyword.options.get("ELSET"):
+            # other sets may name it
+            scope.element_sets.setdefault(keyword.options["ELSET"], [])
         return
     needed = int(NODE_COUNT[word])
     name = keyword.options.get("ELSET", "")
@@ -205,11 +210,18 @@ def _generated_range(
 ) -> range:
     try:
         low, high, step = [*map(int, words), 1][:3]
-        return range(low, high + 1, step)
+        found = range(low, high + 1, step)
     except ValueError:
         raise deck_error(
             keyword.file, line, f"'{', '.join(words)}', expected first, last, step"
         ) from None
+    if len(found) > MOST_MEMBERS:
+        raise deck_error(
+            keyword.file,
+            line,
+            f"'{', '.join(words)}' are {len(found)} members, expected at most {MOST_MEMBERS}",
+        )
+    return found
 
 
 def _instance_member(
@@ -313,7 +325,7 @@ def _axis_rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
-def _raw_mesh(root: _Scope) -> RawMesh:
+def _raw_mesh(root: _Scope, file: Path) -> RawMesh:
     place = {key: i for i, key in enumerate(root.nodes)}
     kinds: dict[str, list[list[int]]] = {}
     where: dict[Key, tuple[str, int]] = {}
@@ -322,8 +334,8 @@ def _raw_mesh(root: _Scope) -> RawMesh:
         if missing:
             inside = f" of the instance {key[0]}" if key[0] else ""
             raise InputError(
-                f"imported.file: element {key[1]}{inside} has the node {missing[0][1]}, which is "
-                "not defined"
+                f"imported.file = '{file}': element {key[1]}{inside} has the node "
+                f"{missing[0][1]}, which is not defined"
             )
         rows = kinds.setdefault(word, [])
         where[key] = (word, len(rows))

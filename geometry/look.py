@@ -118,8 +118,10 @@ def look_at(file: str | Path) -> Look:
     raw = coarse_step(file) if drawing else read_raw(Path(file))
     solid = [cells for word, cells in raw.blocks if DIMENSION.get(FAMILY.get(word, "")) == 3]
     if not solid:
+        there = "; ".join([*_flat_words(raw), *raw.notes]) or "it has none at all"
         raise InputError(
-            f"'{file}': no solid cells, expected tetrahedra, hexahedra, wedges or pyramids"
+            f"'{file}': no solid cells ({there}), expected tetrahedra, hexahedra, wedges or "
+            "pyramids"
         )
     used = np.unique(np.concatenate([cells.ravel() for cells in solid]))
     box = np.stack([raw.points[used].min(axis=0), raw.points[used].max(axis=0)])
@@ -145,6 +147,11 @@ def look_at(file: str | Path) -> Look:
         bore,
         _missing_in_drawing(cut) if drawing else _missing_names(raw, cut, bore),
     )
+
+
+def _flat_words(raw: RawMesh) -> list[str]:
+    """Such as "120 triangle6"."""
+    return [f"{count} {word}" for word, count in _cell_counts(raw).items()]
 
 
 def is_drawing(file: Path) -> bool:
@@ -304,12 +311,16 @@ def _cut_faces(
             if sectors and _cut_faces_match(raw, outside, (i, j), axis, sectors, size, drawing):
                 pairs.setdefault(sectors, []).append((i, j))
         for sectors, some in pairs.items():
-            area = sum(faces[i].area for i, _ in some)
+            low, high = ([one[k] for one in some] for k in (0, 1))
+            # faces that are carried on by a second turn are no cut faces
+            if set(low) & set(high):
+                continue
+            area = sum(faces[i].area for i in low)
             # an axis that matches as much as an earlier one, to rounding, does not replace it
             if area > most * (1 + 1e-9):
                 most = area
-                low = tuple(faces[i].name for i, _ in some)
-                best = CutFaces(axis, sectors, low, tuple(faces[j].name for _, j in some))
+                names = (tuple(faces[i].name for i in side) for side in (low, high))
+                best = CutFaces(axis, sectors, *names)
     return best
 
 

@@ -80,12 +80,14 @@ def read_raw(file: Path) -> RawMesh:
     said = io.StringIO()
     try:
         # readers of foreign files print and raise whatever they like, SystemExit too
-        with contextlib.redirect_stdout(said):
+        with contextlib.redirect_stdout(said), contextlib.redirect_stderr(said):
             raw = SUFFIX_READERS[suffix](file)
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        words = " ".join([str(error), said.getvalue()]).split()
+        # some readers raise without words from what says why
+        own = "" if isinstance(error, SystemExit) else str(error) or str(error.__context__ or "")
+        words = f"{own} {said.getvalue()}".split()
         reason = " ".join(words[:60]) or type(error).__name__
         raise InputError(
             f"imported.file = '{file}': cannot be read as {suffix} ({reason})"
@@ -154,7 +156,9 @@ def read_by_meshio(file: Path) -> RawMesh:
     """.bdf/.nas (property numbers as "pid_1"), .vtu: what meshio knows about names."""
     import meshio
 
-    mesh = meshio.read(file)
+    # the reader itself: meshio.read hides why one failed
+    reader = meshio.vtu if file.suffix.lower() == ".vtu" else meshio.nastran
+    mesh = reader.read(file)
     blocks = [(block.type, from_vtk_order(block.type, block.data)) for block in mesh.cells]
     groups = {
         name: [

@@ -137,10 +137,11 @@ def _check_middles(
     cells: np.ndarray,
     source: str,
 ) -> None:
-    """Refuse two nodes in the middle of one edge: dolfinx crashes on them.
+    """Refuse two nodes in the middle of one edge, and one node in the middle of two edges or at a
+    corner too: dolfinx crashes on them.
 
     They come from cells that share corners but not mid-side nodes, or from a quadrilateral that
-    faces two triangles.
+    faces two triangles; the others from a wrong number in a file.
     """
     family = FAMILY[word]
     k = CORNERS[family]
@@ -156,6 +157,15 @@ def _check_middles(
             f"imported.file = '{source}': cells meet near {x:.6g}, {y:.6g}, {z:.6g} that do not "
             "fit (their edge has two nodes in its middle, or a quadrilateral faces two "
             "triangles), expected a conforming mesh with merged nodes"
+        )
+    pairs = np.unique(np.column_stack([middle, ends]), axis=0)
+    nodes, edges = np.unique(pairs[:, 0], return_counts=True)
+    twice = np.union1d(nodes[edges > 1], np.intersect1d(nodes, cells[:, :k]))
+    if len(twice):
+        x, y, z = points[twice[0]]
+        raise InputError(
+            f"imported.file = '{source}': the node at {x:.6g}, {y:.6g}, {z:.6g} is in the middle "
+            "of two edges, or at a corner too, expected a node of its own for each edge"
         )
 
 

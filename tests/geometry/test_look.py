@@ -6,6 +6,7 @@ from pathlib import Path
 import decks
 import numpy as np
 import pytest
+from structured import box
 
 import bladefem
 from bladefem.cli.main import main
@@ -59,6 +60,14 @@ def test_facets_keep_their_face_when_cells_change(deck):
     faces = numbered_faces(raw)
     corners = [face_corners(faces, number) for number in range(faces.count)]
     assert sum(len(part) for parts in corners for part in parts) == len(faces.corners)
+
+
+def test_faces_that_a_second_turn_carries_on_are_no_cut_faces(tmp_path):
+    """A square bar about its own axis; a quarter of a disc would match by the same turn."""
+    bar = box((3, 2, 2), (0.3, 0.04, 0.04), "tetra10", origin=(0.0, -0.02, -0.02))
+    m = decks.Model(bar.points, [("tetra10", bar.bodies["blade"])], {}, {})
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(m, {})))
+    assert look_at(tmp_path / "a.inp").cut is None
 
 
 def test_command(deck, capsys):
