@@ -318,6 +318,22 @@ class Mistuning:
     load: float = quantity(
         0.0, "1", 0.0, 0.3, "relative standard deviation of the dampers' normal loads"
     )
+    mass: float = quantity(
+        0.0,
+        "1",
+        0.0,
+        0.3,
+        "relative standard deviation of the dampers' masses, with their inertia and the normal "
+        "load that it makes",
+    )
+    traction: float = quantity(
+        0.0,
+        "1",
+        0.0,
+        1.0,
+        "largest share of Coulomb's limit that the loading history leaves in the contacts of a "
+        "damper, in a direction of its own",
+    )
     seed: int = quantity(0, "1", 0, 1000000, "of the draws")
     wheels: int = quantity(30, "1", 2, 100000, "drawn by 'bladefem scatter' for each load")
     level: str = quantity(

@@ -30,7 +30,7 @@ NEGLIGIBLE_STIFFNESS_SHARE = 1e-12
 class DiameterParts:
     """What stays at all frequencies; D = N/2 + 1 nodal diameters, P ports, k modes of both bodies.
 
-    Ports are in the order contact, blade, load, probe.
+    Ports are in the order contact, blade, modes of the damper, load, probe.
     """
 
     # (D, P, P) residual flexibility with contact springs [m/N]
@@ -51,8 +51,13 @@ class DiameterParts:
     mean: RealOrComplex
     contact: slice
     blade: slice
+    damper: slice
     load: slice
     probe: slice
+
+    def deviating(self, dampers: bool) -> slice:
+        """The readings of the blades, with those of the dampers or without."""
+        return slice(self.blade.start, self.damper.stop if dampers else self.blade.stop)
 
 
 def diameter_parts(wheel: Wheel) -> DiameterParts:
@@ -99,8 +104,18 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
 def _port_sizes(wheel: Wheel) -> list[int]:
     body = wheel.sectors[0]
     everything = np.arange(len(body.residual))
-    others = [len(everything[body.ports.get(n, slice(0, 0))]) for n in ("blade", "load", "probe")]
-    return [len(wheel.rows), *others]
+    blade, load, probe = (
+        len(everything[body.ports.get(n, slice(0, 0))]) for n in ("blade", "load", "probe")
+    )
+    return [len(wheel.rows), blade, damper_modes(wheel), load, probe]
+
+
+def damper_modes(wheel: Wheel) -> int:
+    """Modes of a damper, rigid ones included."""
+    damper = wheel.damper
+    if damper is None:
+        return 0
+    return len(damper.mass) if isinstance(damper, RigidBody) else len(damper.omega)
 
 
 def _residual_and_modes(
@@ -125,22 +140,30 @@ def _residual_and_modes(
     else:
         other = np.zeros((len(contact), 0))
         flexibility = np.zeros((len(contact), len(contact)))
+    modes = other.shape[1]
     R = np.zeros((len(diameters), ports, ports), dtype=complex)
-    L = np.zeros((len(diameters), ports, most + other.shape[1]), dtype=complex)
+    L = np.zeros((len(diameters), ports, most + modes), dtype=complex)
     for d, body in enumerate(diameters):
-        order = _port_order(wheel, body)
-        R[d] = body.residual[np.ix_(order, order)]
+        order, rows = _port_order(wheel, body)
+        R[d][np.ix_(rows, rows)] = body.residual[np.ix_(order, order)]
         R[d][np.ix_(contact, contact)] += flexibility
-        L[d, :, : len(body.omega)] = body.shapes[order]
+        L[d, rows, : len(body.omega)] = body.shapes[order]
         L[d, contact, most:] = -other
+        # the rows between blade and load read the damper's modes
+        own = np.setdiff1d(np.arange(ports), rows)
+        L[d, own, most:] = np.eye(modes)
     return R, L
 
 
-def _port_order(wheel: Wheel, body: PortModel) -> np.ndarray:
+def _port_order(wheel: Wheel, body: PortModel) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the body's ports in the wheel's order, and their places there."""
     everything = np.arange(len(body.residual))
     parts = [everything[body.ports["contact"]][wheel.rows]]
     parts += [everything[body.ports.get(name, slice(0, 0))] for name in ("blade", "load", "probe")]
-    return np.concatenate(parts)
+    order = np.concatenate(parts)
+    places = np.arange(len(order))
+    behind = places >= len(parts[0]) + len(parts[1])
+    return order, places + damper_modes(wheel) * behind
 
 
 def _modal_terms(

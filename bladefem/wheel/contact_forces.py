@@ -43,6 +43,7 @@ def contact_forces(
     wheel: Wheel,
     elements: Elements,
     w: np.ndarray,
+    start: np.ndarray,
     samples: int,
     jacobian: bool = True,
 ) -> ContactForces:
@@ -50,12 +51,13 @@ def contact_forces(
 
     Args:
         elements: of all dampers.
+        start: (N n, tangents) friction forces from which the law starts [N].
         samples: a period; 0 locates transitions exactly, for elements of one tangent.
     """
     count, n, d, K = w.shape
     missing = 1 + elements.tangents - d
     flat = w.reshape(count * n, d, K).copy()
-    flat[:, :, 0] += wheel.offset(elements).reshape(count * n, d)
+    flat[:, :, 0] += wheel.offset(elements, start).reshape(count * n, d)
     if missing:
         flat = np.concatenate([np.zeros((count * n, missing, K)), flat], axis=1)
     if samples:

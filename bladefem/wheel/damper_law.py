@@ -23,7 +23,7 @@ from ..friction.law_table import select_elements
 from ..reduction.assemble import folded_diameter
 from ..util.arrays import ComplexArray, RealArray, RealOrComplex
 from .law_kernel import GHOST_POINTS, evaluate_law
-from .model import Wheel
+from .model import Pattern, Wheel
 from .tuned import travelling_order
 
 # of the table: sizes, ratios and phases of the two amplitudes
@@ -412,7 +412,9 @@ def _contact(
     many = select_elements(e, np.tile(np.arange(n), total))
     missing = 1 + many.tangents - d
     flat = np.zeros((total * n, missing + d, 3))
-    flat[:, missing:, 0] = np.tile(wheel.offset(wheel.all_elements)[0], (total, 1))
+    whole = wheel.all_elements
+    offset = wheel.offset(whole, wheel.first_forces(Pattern(), whole))
+    flat[:, missing:, 0] = np.tile(offset[0], (total, 1))
     flat[:, missing:, 1] = w.real.reshape(-1, d)
     flat[:, missing:, 2] = -w.imag.reshape(-1, d)
     found = evaluate(many, flat, samples, True, precision="single")

@@ -36,6 +36,8 @@ class WheelFlexibility:
     # (H+1, N, q, q) dynamic stiffness of the deviations, and LU factors of 1 + E A_yy; empty: tuned
     E: np.ndarray
     factors: tuple[tuple[np.ndarray, np.ndarray], ...]
+    # readings of blades and dampers that the deviations act on
+    deviating: slice
     # whether the mean takes part in the balance
     coupled: bool
 
@@ -54,9 +56,9 @@ class WheelFlexibility:
         f = to_diameters(force)
         out = tuned_product(parts, self.T, f, rows, columns)
         if len(self.factors):
-            y = from_diameters(tuned_product(parts, self.T, f, parts.blade, columns))
+            y = from_diameters(tuned_product(parts, self.T, f, self.deviating, columns))
             z = to_diameters(self.deviation_forces(y))
-            out -= tuned_product(parts, self.T, z, rows, parts.blade)
+            out -= tuned_product(parts, self.T, z, rows, self.deviating)
         if not self.coupled:
             out[:, :, 0] = 0.0
         return from_diameters(out)
@@ -90,12 +92,17 @@ def wheel_flexibility(
     _, Z, T, shared = wheel.kept["last"]
     E = np.zeros((0, 0, 0, 0))
     factors: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    dampers = pattern.heavier_dampers
+    deviating = parts.deviating(dampers)
     if not pattern.tuned:
-        if "yy" not in shared:
-            shared["yy"] = [_blade_matrix(parts, T, h) for h in range(harmonics + 1)]
-        E = np.array([pattern.change(h * omega) for h in range(harmonics + 1)])
-        factors = tuple(_factorise_blocks(A, E[h]) for h, A in enumerate(shared["yy"]))
-    return WheelFlexibility(omega, parts, Z, T, E, factors, wheel.coupled)
+        if dampers not in shared:
+            shared[dampers] = [
+                _reading_matrix(parts, T, h, deviating) for h in range(harmonics + 1)
+            ]
+        sizes = parts.blade.stop - parts.blade.start, deviating.stop - parts.damper.start
+        E = np.array([pattern.change(h * omega, *sizes) for h in range(harmonics + 1)])
+        factors = tuple(_factorise_blocks(A, E[h]) for h, A in enumerate(shared[dampers]))
+    return WheelFlexibility(omega, parts, Z, T, E, factors, deviating, wheel.coupled)
 
 
 def to_diameters(x: np.ndarray) -> np.ndarray:
@@ -108,16 +115,17 @@ def from_diameters(x: np.ndarray) -> np.ndarray:
     return np.fft.ifft(x, axis=0)
 
 
-def _blade_matrix(
+def _reading_matrix(
     parts: DiameterParts,
     T: np.ndarray,
     h: int,
+    rows: slice,
 ) -> np.ndarray:
-    """(N q, N q) flexibility among the readings of all blades, tuned."""
+    """(N q, N q) flexibility among the readings of all sectors, tuned."""
     count = len(T)
-    U = parts.U[:, parts.blade]
+    U = parts.U[:, rows]
     blocks = U @ T[:, h] @ U.conj().swapaxes(1, 2)
-    half = parts.A[:, parts.blade, parts.blade]
+    half = parts.A[:, rows, rows]
     blocks += np.concatenate([half, half[count - len(half) : 0 : -1].conj()])
     by_distance = np.fft.ifft(blocks, axis=0)
     sectors = np.arange(count)

@@ -5,7 +5,7 @@ neighbours, the forces on all blades, and what differs from blade to blade.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -35,20 +35,45 @@ class Pattern:
     mass: RealArray | None = None
     # friction elements of all dampers, sector by sector, N times as many as the wheel has
     elements: Elements | None = None
+    # (N,) relative deviations of the dampers' inertia; the normal loads are in the elements
+    damper_mass: RealArray | None = None
+    # (N n, tangents) friction forces from which the law starts; those of the wheel when None [N]
+    start: RealArray | None = None
 
     @property
     def tuned(self) -> bool:
-        """No blade deviates; its dampers may."""
-        return not any(x is not None and np.any(x) for x in (self.stiffness, self.mass))
+        """No blade deviates, and no damper in its inertia; contacts may."""
+        parts = (self.stiffness, self.mass, self.damper_mass)
+        return not any(x is not None and np.any(x) for x in parts)
 
-    def change(self, w: float) -> np.ndarray:
-        """(N, q, q) dynamic stiffness of the deviations at circular frequency w."""
-        parts = [np.asarray(x) for x in (self.stiffness, self.mass) if x is not None]
-        total = np.zeros(parts[0].shape)
+    @property
+    def heavier_dampers(self) -> bool:
+        """The inertia of some damper deviates."""
+        return self.damper_mass is not None and bool(np.any(self.damper_mass))
+
+    def change(
+        self,
+        w: float,
+        readings: int,
+        damper: int,
+    ) -> np.ndarray:
+        """(N, q + k, q + k) dynamic stiffness of the deviations at circular frequency w, on the
+        readings of the blades and on the modes of the dampers, whose mass is 1.
+
+        Args:
+            readings: q, of a blade.
+            damper: k, modes of a damper; 0 where none deviates.
+        """
+        given = (self.stiffness, self.mass, self.damper_mass)
+        count = next(len(x) for x in given if x is not None)
+        total = np.zeros((count, readings + damper, readings + damper))
         if self.stiffness is not None:
-            total = total + self.stiffness
+            total[:, :readings, :readings] += self.stiffness
         if self.mass is not None:
-            total = total - w**2 * self.mass
+            total[:, :readings, :readings] -= w**2 * self.mass
+        if damper and self.damper_mass is not None:
+            own = np.arange(readings, readings + damper)
+            total[:, own, own] = -(w**2) * self.damper_mass[:, None]
         return total
 
 
@@ -139,13 +164,16 @@ class Wheel:
         force[:, first:] = elements.traction
         return force.reshape(self.count, self.nodes, self.directions)
 
-    def offset(self, elements: Elements) -> np.ndarray:
-        """(N, n, d) mean displacement that makes the friction law start from its preload, see
-        `hbm.model.ReducedModel.offset` [m].
+    def first_forces(self, pattern: Pattern, elements: Elements) -> np.ndarray:
+        """(N n, tangents) friction forces of all dampers from which the law starts [N]."""
+        if pattern.start is not None:
+            return pattern.start
+        return elements.traction if self.start is None else np.tile(self.start, (self.count, 1))
+
+    def offset(self, elements: Elements, start: np.ndarray) -> np.ndarray:
+        """(N, n, d) mean displacement that makes the friction law start from forces (N n,
+        tangents), see `hbm.model.ReducedModel.offset` [m].
         """
-        start = elements.traction
-        if self.start is not None:
-            start = np.tile(self.start, (self.count, 1))
         kt = elements.kt[:, None]
         moved = np.zeros((len(kt), self.directions))
         tangential = moved[:, self.directions - elements.tangents :]
@@ -243,6 +271,26 @@ def pattern_elements(wheel: Wheel, pattern: Pattern) -> Elements:
     if pattern.elements.tangents != wheel.elements.tangents:
         raise InputError("pattern.elements: expected as many tangents as the wheel's elements have")
     return _spread(pattern.elements, wheel.nodes, wheel.count)
+
+
+def heavier_damper(
+    damper: RigidBody | PortModel | None,
+    factor: float,
+) -> RigidBody | PortModel | None:
+    """A damper of another density: all its inertia times a factor, its stiffness and its viscous
+    damping as they are.
+    """
+    if damper is None:
+        return None
+    if isinstance(damper, RigidBody):
+        return replace(damper, mass=factor * damper.mass)
+    # modes of mass 1 again
+    return replace(
+        damper,
+        omega=damper.omega / np.sqrt(factor),
+        shapes=damper.shapes / np.sqrt(factor),
+        damping=None if damper.damping is None else damper.damping / factor,
+    )
 
 
 def _spread(

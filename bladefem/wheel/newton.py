@@ -47,6 +47,8 @@ class WheelBalance:
     flex: WheelFlexibility
     # of all dampers
     elements: Elements
+    # (N n, tangents) friction forces from which the law starts [N]
+    start: np.ndarray
     # (N, n, d, K) displacements of full stick [m]
     stuck: np.ndarray
     # a period, 0: transitions located exactly
@@ -84,7 +86,9 @@ def evaluate_wheel(
     jacobian: bool = True,
 ) -> WheelState:
     """Forces and residual at w (N, n, d, K)."""
-    forces = contact_forces(balance.wheel, balance.elements, w, balance.samples, jacobian)
+    forces = contact_forces(
+        balance.wheel, balance.elements, w, balance.start, balance.samples, jacobian
+    )
     residual = w - balance.stuck + contact_motions(balance.flex, forces.p)
     size = max(np.linalg.norm(w), np.linalg.norm(balance.stuck), np.finfo(float).tiny)
     return WheelState(w, forces, residual, float(np.linalg.norm(residual) / size))

@@ -13,7 +13,7 @@ from ..hbm.linear.bodies import Damping
 from ..hbm.model import ReducedModel
 from ..hbm.sector_modes import real_form
 from ..reduction.assemble import join_bodies
-from .model import Pattern, Wheel, pattern_elements
+from .model import Pattern, Wheel, heavier_damper, pattern_elements
 
 # residual flexibility of the blade readings over that of their modes: no deviation acts on it
 NEGLIGIBLE_FLEXIBILITY_SHARE = 1e-9
@@ -66,18 +66,23 @@ def one_body_model(
         pattern_elements(wheel, pattern),
         {h: np.asarray(f).ravel() for h, f in wheel.excitation.items()},
         Damping(),
-        _all_dampers(wheel),
+        _all_dampers(wheel, pattern),
         wheel.damper_damping,
         coupled=wheel.coupled,
+        start=pattern.start,
     )
 
 
-def _all_dampers(wheel: Wheel) -> RigidBody | tuple[PortModel, ...] | None:
+def _all_dampers(wheel: Wheel, pattern: Pattern) -> RigidBody | tuple[PortModel, ...] | None:
+    factors = np.ones(wheel.count)
+    if pattern.damper_mass is not None:
+        factors = factors + pattern.damper_mass
     if isinstance(wheel.damper, RigidBody):
-        ones = np.eye(wheel.count)
-        mass = np.asarray(np.kron(ones, wheel.damper.mass), float)
-        return RigidBody(mass, np.asarray(np.kron(ones, wheel.damper.B), float))
-    return None if wheel.damper is None else (join_bodies((wheel.damper,) * wheel.count),)
+        mass = np.asarray(np.kron(np.diag(factors), wheel.damper.mass), float)
+        return RigidBody(mass, np.asarray(np.kron(np.eye(wheel.count), wheel.damper.B), float))
+    dampers = [heavier_damper(wheel.damper, factor) for factor in factors]
+    bodies = tuple(one for one in dampers if isinstance(one, PortModel))
+    return (join_bodies(bodies),) if bodies else None
 
 
 def _port_rows(wheel: Wheel) -> dict[str, np.ndarray]:
@@ -135,7 +140,7 @@ def _mistuned_modes(
     """Eigenvalues and vectors of the mistuned wheel in its tuned modes."""
     K = np.diag(omega**2)
     M = np.eye(len(omega))
-    if pattern.tuned:
+    if pattern.stiffness is None and pattern.mass is None:
         return omega**2, M
     readings = shapes[rows]
     static = (readings[:, omega > 0] / omega[omega > 0] ** 2) @ readings[:, omega > 0].T

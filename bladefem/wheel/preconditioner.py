@@ -115,7 +115,7 @@ def _dense_factors(
     U = parts.U[:, parts.contact][:, :, kept]
     turned = U.conj().swapaxes(1, 2)
     spectrum = np.fft.fft(C, axis=0) / count
-    readings = parts.U[:, parts.blade][:, :, kept]
+    readings = parts.U[:, flex.deviating][:, :, kept]
     deviations = np.fft.fft(flex.E[h], axis=0) / count if len(flex.factors) else None
     system = np.empty((count, k, count, k), dtype=complex)
     diameters = np.arange(count)

@@ -95,7 +95,8 @@ def solve_wheel(
     flex = wheel_flexibility(wheel, omega, H, pattern)
     elements = pattern_elements(wheel, pattern)
     stuck = _shaped(wheel, linear_motion(wheel, flex, "contact"))
-    balance = WheelBalance(wheel, flex, elements, stuck, samples)
+    first = wheel.first_forces(pattern, elements)
+    balance = WheelBalance(wheel, flex, elements, first, stuck, samples)
     end, method = _attempts(balance, start, options)
     return _solution(balance, end, method)
 
@@ -202,7 +203,8 @@ def free_wheel(
     pattern: Pattern = TUNED_PATTERN,
 ) -> np.ndarray:
     """(N, H+1, probes) amplitudes without contact forces [m]."""
-    return stuck_wheel(without_contact(wheel), omega, H, replace(pattern, elements=None))
+    blades = replace(pattern, elements=None, damper_mass=None, start=None)
+    return stuck_wheel(without_contact(wheel), omega, H, blades)
 
 
 def without_contact(wheel: Wheel) -> Wheel:
@@ -221,13 +223,18 @@ def linear_motion(
     port: str,
 ) -> np.ndarray:
     """(N, rows, H+1) motion of a port by the excitation, all contacts sticking [m]."""
+    return flex.motion(excitation_forces(wheel, flex), getattr(flex.parts, port), flex.parts.load)
+
+
+def excitation_forces(wheel: Wheel, flex: WheelFlexibility) -> np.ndarray:
+    """(N, loads, H+1) amplitudes of the excitation on all blades [N]."""
     harmonics = flex.T.shape[1]
     parts = flex.parts
     force = np.zeros((wheel.count, parts.load.stop - parts.load.start, harmonics), dtype=complex)
     for h, amplitudes in wheel.excitation.items():
         if h < harmonics:
             force[:, :, h] = amplitudes
-    return flex.motion(force, getattr(parts, port), parts.load)
+    return force
 
 
 def deviation_forces(
@@ -243,11 +250,14 @@ def deviation_forces(
     beyond = point.f - wheel.springs[:, :, None] * point.w
     beyond[..., 0] -= wheel.preload(pattern_elements(wheel, pattern))
     forces = to_complex(beyond.reshape(count, -1, beyond.shape[3]))
-    readings = linear_motion(wheel, flex, "blade")
-    readings = readings - flex.motion(forces, flex.parts.blade, flex.parts.contact)
+    blade = flex.parts.blade
     if not len(flex.factors):
-        return np.zeros_like(readings)
-    return -np.einsum("hnij,njh->nih", flex.E, readings)
+        return np.zeros((count, blade.stop - blade.start, forces.shape[2]), dtype=complex)
+    readings = flex.motion(excitation_forces(wheel, flex), flex.deviating, flex.parts.load)
+    readings = readings - flex.motion(forces, flex.deviating, flex.parts.contact)
+    found = -np.einsum("hnij,njh->nih", flex.E, readings)
+    # what the dampers' own deviations do comes by the contacts
+    return found[:, : blade.stop - blade.start]
 
 
 def _homotopy(balance: WheelBalance, options: Options) -> WheelNewton:
@@ -377,3 +387,19 @@ def _check_point(
             )
         if not np.isfinite(value).all():
             raise InputError(f"pattern.{name}: expected finite numbers")
+    _check_dampers(wheel, pattern)
+
+
+def _check_dampers(wheel: Wheel, pattern: Pattern) -> None:
+    mass = pattern.damper_mass
+    if mass is not None and (np.shape(mass) != (wheel.count,) or not (np.array(mass) > -1).all()):
+        raise InputError(
+            f"pattern.damper_mass: expected {wheel.count} relative deviations above -1, one a "
+            "damper"
+        )
+    wanted = (wheel.count * wheel.nodes, wheel.elements.tangents)
+    if pattern.start is not None and np.shape(pattern.start) != wanted:
+        raise InputError(
+            f"pattern.start of shape {np.shape(pattern.start)}: expected {wanted}, forces of the "
+            "friction elements of all dampers"
+        )

@@ -118,10 +118,7 @@ def test_dampers_scatter(made):
     wheel, family, _ = made
     scatter = Scatter(0.01, friction=0.08, stiffness=0.08, load=0.08, seed=2)
     drawn = drawn_patterns(wheel, scatter, 6, lambda d: lumped_pattern(BLADES, d))
-    draws = drawn_deviations(BLADES.count, scatter, 6)
-    factors = {
-        name: 1 + 0.08 * draws[:, 1 + i] for i, name in enumerate(("friction", "stiffness", "load"))
-    }
+    factors = drawn_deviations(BLADES.count, scatter, 6).factors(scatter)
     changed = {
         name: tuple(
             damper_law(wheel, family, SIZES, 64, scaled_elements(wheel.elements, name, factor))

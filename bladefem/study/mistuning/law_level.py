@@ -11,9 +11,9 @@ import numpy as np
 
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
-from ...wheel.damper_law import Family, damper_law, family_of_modes, scaled_elements
+from ...wheel.damper_law import DamperLaw, Family, damper_law, family_of_modes, scaled_elements
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
-from ...wheel.model import Pattern, Wheel
+from ...wheel.model import Pattern, Wheel, heavier_damper
 from ...wheel.scatter import Scatter, drawn_deviations
 from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification
@@ -24,7 +24,7 @@ from ..pipeline.loads import Curve
 # amplified by 2.8; far beyond, light dampers lift off and have no one motion
 MOTION_RANGE = 0.05, 4.0
 # scattered parameters but the load, which scales exactly
-CHANGED_PARAMETERS = ("friction", "stiffness")
+CHANGED_PARAMETERS = ("friction", "stiffness", "mass")
 # standard deviations at which the changed laws are made
 DEVIATIONS_OF_CHANGE = 1.5
 
@@ -49,13 +49,9 @@ def law_level(
         NotSolvedError: the damper's small balance has no solution somewhere.
     """
     family = family_of_modes(wheel, curve.peak.omega, mode)
-    law = _scattered_law(wheel, family, scatter, curve)
+    law = _scattered_law(wheel, family, scatter, curve, mode)
     draws = drawn_deviations(wheel.count, scatter, len(patterns))
-    factors = {
-        name: 1 + getattr(scatter, name) * draws[:, 1 + i]
-        for i, name in enumerate(("friction", "stiffness", "load"))
-        if getattr(scatter, name) > 0
-    }
+    factors = draws.factors(scatter)
     deviation = pattern_deviations(patterns, family, wheel.count)
     return law_statistics(LawWheels(family, law, deviation, factors), curve.load, band)
 
@@ -65,6 +61,7 @@ def _scattered_law(
     family: Family,
     scatter: Scatter,
     curve: Curve,
+    mode: int,
 ) -> ScatteredLaw:
     """The law of the nominal damper, and of those with more and less of what scatters."""
     order = travelling_order(wheel) or 0
@@ -76,13 +73,30 @@ def _scattered_law(
         share = DEVIATIONS_OF_CHANGE * getattr(scatter, name)
         if share > 0:
             more, less = (
-                damper_law(
-                    wheel, family, sizes, samples, scaled_elements(wheel.elements, name, factor)
-                )
+                _changed_law(wheel, curve.peak.omega, mode, sizes, samples, name, factor)
                 for factor in (1 + share, 1 - share)
             )
             changed[name] = (more, less, share)
     return ScatteredLaw(damper_law(wheel, family, sizes, samples), changed)
+
+
+def _changed_law(
+    wheel: Wheel,
+    omega: float,
+    mode: int,
+    sizes: tuple[float, float],
+    samples: int,
+    name: str,
+    factor: float,
+) -> DamperLaw:
+    """The law of a damper with another friction coefficient, contact stiffness or mass."""
+    elements = None
+    if name == "mass":
+        # of the same load: that is a parameter of its own
+        wheel = replace(wheel, damper=heavier_damper(wheel.damper, factor))
+    else:
+        elements = scaled_elements(wheel.elements, name, factor)
+    return damper_law(wheel, family_of_modes(wheel, omega, mode), sizes, samples, elements)
 
 
 def with_checks(

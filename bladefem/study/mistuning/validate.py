@@ -59,6 +59,11 @@ def refuse_scatter(scene: Scene) -> None:
             f"study.masses: {len(scene.study.masses or ())} damper masses, expected one for "
             "'bladefem scatter'"
         )
+    if scene.mistuning.traction > 0 and scene.mistuning.level == LAW_LEVEL:
+        raise InputError(
+            f"mistuning.traction = {scene.mistuning.traction:g}: the law of one damper knows one "
+            'state of its friction forces, expected mistuning.level = "whole wheel"'
+        )
 
 
 def scene_deviations(
@@ -90,14 +95,14 @@ def scene_deviations(
         raise InputError("mistuning: expected a pattern file or a scatter")
     # the same first wheel as the statistics draw
     scatter = Scatter(given.scatter, seed=given.seed)
-    deviation = scatter.blades * drawn_deviations(count, scatter, 1)[0, 0]
+    deviation = drawn_deviations(count, scatter, 1).blades[0]
     return np.repeat(deviation[:, None], families, axis=1)
 
 
 def scene_scatter(scene: Scene) -> Scatter:
     """The scene's standard deviations."""
     m = scene.mistuning
-    return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.seed)
+    return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.mass, m.traction, m.seed)
 
 
 def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
