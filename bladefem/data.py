@@ -72,6 +72,8 @@ class PortModel:
     damping: RealOrComplex | None = None
     # (m, m) forces of the displacements that have no energy, by unsymmetric stiffness [1/s^2]
     circulatory: RealOrComplex | None = None
+    # a flow may feed modes: their damping may be negative
+    self_excited: bool = False
 
     def __post_init__(self) -> None:
         p = len(self.residual)
@@ -92,7 +94,8 @@ class PortModel:
                     f"PortModel.{name} of shape {np.shape(value)}: expected finite numbers of "
                     f"shape {' or '.join(map(str, shapes))}"
                 )
-            if (name == "omega" or np.ndim(value) == 1) and np.any(value < 0):
+            fed = name == "damping" and self.self_excited
+            if (name == "omega" or np.ndim(value) == 1) and not fed and np.any(value < 0):
                 raise InputError(
                     f"PortModel.{name} from {np.min(value):.4g}: expected no negative number"
                 )

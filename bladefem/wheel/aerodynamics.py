@@ -3,17 +3,19 @@ flutter, and the limit cycle that friction leaves.
 
 A blade mode of mass 1 in nodal diameter d feels -c_d q, c_d a complex stiffness [1/s^2]: its real
 part shifts the squared frequency, its imaginary part over 2 omega^2 is a damping ratio, negative
-where the flow feeds the motion. Influence coefficients L_k are the forces on a blade by the motion
-of the blade k places ahead: c_d = sum_k L_k e^{j 2 pi d k / N}.
+where the flow feeds the motion. Away from the mode's own frequency the imaginary part acts as a
+viscous force does, Im(c_d) / omega times the velocity. Influence coefficients L_k are the forces on
+a blade by the motion of the blade k places ahead: c_d = sum_k L_k e^{j 2 pi d k / N}.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..data import PortModel
 from ..errors import InputError
 from ..hbm.nonlinear_modes import NonlinearMode
 
@@ -28,6 +30,31 @@ class LimitCycle:
     omega: float
     # larger motions decay and smaller ones grow
     stable: bool
+
+
+def with_flow(body: PortModel, influence: np.ndarray) -> PortModel:
+    """A sector in one nodal diameter with the forces of the flow on its modes.
+
+    Args:
+        influence: (m,) complex aerodynamic stiffness of each mode [1/s^2]; zero for rigid ones.
+
+    Raises:
+        InputError: the flow leaves a mode no stiffness.
+    """
+    if not np.any(influence):
+        return body
+    squared = body.omega**2 + influence.real
+    if (squared[influence != 0] <= 0).any():
+        raise InputError(
+            "influence: the aerodynamic stiffness leaves a mode no stiffness of its own, expected "
+            "a smaller frequency shift"
+        )
+    rate = np.divide(influence.imag, body.omega, out=np.zeros_like(squared), where=body.omega > 0)
+    own = np.zeros(len(rate)) if body.damping is None else body.damping
+    damping = own + (rate if own.ndim == 1 else np.diag(rate))
+    return replace(
+        body, omega=np.sqrt(squared), damping=damping, self_excited=bool((rate < 0).any())
+    )
 
 
 def influence_of_distance(

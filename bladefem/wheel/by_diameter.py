@@ -11,7 +11,7 @@ frequency and the harmonic; d > N/2 are the conjugates of N - d. Sums over secto
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,14 +39,12 @@ class DiameterParts:
     U: ComplexArray
     # (N, k, k) stiffness of the contact springs in the modes [1/s^2]
     N: ComplexArray
-    # (N, k) squared circular frequencies [1/s^2]
+    # (N, k) squared circular frequencies, those of a flow's shift in them [1/s^2]
     stiffness: RealArray
-    # (N, k, k) viscous damping [1/s]
+    # (N, k, k) viscous damping, with that of the flow [1/s]
     viscous: ComplexArray
     # (N, k) loss factor times squared frequency [1/s^2]
     hysteretic: RealArray
-    # (N, k) aerodynamic stiffness, not for the mean [1/s^2]
-    influence: ComplexArray
     # (N, k, k) T of the mean [s^2]
     mean: RealOrComplex
     contact: slice
@@ -76,26 +74,24 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
     springs = np.zeros(ends[-1])
     springs[: ends[0]] = wheel.springs.ravel()
     A, U, _, N = frequency_independent_parts(R, L, springs)
-    stiffness, viscous, hysteretic = _modal_terms(wheel, diameters, most)
+    count = wheel.count
+    stiffness, viscous, hysteretic = _modal_terms(wheel, most)
+    # the flow does nothing to the mean
+    still, _, _ = _modal_terms(replace(wheel, influence=None), most)
     mean = np.array(
         [
-            _mean_flexibility(stiffness[d], L[d, : sizes[0]], springs[: sizes[0]], N[d], wheel.hold)
+            _mean_flexibility(still[d], L[d, : sizes[0]], springs[: sizes[0]], N[d], wheel.hold)
             for d in range(len(diameters))
         ]
     )
-    count = wheel.count
     slices = [slice(int(e - s), int(e)) for s, e in zip(sizes, ends, strict=True)]
-    influence = np.zeros((count, L.shape[2]), dtype=complex)
-    if wheel.influence is not None:
-        influence[:, :most] = wheel.influence
     return DiameterParts(
         A,
         _all_diameters(U, count),
         _all_diameters(N, count),
-        _all_diameters(stiffness, count),
-        _all_diameters(viscous, count),
-        _all_diameters(hysteretic, count),
-        influence,
+        stiffness,
+        viscous,
+        hysteretic,
         _all_diameters(mean if wheel.coupled else np.zeros_like(mean), count),
         *slices,
     )
@@ -168,10 +164,9 @@ def _port_order(wheel: Wheel, body: PortModel) -> tuple[np.ndarray, np.ndarray]:
 
 def _modal_terms(
     wheel: Wheel,
-    diameters: list[PortModel],
     most: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Squared frequencies (D, k), viscous damping (D, k, k) and loss terms (D, k)."""
+    """Squared frequencies (N, k), viscous damping (N, k, k) and loss terms (N, k)."""
     damper = wheel.damper
     extra: tuple[np.ndarray, np.ndarray | None]
     if isinstance(damper, RigidBody):
@@ -181,10 +176,11 @@ def _modal_terms(
     else:
         extra = (np.zeros(0), None)
     k = most + len(extra[0])
-    stiffness = np.zeros((len(diameters), k))
-    viscous = np.zeros((len(diameters), k, k), dtype=complex)
-    hysteretic = np.zeros((len(diameters), k))
-    for d, body in enumerate(diameters):
+    stiffness = np.zeros((wheel.count, k))
+    viscous = np.zeros((wheel.count, k, k), dtype=complex)
+    hysteretic = np.zeros((wheel.count, k))
+    for d in range(wheel.count):
+        body, mirrored = wheel.wave(d)
         for start, omega, own, law in (
             (0, body.omega, body.damping, wheel.damping),
             (most, *extra, wheel.damper_damping),
@@ -193,6 +189,8 @@ def _modal_terms(
             stiffness[d, part] = omega**2
             viscous[d, part, part] = _damping_matrix(omega, own, law)
             hysteretic[d, part] = law.structural * omega**2
+        if mirrored:
+            viscous[d] = viscous[d].conj()
         # diameters with fewer modes: nothing moves these
         stiffness[d, len(body.omega) : most] = 1e200
     return stiffness, viscous, hysteretic
@@ -249,7 +247,6 @@ def modal_impedance(
     Z = 1j * w[None, :, None, None] * parts.viscous[:, None]
     diagonal = parts.stiffness[:, None, :] - (w**2)[None, :, None]
     diagonal = diagonal + 1j * np.sign(w)[None, :, None] * parts.hysteretic[:, None, :]
-    diagonal[:, 1:] += parts.influence[:, None, :]
     modes = np.arange(k)
     Z[:, :, modes, modes] += diagonal
     return Z

@@ -95,10 +95,9 @@ def family_of_modes(wheel: Wheel, omega: float, mode: int = 0) -> Family:
             readings.
     """
     order = travelling_order(wheel)
-    if order is None or wheel.influence is not None or set(wheel.excitation) != {1}:
+    if order is None or set(wheel.excitation) != {1}:
         raise InputError(
-            "damper law: expected one engine order and no aerodynamic influence, statistics of "
-            "other forces take the whole wheel"
+            "damper law: expected one engine order, statistics of other forces take the whole wheel"
         )
     count = wheel.count
     own, _ = folded_diameter(1, order, count)
@@ -110,15 +109,15 @@ def family_of_modes(wheel: Wheel, omega: float, mode: int = 0) -> Family:
     read = int(np.argmax(abs(readings)))
     rows = []
     for d in range(count):
-        n, mirrored = folded_diameter(1, d, count)
-        rows.append(_mode_of(wheel, wheel.sectors[n], pattern, read, mirrored))
+        body, mirrored = wheel.wave(d)
+        rows.append(_mode_of(wheel, body, pattern, read, mirrored))
     values = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     force = np.fft.fft(wheel.excitation[1], axis=0)
     theta = 2 * np.pi * np.arange(count) / count
     before, after = _blade_motions(values["contact"], theta, order)
-    n, mirrored = folded_diameter(1, order, count)
+    body, mirrored = wheel.wave(order)
     left_out = int(values["number"][order])
-    G = _everything_else(wheel, wheel.sectors[n], left_out, omega, mirrored)
+    G = _everything_else(wheel, body, left_out, omega, mirrored)
     return Family(
         values["omega"],
         values["viscous"],

@@ -18,6 +18,7 @@ from ..hbm.linear.bodies import Damping
 from ..hbm.linear.mean_motion import REGULARISATION
 from ..reduction.assemble import pair_model
 from ..util.arrays import RealArray, RealOrComplex
+from .aerodynamics import with_flow
 
 
 @dataclass(frozen=True)
@@ -179,6 +180,16 @@ class Wheel:
         tangential = moved[:, self.directions - elements.tangents :]
         tangential[:] = np.divide(start, kt, out=np.zeros_like(start), where=kt > 0)
         return moved.reshape(self.count, self.nodes, self.directions)
+
+    def wave(self, diameter: int) -> tuple[PortModel, bool]:
+        """The sector in a wave of 0..N-1 nodal diameters, with the flow's forces on it, and whether
+        the conjugate of its shapes is meant: beyond N/2 waves run backwards.
+        """
+        mirrored = 2 * diameter > self.count
+        body = self.sectors[self.count - diameter if mirrored else diameter]
+        if self.influence is None:
+            return body, mirrored
+        return with_flow(body, np.asarray(self.influence[diameter], dtype=complex)), mirrored
 
     @cached_property
     def kept(self) -> dict[Any, Any]:

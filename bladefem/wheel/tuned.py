@@ -12,7 +12,6 @@ from ..data import PortModel
 from ..friction.fourier import to_complex, to_real
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
-from ..reduction.assemble import folded_diameter
 from .model import Wheel
 
 # relative deviation of the forces from a travelling wave
@@ -38,7 +37,7 @@ def tuned_sector(wheel: Wheel, harmonics: int) -> ReducedModel | None:
     """The sector's model for harmonics 0..H; None where the blades do not move alike."""
     order = travelling_order(wheel)
     alike = len(wheel.elements.kt) == wheel.nodes
-    if order is None or not alike or wheel.influence is not None:
+    if order is None or not alike:
         return None
     sides = tuple(_sector(wheel, h, order) for h in range(harmonics + 1))
     damper = (wheel.damper,) if isinstance(wheel.damper, PortModel) else wheel.damper
@@ -87,8 +86,11 @@ def _sector(
     """The sector in the nodal diameter of a harmonic, without the ports that the balance
     ignores.
     """
-    n, mirrored = folded_diameter(harmonic, order, wheel.count)
-    body = wheel.sectors[n]
+    diameter = harmonic * order % wheel.count
+    body, mirrored = wheel.wave(diameter)
+    # the flow does nothing to the mean
+    if harmonic == 0:
+        body = wheel.sectors[diameter]
     if not mirrored:
         return body
     return replace(

@@ -1,23 +1,27 @@
 """Aerodynamic influence against dense matrices; limit cycles in closed form and marched in time."""
 
+from dataclasses import replace
 from math import acos, pi, sin
 
 import numpy as np
 import pytest
 from models import single_mass
-from rings import BLADE, EO, LINK, LOAD, MASS, OWN, PROBE, N, elements, forces, ring_wheel
+from rings import BLADE, EO, LINK, LOAD, MASS, OWN, PROBE, RIGID, N, elements, forces, ring_wheel
 from scipy import linalg, optimize
 
 from bladefem.errors import InputError
 from bladefem.hbm.model import Damping
 from bladefem.hbm.nonlinear_modes import nonlinear_mode
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import Options
 from bladefem.wheel.aerodynamics import (
     aerodynamic_damping,
     influence_of_distance,
     limit_cycles,
 )
 from bladefem.wheel.model import Pattern, engine_order
-from bladefem.wheel.solve import free_wheel
+from bladefem.wheel.solve import free_wheel, solve_wheel
+from bladefem.wheel.tuned import tuned_sector
 
 
 def test_influence_of_neighbours_is_that_of_dense_matrices():
@@ -31,24 +35,46 @@ def test_influence_of_neighbours_is_that_of_dense_matrices():
     K = np.kron(np.eye(N), OWN) + np.kron(following, LINK) + np.kron(following.T, LINK.T)
     K = K.astype(complex)
     M = np.kron(np.eye(N), MASS)
-    # c_d M phi_d phi_d^H M in every nodal diameter, of the tuned sector's first mode
+    C = (0.02 * M).astype(complex)
+    # c_d M phi_d phi_d^H M in every nodal diameter, of the tuned sector's first mode: stiffness,
+    # and a viscous force
     for d in range(N):
         turn = np.exp(2j * np.pi * d / N)
         own = OWN + turn * LINK + turn.conj() * LINK.T
-        shape = linalg.eigh(own, MASS)[1][:, 0]
-        wave = np.kron(turn ** np.arange(N), MASS @ shape) / np.sqrt(N)
-        K += influence[d, 0] * np.outer(wave, wave.conj())
+        squared, shapes = linalg.eigh(own, MASS)
+        wave = np.kron(turn ** np.arange(N), MASS @ shapes[:, 0]) / np.sqrt(N)
+        K += influence[d, 0].real * np.outer(wave, wave.conj())
+        C += influence[d, 0].imag / np.sqrt(squared[0]) * np.outer(wave, wave.conj())
     for b in range(N):
         part = slice(3 * b, 3 * b + 3)
         K[part, part] += BLADE.T @ dK[b] @ BLADE
     omega = 2.2
     F = np.kron(np.eye(N), LOAD.T) @ engine_order(N, EO, np.array([1.0]))[:, 0]
-    expected = np.kron(np.eye(N), PROBE) @ np.linalg.solve(K - omega**2 * M + 0.02j * omega * M, F)
+    expected = np.kron(np.eye(N), PROBE) @ np.linalg.solve(K - omega**2 * M + 1j * omega * C, F)
     found = free_wheel(wheel, omega, 1, Pattern(dK))[:, 1, 0]
     np.testing.assert_allclose(found, expected, atol=1e-10 * abs(expected).max())
     # forward and backward waves differ
     ratio = aerodynamic_damping(influence, np.ones(3))[:, 0]
     assert abs(ratio[1] - ratio[-1]) > 0.05
+
+
+@pytest.mark.parametrize("order", [EO, N - EO])
+def test_tuned_wheel_in_a_flow_is_the_sector(order):
+    """Every blade of the wheel, with forward and with backward waves; friction and two harmonics'
+    worth of waves in the flow.
+    """
+    influence = influence_of_distance(N, 3, 0, {0: 0.1 + 0.1j, 1: -0.1 + 0.15j, -1: 0.04 - 0.12j})
+    excitation = {1: engine_order(N, order, np.array([0.9]))}
+    wheel = ring_wheel(elements(2, 2.0, 2.0, 0.1), RIGID, excitation, influence=influence)
+    tight = Options(tolerance=1e-12)
+    one = solve(tuned_sector(wheel, 3), 2.3, 3, 240, options=tight)
+    found = solve_wheel(wheel, 2.3, 3, 240, options=tight)
+    assert one.converged and found.converged, (one.reason, found.reason)
+    turn = np.exp(2j * np.pi * order / N * np.arange(N))
+    expected = turn[:, None] ** np.arange(4) * one.probe[:, 0]
+    np.testing.assert_allclose(found.probe[:, :, 0], expected, atol=1e-9 * abs(one.probe).max())
+    still = solve_wheel(replace(wheel, influence=None), 2.3, 3, 240, options=tight)
+    assert abs(still.probe - found.probe).max() > 1e-2 * abs(one.probe).max()
 
 
 def test_limit_cycle_in_closed_form():
