@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
+from ..scene.units import shortened
 from ..util.communicator import Communicator
 from . import tables
 
@@ -44,12 +45,22 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
 PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
+def refuse_picture(file: str) -> None:
+    """A file of ``--view`` that no picture can be written to is refused before the work.
+
+    Raises:
+        InputError: its name does not end as that of a picture.
+    """
+    if Path(file).suffix.lower() not in PICTURES:
+        raise InputError(
+            f"--view {file}: expected a file name that ends with {' or '.join(PICTURES)}"
+        )
+
+
 def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Mesh, quality table, picture."""
-    if options.view and Path(options.view).suffix.lower() not in PICTURES:
-        raise InputError(
-            f"--view {options.view}: expected a file name that ends with {' or '.join(PICTURES)}"
-        )
+    if options.view:
+        refuse_picture(options.view)
     scene, folder, bars = prepared(options, comm)
     from ..study.pipeline import pipeline
 
@@ -100,8 +111,13 @@ def _parse_sizes(text: str | None, option: str) -> list[float] | None:
     """Element sizes [m] as given to an option; empty where they are to be chosen."""
     from ..scene.fields import convert_value, field_at, split_values
 
+    if text is None:
+        return None
     size = field_at("mesh.size")._replace(name=option)
-    return None if text is None else [convert_value(item, size) for item in split_values(text)]
+    sizes = [convert_value(item, size) for item in split_values(text)]
+    if len(set(sizes)) < len(sizes):
+        raise InputError(f"--{option} {text}: a size is given twice, expected each once")
+    return sizes
 
 
 def contact(options: argparse.Namespace, comm: Communicator | None) -> None:
@@ -231,7 +247,7 @@ def prepared(
     from ..io.stage_cache import on_root
     from ..util.progress import progress_wanted, with_progress
 
-    folder = Path(options.output or default_folder(options.scene))
+    folder = run_folder(options)
     if comm is not None:
         # it loads PETSc, which takes all ranks: not inside what rank 0 does alone
         from ..study.pipeline import preflight  # noqa: F401
@@ -298,13 +314,24 @@ def tell(
 def scene_path(given: str) -> Path:
     """The scene file, also of a run folder."""
     path = Path(given)
-    return path / "scene.toml" if path.is_dir() else path
+    try:
+        return path / "scene.toml" if path.is_dir() else path
+    except OSError as error:
+        raise InputError(f"{shortened(given)}: {error.strerror}, expected a scene file") from None
 
 
-def default_folder(given: str) -> Path:
-    """The run folder when none is named: that of the earlier run, or one with the scene's name."""
-    path = Path(given)
-    return path if path.is_dir() else Path("runs") / path.stem
+def run_folder(options: argparse.Namespace) -> Path:
+    """The folder that is named, or else that of the earlier run, or one with the scene's name.
+
+    Raises:
+        InputError: an empty name, as an unset variable of a shell leaves it.
+    """
+    if options.output == "":
+        raise InputError("--output '': expected the name of a folder")
+    if options.output is not None:
+        return Path(options.output)
+    path = scene_path(options.scene)
+    return path.parent if path != Path(options.scene) else Path("runs") / path.stem
 
 
 def draw(mesh_made: Any, file: str) -> None:

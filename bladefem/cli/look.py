@@ -12,6 +12,7 @@ from geometry.look import is_drawing
 
 from ..errors import InputError
 from ..util.communicator import Communicator
+from .commands import refuse_picture
 from .tables import plain_table
 
 if TYPE_CHECKING:
@@ -40,6 +41,13 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     if comm is not None and comm.rank:
         return
+    target = None
+    if options.scene is not None:
+        target = Path(options.scene or Path(options.file).with_suffix(".toml"))
+        if target.exists():
+            raise InputError(f"--scene {target}: the file is there already, expected another name")
+    if options.view:
+        refuse_picture(options.view)
     found = look_at(options.file)
     print(describe_look(found))
     if options.view:
@@ -47,10 +55,7 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
 
         draw_look(found, options.view)
         print(f"picture: {options.view}")
-    if options.scene is not None:
-        target = Path(options.scene) if options.scene else found.file.with_suffix(".toml")
-        if target.exists():
-            raise InputError(f"--scene {target}: the file is there already, expected another name")
+    if target is not None:
         target.write_text(starting_scene(found), encoding="utf-8")
         print(f"scene: {target}")
 

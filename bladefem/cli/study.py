@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..util.communicator import Communicator
 from . import tables
-from .commands import default_folder, given_scene, prepared, tell
+from .commands import given_scene, prepared, run_folder, tell
 
 if TYPE_CHECKING:
     from ..study.pipeline.run_records import SolvedRun
@@ -63,7 +63,7 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
     """The response for each run of the plan, each in its own folder inside the run folder."""
     from ..io.stage_cache import on_root
 
-    base = Path(options.output or default_folder(options.scene))
+    base = run_folder(options)
     plan = _make_plan(options)
     parts = [_run_options(options, base, plan.names, values) for values in plan.runs]
     # all, before long work

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import unicodedata
 from collections.abc import Iterator, Mapping
 from types import NoneType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
@@ -122,6 +123,8 @@ def _parse_bool(value: object, field: Field) -> bool:
 def _parse_text(value: object, field: Field) -> str:
     if not isinstance(value, str):
         raise InputError(f"{field.name} = {shortened(value)}: expected text")
+    if any(unicodedata.category(letter) == "Cc" for letter in value):
+        raise InputError(f"{field.name} = {shortened(repr(value))}: expected one line of text")
     choices = field.meta.get("choices") or ()
     if choices and value not in choices:
         raise InputError(
@@ -154,9 +157,15 @@ def split_values(text: str) -> list[str]:
     """Single values of a text like "20, 50, 100 N", where the last unit holds for those without
     one.
     """
-    items = [item.strip(" '\"") for item in text.strip("[]() ").split(",") if item.strip()]
+    inner = text.strip()
+    if (inner[:1], inner[-1:]) in (("[", "]"), ("(", ")")):
+        inner = inner[1:-1]
+    items = [item.strip(" '\"") for item in inner.split(",") if item.strip()]
     last = items[-1] if items else ""
     unit = last.lstrip("+-.0123456789eE_ ") if last[:1] in tuple("+-.0123456789") else ""
+    # a row of a table such as "600 degC: E=210 GPa" is no number with a unit
+    if set(unit) & set(":="):
+        unit = ""
     return [f"{item} {unit}" if unit and item[-1] in "0123456789." else item for item in items]
 
 

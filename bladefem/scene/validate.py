@@ -8,6 +8,7 @@ the geometry.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import hypot
 from pathlib import Path
 
 from geometry.check_parameters import check_names, check_parameters
@@ -23,6 +24,11 @@ from .tables import Scene
 from .temperature_file import read_temperatures
 from .units import show
 from .validate_contact import contact_problems
+
+# letters that fit on a picture
+LONGEST_TITLE = 200
+# below it the square of a direction's length is lost in rounding
+SHORTEST_DIRECTION = 1e-100
 
 # constants of an orthotropic solid
 ORTHOTROPIC_CONSTANTS = 9
@@ -40,6 +46,7 @@ def validate(scene: Scene) -> None:
         if "." not in field.name or field.name.split(".")[0] in tables:
             convert_value(value_at(scene, field.name), field)
     problems = [
+        *_check_title(scene),
         *kind.conditions(scene),
         *_check_crystals(scene),
         *_check_temperature(scene),
@@ -55,6 +62,12 @@ def validate(scene: Scene) -> None:
     if problems:
         raise InputError(problems[0])
     check_parameters(scene)
+
+
+def _check_title(scene: Scene) -> Iterator[str]:
+    """It is drawn on every picture."""
+    if len(scene.title) > LONGEST_TITLE:
+        yield f"title: {len(scene.title)} letters, expected at most {LONGEST_TITLE}"
 
 
 def _check_supports(scene: Scene) -> Iterator[str]:
@@ -184,6 +197,11 @@ def _check_study(scene: Scene) -> Iterator[str]:
     if scene.study.loads is not None and min(scene.study.loads) == 0:
         why = kind_named(scene.kind).without_load
         yield f"study.loads = 0 N: {why}, expected more than 0 N"
+    for name, unit in (("loads", "N"), ("masses", "kg")):
+        values = getattr(scene.study, name) or ()
+        twice = next((value for value in values if values.count(value) > 1), None)
+        if twice is not None:
+            yield f"study.{name} = {show(twice, unit)}: given twice, expected each value once"
     band = scene.study.band
     if band is not None and not band[0] < band[1]:
         yield (
@@ -193,7 +211,8 @@ def _check_study(scene: Scene) -> Iterator[str]:
 
 
 def _check_excitation(scene: Scene) -> Iterator[str]:
-    if not any(scene.excitation.direction):
+    # its length must not vanish in rounding
+    if not hypot(*scene.excitation.direction) > SHORTEST_DIRECTION:
         yield "excitation.direction = 0, 0, 0: expected a direction"
     modes = scene.model.modes
     mode = scene.excitation.mode

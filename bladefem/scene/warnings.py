@@ -58,6 +58,8 @@ def _doubtful_speed(scene: Scene) -> Iterator[str]:
 def _doubtful_damping(scene: Scene) -> Iterator[str]:
     if scene.operation.damping == 0:
         yield "operation.damping = 0: enough for modes, responses need more than 0"
+    if scene.excitation.force == 0:
+        yield "excitation.force = 0 N: enough for modes, responses need more than 0 N"
 
 
 def _doubtful_mesh(scene: Scene) -> Iterator[str]:

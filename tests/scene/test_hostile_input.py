@@ -96,6 +96,52 @@ WITHOUT_A_MESH = [
 ]
 
 
+# what passed once and failed, or gave nonsense, later
+LATE = [
+    ("title=" + "x" * 201, "201 letters, expected at most 200"),
+    ("title=\x1b[31mred", "expected one line of text"),
+    ("study.loads=50 N, 50 N", "study.loads = 50 N: given twice"),
+    ("study.masses=12 g, 12 g", "study.masses = 12 g: given twice"),
+    ("study.loads=[50 N", "study.loads = '[50 N': expected a number"),
+    ("excitation.direction=1e-300, 0, 0", "expected a direction"),
+    ('material.blade.table=["600 degC: E=210"]', "material table, E = 210 Pa: expected 1 MPa"),
+]
+
+
+@pytest.mark.parametrize(("override", "said"), LATE, ids=lambda v: str(v)[:40])
+def test_late_failures_are_refused_early(override, said):
+    assert said in refused(load_scene, WEDGE, [override])
+
+
+COMMANDS = [
+    (["check", "x" * 5000], "File name too long"),
+    (["run", str(WEDGE), "-o", ""], "--output '': expected the name of a folder"),
+    (["study", str(WEDGE), "--vary", "damper.angle=50, 55 deg", "-o", ""], "--output ''"),
+    (["modes", str(WEDGE), "--campbell", "-5, 100 rpm"], "expected speeds of at least 0 rpm"),
+    (["modes", str(WEDGE), "--converge", "6 mm, 6 mm, 4 mm"], "a size is given twice"),
+    (["look", str(WEDGE.parents[2] / "scenes" / "own_blade.step"), "--view", "x.doc"], "x.doc"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), COMMANDS, ids=lambda v: " ".join(v)[:30])
+def test_commands_refuse_at_once(words, said, tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(words) == 2
+    text = capsys.readouterr().err
+    assert said in text
+    assert text.count("\n") == 1
+
+
+def test_what_a_reader_prints_is_its_reason(tmp_path, capsys):
+    """meshio writes its error to the terminal and exits."""
+    file = tmp_path / "sector.vtu"
+    file.write_text("<VTKFile>")
+    assert main(["look", str(file)]) == 2
+    text = capsys.readouterr().err
+    assert text.count("\n") == 1
+    assert "(1)" not in text
+
+
 @pytest.mark.parametrize(("override", "said"), WITHOUT_A_MESH, ids=lambda v: str(v)[:40])
 def test_check_refuses_without_a_mesh(override, said):
     assert said in refused(load_scene, WEDGE, [override])

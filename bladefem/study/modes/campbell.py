@@ -164,6 +164,8 @@ def read_speeds(text: str) -> list[float]:
                 f"most {MAX_SPEEDS}"
             )
         out += list(np.arange(out[-1] + step, end - step / 2, step))
+    if min(out, default=0.0) < 0:
+        raise InputError(f"campbell = {text}: expected speeds of at least 0 rpm")
     return out
 
 
