@@ -159,6 +159,19 @@ def _with_numbered_faces(raw: RawMesh, wanted: dict[str, list[str]]) -> RawMesh:
     return replace(raw, surfaces={**raw.surfaces, **found})
 
 
+def check_extent(across: float, scale: float) -> None:
+    """Refuse a model of a size [m] that no blade has: its scale or unit is wrong.
+
+    Raises:
+        InputError: with the scale to change.
+    """
+    if not MIN_MODEL_SIZE < across < MAX_MODEL_SIZE:
+        raise InputError(
+            f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the "
+            "factor from the file's unit to metres (0.001 for millimetres)"
+        )
+
+
 def mesh_of_raw(
     raw: RawMesh,
     scale: float,
@@ -178,12 +191,7 @@ def mesh_of_raw(
     solids = solid_cells(raw, source, linear, np.asarray(axis, dtype=float))
     mesh = _split_bodies(raw, solids, source)
     mesh = replace(mesh, points=_turn_to_axis(mesh, scale, np.asarray(axis, dtype=float)))
-    across = float(np.ptp(mesh.points[np.unique(solids.cells)], axis=0).max())
-    if not MIN_MODEL_SIZE < across < MAX_MODEL_SIZE:
-        raise InputError(
-            f"imported.scale = {scale:g}: the model would be {across:.3g} m across, expected the "
-            "factor from the file's unit to metres (0.001 for millimetres)"
-        )
+    check_extent(float(np.ptp(mesh.points[np.unique(solids.cells)], axis=0).max()), scale)
     mesh = _with_faces(mesh, raw, wanted)
     mesh = _find_pairs(mesh, sectors, source, tolerance, cut_gap)
     points, straightened = straighten_cells(

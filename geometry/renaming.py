@@ -21,7 +21,7 @@ def read_names(texts: Iterable[str]) -> dict[str, list[str]]:
     Raises:
         InputError: not "new = old" or "new = old + old".
     """
-    wanted = {}
+    wanted: dict[str, list[str]] = {}
     for text in texts:
         new, equals, olds = (part.strip() for part in text.partition("="))
         parts = [old.strip() for old in olds.split("+")]
@@ -29,6 +29,11 @@ def read_names(texts: Iterable[str]) -> dict[str, list[str]]:
             raise InputError(
                 f'imported.names = {text!r}: expected "new = old", such as "clamp = face_3 + '
                 'face_4"'
+            )
+        if new in wanted:
+            raise InputError(
+                f"imported.names: '{new}' is given twice, expected '{new} = "
+                f"{' + '.join(wanted[new] + parts)}' for one group of all"
             )
         wanted[new] = parts
     return wanted

@@ -25,7 +25,7 @@ from .curving import second_order
 from .draw import boundary_centres, tie_meshes
 from .finalise_mesh import check_count
 from .fitted_wedge import fit_wedge
-from .imported import mesh_of_raw
+from .imported import check_extent, mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize, Wedge
 from .raw_mesh import RawMesh, from_gmsh_model
@@ -88,6 +88,9 @@ def read_step(
     with gmsh_session() as gmsh:
         with gmsh_step("imported.file", f"import '{file}'"):
             _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
+        # shapes of another size are more than the drawing library can handle
+        box = np.array(gmsh.model.getBoundingBox(-1, -1))
+        check_extent(float(np.max(box[3:] - box[:3])), scale)
         named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
             on = axis_rotation(unit, 2 * np.pi / sectors)

@@ -11,9 +11,10 @@ import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
+from zipfile import BadZipFile, ZipFile
 
 import numpy as np
+from numpy.lib.format import write_array
 
 _HOMES = ("bladefem", "geometry")
 
@@ -25,9 +26,12 @@ def write_npz(
 ) -> None:
     """Write a value with its key; TypeError for what has no encoding."""
     tree, arrays = tree_of(value)
-    with open(path, "wb") as file:
-        members: dict[str, Any] = {f"a{i}": a for i, a in enumerate(arrays)}
-        np.savez(file, key=np.array(key), tree=np.array(tree), **members)
+    members: dict[str, Any] = {f"a{i}": a for i, a in enumerate(arrays)}
+    # as np.savez does, which on a full disk leaves an archive whose end complains once more
+    with ZipFile(path, "w") as archive:
+        for name, array in {"key": np.array(key), "tree": np.array(tree), **members}.items():
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as file:
+                write_array(file, np.asanyarray(array), allow_pickle=False)
 
 
 def read_npz(path: str | Path, key: str) -> Any:

@@ -228,8 +228,10 @@ def test_step_is_finer_on_contact_faces(tmp_path):
 
 def test_step_with_a_wrong_scale_is_refused_before_it_is_meshed(tmp_path):
     write_step(tmp_path / "a.step", "block", {})
-    with pytest.raises(InputError, match=r"mesh\.size.*cells"):
+    with pytest.raises(InputError, match=r"imported\.scale = 1: the model would be 100 m across"):
         read_step(tmp_path / "a.step", MeshSize(size=1e-3), scale=1.0 + 1e-9)
+    with pytest.raises(InputError, match=r"mesh\.size.*cells"):
+        read_step(tmp_path / "a.step", MeshSize(size=1e-3), scale=0.1)
 
 
 def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):

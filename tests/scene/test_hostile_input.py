@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -121,6 +122,38 @@ COMMANDS = [
     (["modes", str(WEDGE), "--converge", "6 mm, 6 mm, 4 mm"], "a size is given twice"),
     (["look", str(WEDGE.parents[2] / "scenes" / "own_blade.step"), "--view", "x.doc"], "x.doc"),
 ]
+
+
+OWN = WEDGE.parents[2] / "scenes" / "own_blade.toml"
+
+
+@pytest.mark.parametrize(
+    ("override", "said"),
+    [
+        ("imported.seats=face_14, face_14", "face_14, face_14: expected two faces"),
+        ("imported.names=tip = face_21, tip = face_20", "'tip = face_21 + face_20' for one group"),
+    ],
+)
+def test_an_own_blade_is_refused_without_a_mesh(override, said):
+    assert said in refused(load_scene, OWN, [override])
+
+
+def test_a_wrong_scale_is_named(tmp_path, capsys):
+    words = ["mesh", str(OWN), "--set", "imported.scale=1e9", "-o", str(tmp_path)]
+    assert main(words) == 2
+    assert "imported.scale = 1e+09: the model would be 2.4" in capsys.readouterr().err
+
+
+def test_a_full_disk_is_one_sentence(tmp_path):
+    """A limit of the shell on the size of files stands in for the disk."""
+    code = "import numpy as np; from bladefem.io.stage_cache import cached_stage; from pathlib "
+    code += f"import Path; cached_stage(Path({str(tmp_path)!r}), 'a', 'k', lambda: np.zeros(10**6))"
+    command = f"ulimit -f 100; exec {sys.executable} -c {shlex.quote(code)}"
+    done = subprocess.run(
+        ["bash", "-c", command], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert "cannot be written (File too large)" in done.stderr.splitlines()[-1]
+    assert "Exception ignored" not in done.stderr
 
 
 @pytest.mark.parametrize(("words", "said"), COMMANDS, ids=lambda v: " ".join(v)[:30])

@@ -54,6 +54,8 @@ def _seat_conditions(scene: Scene) -> Iterator[str]:
                 "imported.seat_width: expected together with imported.seats, the faces of the seats"
             )
         return
+    if imported.seats[0] == imported.seats[1]:
+        yield f"imported.seats = {', '.join(imported.seats)}: expected two faces"
     if not is_drawing(scene):
         yield (
             f"imported.seats: '{Path(imported.file).name}' is a mesh, expected a STEP file, into "
