@@ -143,6 +143,9 @@ def all_diameters(
     )
     found = {p.con.nodal_diameter: p for p in steps}
     if prove:
+        if isinstance(body, Body) and kept is None and t.opened is not None:
+            # nobody else has them: the count takes their memory
+            t.opened.elimination.release()
         found = _check_inertia(t, found, solved, tolerance)
     if kept is not None:
         kept.pairs.update(found)
@@ -382,7 +385,7 @@ def _check_inertia(
     """
     lost = lost_modes(t, {n: p.con for n, p in found.items()}, _list_eigenvalues(found), count)
     for n in lost:
-        found[n] = found_again(found[n].flex, count, lost[n], tolerance)
+        found[n] = found_again(flexible(found[n].con), count, lost[n], tolerance)
     return found
 
 
@@ -453,7 +456,7 @@ def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
     if t.opened is None:
         return None
     opened = t.opened
-    return core.eliminate_again(opened.core, (opened.K - shift * opened.M).tocsr())
+    return opened.elimination.shifted((opened.K - shift * opened.M).tocsr())
 
 
 def _count_below(

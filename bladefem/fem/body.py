@@ -22,6 +22,8 @@ from .compat import (
     build_mesh,
     cell_dofs,
     dolfinx,
+    one_component,
+    repeat_components,
     ufl,
     vector_space,
 )
@@ -120,9 +122,7 @@ def assemble(
     v = ufl.TestFunction(space)
     energy = depth * ufl.inner(law(ufl.sym(ufl.grad(u))), ufl.sym(ufl.grad(v)))
     K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
-    M = assemble_matrix(
-        depth * rho * ufl.inner(u, v) * ufl.dx(metadata={"quadrature_degree": mass})
-    )
+    M = _mass_matrix(space, CELLS[mesh.cell_type][1], depth * rho, mass)
     rows = _block_rows(mesh, space, used[local], origin, comm)
     return Body(
         mesh,
@@ -137,6 +137,21 @@ def assemble(
         comm,
         heat=heat,
     )
+
+
+def _mass_matrix(
+    space: Any,
+    degree: int,
+    density: Any,
+    quadrature: int,
+) -> PETSc.Mat:
+    """The mass of one direction, repeated for each: a ninth of the work, a third of the entries."""
+    one = one_component(space, degree)
+    u = ufl.TrialFunction(one or space)
+    v = ufl.TestFunction(one or space)
+    measure = ufl.dx(metadata={"quadrature_degree": quadrature})
+    M = assemble_matrix(density * ufl.inner(u, v) * measure)
+    return M if one is None else repeat_components(M, space.mesh.geometry.dim)
 
 
 def properties(

@@ -211,6 +211,56 @@ def assemble_matrix(form: Any) -> PETSc.Mat:
     return matrix
 
 
+def one_component(space: Any, degree: int) -> Any:
+    """The space of one component of a vector space; None where its nodes are numbered otherwise."""
+    make = getattr(dolfinx.fem, "functionspace", None) or dolfinx.fem.FunctionSpace
+    scalar = _wait_for_build(lambda: make(space.mesh, ("Lagrange", degree)))
+    one, all_of_them = scalar.dofmap.index_map, space.dofmap.index_map
+    same = (
+        np.array_equal(cell_dofs(scalar), cell_dofs(space))
+        and one.local_range == all_of_them.local_range
+        and np.array_equal(one.ghosts, all_of_them.ghosts)
+    )
+    return scalar if space.mesh.comm.allreduce(same, MPI.LAND) else None
+
+
+def repeat_components(matrix: PETSc.Mat, dim: int) -> PETSc.Mat:
+    """The Kronecker product with the identity (dim, dim); the given matrix is destroyed."""
+    starts, columns, values = matrix.getValuesCSR()
+    (rows, size), _ = matrix.sizes
+    counts = np.repeat(np.diff(starts), dim)
+    entry = np.repeat(starts[:-1], dim)
+    ends = np.concatenate([[0], np.cumsum(counts)])
+    source = np.arange(ends[-1]) + np.repeat(entry - ends[:-1], counts)
+    component = np.repeat(np.tile(np.arange(dim), rows), counts)
+    out = PETSc.Mat().createAIJ(
+        ((dim * rows, dim * size),) * 2,
+        bsize=dim,
+        csr=(
+            ends.astype(PETSc.IntType),
+            (dim * columns[source] + component).astype(PETSc.IntType),
+            values[source],
+        ),
+        comm=matrix.comm,
+    )
+    out.assemble()
+    matrix.destroy()
+    return out
+
+
+def shared_matrix(
+    shape: tuple[int, int],
+    starts: np.ndarray,
+    columns: np.ndarray,
+    values: np.ndarray,
+) -> PETSc.Mat:
+    """A PETSc matrix of this rank alone on the memory of a sparse one, which must not change."""
+    csr = (starts.astype(PETSc.IntType, copy=False), columns.astype(PETSc.IntType, copy=False))
+    out = PETSc.Mat().createAIJWithArrays(shape, (*csr, values), comm=MPI.COMM_SELF)
+    out.assemble()
+    return out
+
+
 def assemble_vector(form: Any) -> PETSc.Vec:
     """Assembled vector of a linear form, shares of neighbouring ranks added."""
     vector = dolfinx.fem.petsc.assemble_vector(compile_form(form))

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
 
 from ..errors import NotSolvedError
-from .compat import MPI, PETSc
+from .compat import MPI, shared_matrix
 from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
 from .schur import Bridge, replace_dense_solve, schur_complement, solve_through_boundary
@@ -127,12 +127,8 @@ def eliminate_interior(
     Raises:
         NotSolvedError: from MUMPS, on any rank.
     """
-    matrix = PETSc.Mat().createAIJ(
-        A.shape,
-        comm=MPI.COMM_SELF,
-        csr=(A.indptr.astype(PETSc.IntType), A.indices.astype(PETSc.IntType), A.data),
-    )
-    matrix.assemble()
+    A.sort_indices()
+    matrix = shared_matrix(A.shape, A.indptr, A.indices, A.data)
     factor = _factorise_together(
         lambda: factorise_matrix(matrix, definite, rim, order, keep), shared
     )
@@ -159,11 +155,37 @@ def eliminate_interior(
     )
 
 
-def eliminate_again(core: Core, A: sp.csr_matrix) -> Core:
-    """A shifted matrix of the same pattern with its interior eliminated, for ``count_negative``."""
-    return eliminate_interior(
-        A, core.rim, definite=False, order=core.order, keep=False, shared=core.shared
-    )
+@dataclass
+class Elimination:
+    """The elimination of an open sector's interior, done when it is asked for first."""
+
+    # (n_open, n_open) [N/m], see Core
+    A: sp.csr_matrix
+    rim: np.ndarray
+    order: np.ndarray | None
+    shared: SharedBoundary | None
+    done: Core | None = None
+
+    def core(self) -> Core:
+        """The eliminated interior (collective where it is shared)."""
+        if self.done is None:
+            self.done = eliminate_interior(self.A, self.rim, order=self.order, shared=self.shared)
+        return self.done
+
+    def release(self) -> None:
+        """Give the memory of the factors back; what holds a core must not solve with it again."""
+        if self.done is not None:
+            # its callback would keep it
+            self.done.factor.matrix.destroy()
+            self.done = None
+
+    def shifted(self, A: sp.csr_matrix) -> Core:
+        """Another matrix of the same pattern with its interior eliminated, for
+        ``count_negative``.
+        """
+        return eliminate_interior(
+            A, self.rim, definite=False, order=self.order, keep=False, shared=self.shared
+        )
 
 
 def _factorise_together(

@@ -292,6 +292,10 @@ def krylov_schur(
         if pencil.failure is not None:
             raise pencil.failure
         reason = int(eps.getConvergedReason())
+        # memory of no more use, before the vectors come
+        pencil.images = _Columns()
+        if not pencil.kept:
+            pencil.known = _Columns()
         found = _converged_vectors(pencil, eps)
     finally:
         # now: at the end of the program its callbacks would be gone
@@ -382,14 +386,13 @@ def _make_solver(
 
 def _converged_vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
     """(n_own, m) converged vectors."""
-    columns = []
+    size = pencil.con.own.stop - pencil.con.own.start
+    out = np.empty((size, eps.getConverged()), pencil.con.dtype, order="F")
     vector = eps.getOperators()[0].createVecRight()
-    for i in range(eps.getConverged()):
+    for i in range(out.shape[1]):
         eps.getEigenvector(i, vector)
-        columns.append(pencil.column(vector))
-    if not columns:
-        return np.zeros((pencil.con.own.stop - pencil.con.own.start, 0), pencil.con.dtype)
-    return np.asfortranarray(np.hstack(columns))
+        out[:, i] = pencil.column(vector)[:, 0]
+    return out
 
 
 def _purify_vectors(
@@ -403,12 +406,14 @@ def _purify_vectors(
     """
     if not X.shape[1]:
         return np.zeros(0), X
-    _Q, MQ, _ = orthonormal(con, [], [], X, NEW_DIRECTION_SHARE)
+    MQ = orthonormal(con, [], [], X, NEW_DIRECTION_SHARE)[1]
     Y = inverse(MQ)
     theta, S = np.linalg.eigh(_hermitian_part(inner_products(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]
     good = theta > 0
+    del MQ
     V = linear_combinations(Y, np.ascontiguousarray((S[:, ::-1][:, :wanted] / theta)[:, good]))
+    del Y
     MV = apply_block(con.M, V)
     gram = _hermitian_part(inner_products(con.body.comm, V, MV))
     # nearly the identity: its inverse root keeps each vector where it is

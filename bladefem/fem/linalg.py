@@ -44,7 +44,7 @@ class Folded:
     # (n_open, n_free) real or complex
     C: sp.csr_matrix
     # A with its interior eliminated, shared by all nodal diameters
-    core: interior.Core | None
+    core: interior.Elimination | None
     # (n_open/dim,)*2 the same for each direction: A is its Kronecker product with the identity,
     # a third of the numbers to read; None where A couples directions
     nodal: sp.csr_matrix | None = None
@@ -106,7 +106,11 @@ def factorise(
             MUMPS's INFOG.
     """
     if isinstance(A, Folded):
-        core = A.core or interior.eliminate_interior(A.A, A.rim, definite, shared=A.shared)
+        core = (
+            A.core.core()
+            if A.core is not None
+            else interior.eliminate_interior(A.A, A.rim, definite, shared=A.shared)
+        )
         if springs is not None and A.shared is not None:
             springs = whole_part(A.shared, springs[:, None])[:, 0]
         return Factor(interior.join_cut_faces(core, A.faces, definite, springs), False)
@@ -119,6 +123,16 @@ def factorise(
         matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
     return Factor(factorise_matrix(matrix, definite), doubled)
+
+
+def release(A: Matrix, factor: Factor) -> None:
+    """Give the memory of a factorisation back, which must not be used again; A can be factorised
+    anew.
+    """
+    if isinstance(A, Folded) and A.core is not None:
+        A.core.release()
+    elif isinstance(factor.parts, Factorised):
+        factor.parts.matrix.destroy()
 
 
 def solve_block(factor: Factor, B: np.ndarray) -> np.ndarray:

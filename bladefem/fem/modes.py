@@ -17,11 +17,20 @@ from ..errors import InputError, NotSolvedError
 from ..util.lockstep import run_together
 from .compat import MPI
 from .constraint import Constrained, expand_to_mesh, restrict_load
-from .cyclic_schur import count_negative, eliminate_again
+from .cyclic_schur import count_negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
 from .flexibility import Flexibility, compliance, compliances, flexible
 from .lanczos import lowest_eigenpairs
-from .linalg import Folded, apply_block, combined, inertia, inner_products, mean_diagonal
+from .linalg import (
+    Folded,
+    apply_block,
+    combined,
+    inertia,
+    inner_products,
+    mean_diagonal,
+    release,
+)
+from .memory import give_back
 
 # error of a vector's direction; that of a frequency is its square
 DIRECTION_TOLERANCE = 1e-8
@@ -49,7 +58,7 @@ def modes(
     """The lowest modes, rigid ones included, mass-normalised over the body (one sector of a wheel).
 
     Args:
-        flex: factorisation to use again.
+        flex: factorisation to use, and to keep.
         tolerance: largest error of an eigenvector's direction in the M-norm.
         prove: count the eigenvalues by the inertia of one more factorisation.
 
@@ -59,9 +68,10 @@ def modes(
     """
     if count < 1:
         raise InputError(f"count is {count}, expected at least 1 mode")
-    flex = flex or flexible(con)
-    found = proven_pairs if prove else lowest_pairs
-    return mode_set(con, *found(flex, count, tolerance, solver=solver))
+    if not prove:
+        return mode_set(con, *lowest_pairs(flex or flexible(con), count, tolerance, solver=solver))
+    pairs = proven_pairs(flex or flexible(con), count, tolerance, solver, flex is not None)
+    return mode_set(con, *pairs)
 
 
 def proven_pairs(
@@ -69,9 +79,13 @@ def proven_pairs(
     count: int,
     tolerance: float = DIRECTION_TOLERANCE,
     solver: Eigensolver = SLEPC,
+    keep: bool = True,
 ) -> tuple[np.ndarray, np.ndarray]:
     """``lowest_pairs`` whose number the inertia confirms; those that were missed are found by
     blocks.
+
+    Args:
+        keep: keep the factors while the eigenvalues are counted, which takes memory for both.
 
     Raises:
         NotSolvedError: the numbers differ even so.
@@ -81,9 +95,13 @@ def proven_pairs(
         # rigid motions alone, which geometry counts
         return lam, X
     upper, expected = _counting_shift(lam)
+    if not keep:
+        release(flex.con.K, flex.factor)
+        give_back()
     exact = count_below(flex.con, upper)
     if exact == expected:
         return lam, X
+    flex = flex if keep else flexible(flex.con)
     lam, X = lowest_pairs(flex, max(count, exact), tolerance, solver=BLOCKS)
     found = np.count_nonzero(lam < upper)
     if found != exact:
@@ -250,7 +268,7 @@ def count_below(con: Constrained, lam: float) -> int:
     if isinstance(con.K, Folded) and isinstance(con.M, Folded) and con.K.core is not None:
         # the interior in the order that serves the stiffness too
         shifted = (con.K.A - lam * con.M.A).tocsr()
-        return count_negative(eliminate_again(con.K.core, shifted), con.K.faces)
+        return count_negative(con.K.core.shifted(shifted), con.K.faces)
     return inertia(combined(con.K, -lam, con.M))
 
 

@@ -39,15 +39,19 @@ class Opened:
     M: sp.csr_matrix
     # (n_open/dim,)*2 the mass of one direction; None where directions differ
     nodal_mass: sp.csr_matrix | None
-    # K with its interior eliminated
-    core: core.Core
+    elimination: core.Elimination
     # (nb,) places of the boundary of all parts; empty on one rank
     boundary: np.ndarray
 
     @property
     def shared(self) -> SharedBoundary | None:
         """What joins the parts of several ranks."""
-        return self.core.shared
+        return self.elimination.shared
+
+    @property
+    def core(self) -> core.Core:
+        """K with its interior eliminated."""
+        return self.elimination.core()
 
 
 def open_sector(
@@ -57,7 +61,7 @@ def open_sector(
     pattern: sp.csr_matrix,
     own: slice,
 ) -> Opened | None:
-    """Matrices of the open sector, its interior eliminated (collective).
+    """Matrices of the open sector (collective).
 
     Args:
         T: (n_points*dim, n_open) mesh displacements from open unknowns.
@@ -77,7 +81,7 @@ def open_sector(
         return None
     if body.comm.size == 1:
         K, M = _open_matrices(body, T, start)
-        return _eliminated(body, T, places, (K, M), rim, None, np.empty(0, int))
+        return _opened(body, T, places, (K, M), rim, None, np.empty(0, int))
     part = shared = None
     shares = []
     for A in _open_matrices(body, T, start):
@@ -97,9 +101,7 @@ def open_sector(
     T_part = (T[:, members] @ sp.diags(mine.astype(float))).tocsr()
     T_part.eliminate_zeros()
     local_rim = np.arange(len(part.inside), len(members))
-    return _eliminated(
-        body, T_part, places[members], (K, M), local_rim, shared, places[part.boundary]
-    )
+    return _opened(body, T_part, places[members], (K, M), local_rim, shared, places[part.boundary])
 
 
 def columns_of_part(opened: Opened, A: sp.csr_matrix) -> sp.csr_matrix:
@@ -129,7 +131,7 @@ def maps_of_part(opened: Opened, T: sp.csr_matrix) -> tuple[sp.csr_matrix, core.
     )
 
 
-def _eliminated(
+def _opened(
     body: Body,
     T: sp.csr_matrix,
     places: np.ndarray,
@@ -138,14 +140,13 @@ def _eliminated(
     shared: SharedBoundary | None,
     boundary: np.ndarray,
 ) -> Opened:
-    """The record, with the interior eliminated."""
+    """The record, with the order of the elimination."""
     K, M = matrices
     order = interior_first(K, rim, places // body.dim)
     nodal = _of_one_direction(M, places, body.dim)
     # what building the matrices took is of no more use
     give_back()
-    eliminated = core.eliminate_interior(K, rim, order=order, shared=shared)
-    return Opened(T, places, K, M, nodal, eliminated, boundary)
+    return Opened(T, places, K, M, nodal, core.Elimination(K, rim, order, shared), boundary)
 
 
 def _open_matrices(

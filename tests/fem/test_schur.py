@@ -83,3 +83,16 @@ def test_given_order_gives_the_same_modes(monkeypatch):
     assert found.order[found.rim].min() == len(found.inner)
     a, b = (modes(at_diameter(t, 3), 6).frequencies for t in (own, given))
     np.testing.assert_allclose(a, b, rtol=1e-11)
+
+
+def test_factors_that_were_given_back_are_made_again():
+    """A count may take their memory; what comes later finds them."""
+    t = opened()
+    con = at_diameter(t, 3)
+    first = t.opened.core
+    a = modes(con, 6).frequencies
+    assert t.opened.core is not first
+    kept = flexible(con)
+    b = modes(con, 6, kept).frequencies
+    assert t.opened.core is kept.factor.parts.core
+    np.testing.assert_allclose(a, b, rtol=1e-11)

@@ -127,7 +127,7 @@ def test_a_failure_of_one_rank_ends_all(both, monkeypatch):
 
     monkeypatch.setattr(core, "factorise_matrix", fails)
     with pytest.raises(NotSolvedError, match="memory ran out"):
-        core.eliminate_again(opened.core, opened.K)
+        opened.elimination.shifted(opened.K)
 
 
 def _ports(t):
