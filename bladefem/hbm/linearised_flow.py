@@ -4,10 +4,13 @@ The motion of the contacts is known from the balance; each node's state (stick, 
 instants of a period, and how a step's force depends on the force before and on the displacements at
 both ends, follow from the return map. The bodies are integrated exactly for forces that are linear
 between two instants, and the contact forces implicitly, so that no step is too long for stability;
-what is left is the error of sampled friction, which falls with the square of the instants.
+what is left is the error of sampled friction, which falls with the square of the instants
+(`bladefem.hbm.flow_map` puts the two together).
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numba import njit
@@ -15,7 +18,7 @@ from scipy import linalg
 
 from ..friction.time_step import step_2d
 from ..util.numba_options import INNER_KERNEL, KERNEL
-from .linear.array_copy import copy_matrix
+from .closed_contacts import coupled_groups
 from .sector_modes import SectorModes
 
 # periods marched until 2-D forces repeat
@@ -31,18 +34,43 @@ def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray
         E (2M, 2M) from (q, v) before; G0 and G1 (2M, M) from the modal forces before and after,
         linear in between.
     """
-    M = len(system.stiffness)
-    A = np.zeros((4 * M, 4 * M))
-    A[:M, M : 2 * M] = np.eye(M)
-    A[M : 2 * M, :M] = -system.stiffness_matrix
-    A[M : 2 * M, M : 2 * M] = -system.damping
-    A[M : 2 * M, 2 * M : 3 * M] = np.eye(M)
-    A[2 * M : 3 * M, 3 * M :] = np.eye(M) / dt
-    flow = linalg.expm(A * dt)
-    E = flow[: 2 * M, : 2 * M]
-    constant = flow[: 2 * M, 2 * M : 3 * M]
-    rising = flow[: 2 * M, 3 * M :]
-    return E, constant - rising, rising
+    K = system.stiffness_matrix
+    M = len(K)
+    E = np.zeros((2 * M, 2 * M))
+    G0 = np.zeros((2 * M, M))
+    G1 = np.zeros((2 * M, M))
+    for modes, step in group_steps(K, system.damping, coupled_groups(K, system.damping), dt):
+        rows = np.concatenate([modes, M + modes])
+        for target, part in zip((E, G0, G1), step, strict=True):
+            target[np.ix_(rows, rows if target is E else modes)] = part
+    return E, G0, G1
+
+
+def group_steps(
+    K: np.ndarray,
+    D: np.ndarray,
+    groups: Sequence[np.ndarray],
+    dt: float,
+) -> Iterator[tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]]:
+    """Modes of each group, and E (2b, 2b), G0 and G1 (2b, b) of its b modes, as `linear_steps`."""
+    for b in sorted({len(group) for group in groups}):
+        alike = [group for group in groups if len(group) == b]
+        A = np.zeros((len(alike), 4 * b, 4 * b))
+        # time in steps, so that the exponential has entries of like sizes
+        A[:, :b, b : 2 * b] = np.eye(b)
+        A[:, b : 2 * b, 2 * b : 3 * b] = np.eye(b)
+        A[:, 2 * b : 3 * b, 3 * b :] = np.eye(b)
+        for own, group in zip(A, alike, strict=True):
+            own[b : 2 * b, :b] = -K[np.ix_(group, group)] * dt**2
+            own[b : 2 * b, b : 2 * b] = -D[np.ix_(group, group)] * dt
+        flow = linalg.expm(A)[:, : 2 * b]
+        flow[:, :b, b : 2 * b] *= dt
+        flow[:, b:, :b] /= dt
+        flow[:, :b, 2 * b :] *= dt**2
+        flow[:, b:, 2 * b :] *= dt
+        for own, group in zip(flow, alike, strict=True):
+            constant, rising = own[:, 2 * b : 3 * b], own[:, 3 * b :]
+            yield group, (own[:, : 2 * b], constant - rising, rising)
 
 
 @njit(**KERNEL)
@@ -212,116 +240,3 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
     load[0, 1] = mu * nx
     load[1, 1] = mu * ny
     return fx, fy, share
-
-
-@njit(**KERNEL)
-def flow_map(E, G0, G1, U, R, A, B1, B0, share, steps):
-    """(2M+m, 2M+m) map of disturbances of (q, v, f) over the first steps of a period.
-
-    Args:
-        E, G0, G1: of `linear_steps`, the last two applied to -U^T: (2M, m).
-        U: (m, M) contact readings; R: (m, m) residual flexibility.
-        A, B1, B0: (S, n, d, d) derivatives of a step's force by the force before, and by the
-            displacements after and before [N/m].
-        share: (S, n) of each step for which the force before acts.
-        steps: at most S.
-    """
-    S, n, d, _ = A.shape
-    m, M = U.shape
-    size = 2 * M + m
-    X = np.zeros((2 * M, size))
-    F = np.zeros((m, size))
-    for i in range(2 * M):
-        X[i, i] = 1.0
-    for i in range(m):
-        F[i, 2 * M + i] = 1.0
-    bodies = np.dot(U, np.ascontiguousarray(G1[:M]))
-    flexible = _difference(R, bodies)
-    W = _difference(np.dot(U, np.ascontiguousarray(X[:M])), np.dot(R, F))
-    rhs = np.empty((m, size))
-    acting = np.empty((m, size))
-    inverse = np.empty((m, m))
-    blocks = B1.reshape((S, n * d * d))
-    for k in range(1, steps + 1):
-        j = k % S
-        for row in range(m):
-            for c in range(size):
-                acting[row, c] = 2.0 * share[j, row // d] * F[row, c]
-        X = np.dot(E, X)
-        _add_matrix(np.dot(G0, acting), X)
-        free = np.dot(U, np.ascontiguousarray(X[:M]))
-        rhs[:] = 0.0
-        for i in range(n):
-            for a in range(d):
-                row = i * d + a
-                for b in range(d):
-                    column = i * d + b
-                    _add_row(A[j, i, a, b], F[column], rhs[row])
-                    _add_row(B1[j, i, a, b], free[column], rhs[row])
-                    _add_row(B0[j, i, a, b], W[column], rhs[row])
-        if k == 1 or _differ(blocks[j], blocks[k - 1]) or _differ(share[j], share[k - 1]):
-            for column in range(m):
-                weight = 2.0 * (1.0 - share[j, column // d])
-                for row in range(m):
-                    flexible[row, column] = R[row, column] - weight * bodies[row, column]
-            inverse = _inverse_of_contact(B1[j], flexible)
-        F = np.dot(inverse, rhs)
-        for row in range(m):
-            for c in range(size):
-                acting[row, c] = 2.0 * (1.0 - share[j, row // d]) * F[row, c]
-        _add_matrix(np.dot(G1, acting), X)
-        W = _difference(free, np.dot(flexible, F))
-    full = np.empty((size, size))
-    copy_matrix(X, full)
-    copy_matrix(F, full[2 * M :])
-    return full
-
-
-# Sums of matrices by plain loops, see `bladefem.hbm.linear.array_copy`.
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _add_matrix(part, target):
-    """target (n, k) becomes target + part (n, k)."""
-    for i in range(part.shape[0]):
-        for j in range(part.shape[1]):
-            target[i, j] += part[i, j]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _add_row(factor, row, target):
-    """target (k,) becomes target + factor * row (k,)."""
-    if factor != 0.0:
-        for c in range(target.size):
-            target[c] += factor * row[c]
-
-
-@njit(**INNER_KERNEL)
-def _difference(a, b):
-    """a - b (n, k)."""
-    out = np.empty(a.shape)
-    for i in range(out.shape[0]):
-        for j in range(out.shape[1]):
-            out[i, j] = a[i, j] - b[i, j]
-    return out
-
-
-@njit(**INNER_KERNEL)
-def _differ(a, b):
-    """Whether a and b (k,) differ."""
-    for i in range(a.size):
-        if a[i] != b[i]:
-            return True
-    return False
-
-
-@njit(**INNER_KERNEL)
-def _inverse_of_contact(B, flexible):
-    """(m, m) inverse of 1 + B times the flexibility, for node blocks B (n, d, d)."""
-    n, d, _ = B.shape
-    matrix = np.eye(n * d)
-    for i in range(n):
-        for a in range(d):
-            for b in range(d):
-                _add_row(B[i, a, b], flexible[i * d + b], matrix[i * d + a])
-    return np.ascontiguousarray(np.linalg.inv(matrix))

@@ -3,12 +3,12 @@ model.
 
 Where normal loads are prescribed and the bodies damped there is one periodic motion, and every
 other one decays to it (the friction law is then monotone). Elsewhere the linearised motion is
-carried through one period along the solution (`bladefem.hbm.linearised_flow`): the largest modulus
-of its multipliers shows how much of a disturbance is left after a period. Nodes that stick
-throughout only add constant multipliers of one, the mean force that stick leaves open, and are
-condensed into the bodies. Travelling waves are judged against all disturbances that repeat after
-the same number r of blades as they do. A disturbance that is carried through 1/r of a period and
-handed on to the next blade meets the same wave again: r such steps make the period.
+carried through one period along the solution (`bladefem.hbm.flow_map`): the largest modulus of its
+multipliers shows how much of a disturbance is left after a period. Nodes that stick throughout only
+add constant multipliers of one, the mean force that stick leaves open, and are condensed into the
+bodies (`bladefem.hbm.closed_contacts`). Travelling waves are judged against all disturbances that
+repeat after the same number r of blades as they do. A disturbance that is carried through 1/r of a
+period and handed on to the next blade meets the same wave again: r such steps make the period.
 
 The named bifurcation is the one through which a motion with such multipliers lost its stability:
 "fold" at +1, "period doubling" at -1, "torus" for a complex pair.
@@ -16,14 +16,16 @@ The named bifurcation is the one through which a motion with such multipliers lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import synthesis
-from .linearised_flow import contact_steps, flow_map, linear_steps
+from .closed_contacts import OpenContacts, open_contacts
+from .flow_map import NodeSteps, flow_map
+from .linearised_flow import contact_steps
 from .model import ReducedModel
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
@@ -40,6 +42,8 @@ INSTANTS_PER_PERIOD = 256
 INSTANT_REFINEMENT = 4
 # distance from one within which it is
 NEAR_ONE = 0.003
+# growth from which on more instants do not make it stable
+DECIDED_GROWTH = 0.1
 # and below which it is that of a motion that nothing holds, such as a damper's walk
 NEUTRAL_GROWTH = 1e-7
 # operations of one verdict up to which many are made, some 0.03 s
@@ -73,7 +77,7 @@ def stability_verdict(
 
     Args:
         most: operations above which it is not made, nor made again with more instants where it is
-            close or the motion unstable.
+            close.
     """
     if not solution.converged:
         return Verdict(UNKNOWN, reason="not converged")
@@ -94,8 +98,9 @@ def stability_verdict(
 
 
 def _needs_a_closer_look(growth: float) -> bool:
-    """The multiplier is unstable, or so close that more instants may make it so."""
-    return growth > UNSTABLE_GROWTH - NEAR_ONE and abs(growth) > NEUTRAL_GROWTH
+    """The multiplier is so close to one that more instants may decide otherwise."""
+    close = UNSTABLE_GROWTH - NEAR_ONE < growth < DECIDED_GROWTH
+    return close and abs(growth) > NEUTRAL_GROWTH
 
 
 def has_one_motion(model: ReducedModel) -> bool:
@@ -113,8 +118,7 @@ def verdict_operations(model: ReducedModel, solution: Solution) -> float:
     system = _system(model)
     if isinstance(system, InputError):
         return 0.0
-    moving = system.blades * (len(solution.w) - solution.states["stick"])
-    return _operations(system, moving * model.directions, INSTANTS_PER_PERIOD)
+    return _operations_from_states(model, solution, system, INSTANTS_PER_PERIOD)
 
 
 def _system(model: ReducedModel) -> SectorModes | InputError:
@@ -147,21 +151,12 @@ def _leading(
     """The multiplier of largest modulus; None where it would take too many operations."""
     S = max(instants, 16 * (solution.harmonics + 1))
     S = system.blades * -(-S // system.blades)
-    d = model.directions
-    moving_nodes = system.blades * (len(solution.w) - solution.states["stick"])
-    if _operations(system, moving_nodes * d, S) > most:
+    if _operations_from_states(model, solution, system, S) > most:
         return None
-    A, B1, B0, share, stuck = _node_steps(model, solution, system.blades, S)
-    system, U, R = _without_stuck(model, system, stuck)
-    moving = np.flatnonzero(~stuck)
-    if _operations(system, len(moving) * d, S) > most:
+    contacts, nodes = linearised_contacts(model, solution, system, S)
+    if _operations(contacts, system.blades, S) > most:
         return None
-    dt = 2 * np.pi / solution.omega / S
-    E, G0, G1 = linear_steps(system, dt)
-    by_contact = -U.T
-    nodes = (part[:, moving] for part in (A, B1, B0, share))
-    arrays = (E, G0 @ by_contact, G1 @ by_contact, U, R, *nodes)
-    part = flow_map(*(np.ascontiguousarray(a) for a in arrays), S // system.blades)
+    part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // system.blades)
     values = linalg.eigvals(_handed_on(system, part), check_finite=False) ** system.blades
     return complex(values[np.argmax(abs(values))])
 
@@ -181,27 +176,65 @@ def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:
     )
 
 
-def _operations(
-    system: SectorModes,
-    contacts: int,
-    S: int,
-) -> float:
-    """Of carrying all disturbances through 1/r of S steps, with so many degrees of freedom in
-    contact.
-    """
-    modes = 2.0 * len(system.stiffness)
-    columns = modes + contacts
-    step = modes * (modes + 3 * contacts) + 2.0 * contacts**2
-    return S / system.blades * (2 * columns * step + 2.0 * contacts**3)
+def _operations(contacts: OpenContacts, blades: int, S: int) -> float:
+    """Of carrying all disturbances through 1/r of S steps, and of the multipliers."""
+    rows, M = contacts.reading.shape
+    coupled = sum((2.0 * len(group)) ** 2 for group in contacts.groups)
+    return _products(M, rows, contacts.push.shape[1], coupled, S / blades)
 
 
-def _node_steps(
+def _operations_from_states(
     model: ReducedModel,
     solution: Solution,
-    blades: int,
+    system: SectorModes,
+    S: int,
+) -> float:
+    """The same from how many nodes stick, slip and lift off."""
+    states = solution.states
+    d = model.directions
+    lifting = states["lift"] + states["open"]
+    closed_normal = d - model.elements.tangents
+    rows = d * (states["slip"] + lifting)
+    forces = rows - closed_normal * states["slip"]
+    M = len(system.stiffness)
+    r = system.blades
+    return _products(M, r * rows, r * forces, 4.0 * M**2 / max(r / 2, 1.0), S / r)
+
+
+def _products(M: int, rows: int, forces: int, coupled: float, steps: float) -> float:
+    """Operations of the products of matrices."""
+    size = 2.0 * M + forces
+    step = coupled + rows * M + 2.0 * M * forces + forces**2 + rows * forces
+    return steps * (2 * size * step + 2.0 * forces**3) + 10.0 * size**3
+
+
+def linearised_contacts(
+    model: ReducedModel,
+    solution: Solution,
+    system: SectorModes,
+    S: int,
+) -> tuple[OpenContacts, NodeSteps]:
+    """Bodies with the springs of closed contacts of all blades, and the steps of the other nodes,
+    at S instants a period.
+    """
+    blades = system.blades
+    *parts, stuck, pressed = _steps_of_nodes(model, solution, S)
+    before, after_motion, before_motion, share = (_of_all_blades(p, blades) for p in parts)
+    moving = np.flatnonzero(np.tile(~stuck, blades))
+    springs = np.tile(model.springs, (blades, 1))
+    contacts = open_contacts(system, np.tile(stuck, blades), np.tile(pressed, blades), springs)
+    nodes = (part[:, moving] for part in (before, after_motion, before_motion, share))
+    return contacts, NodeSteps(*nodes)
+
+
+def _steps_of_nodes(
+    model: ReducedModel,
+    solution: Solution,
     S: int,
 ) -> tuple[np.ndarray, ...]:
-    """A, B1, B0 (S, blades n, d, d) and share of `flow_map`, and which nodes stick throughout."""
+    """The parts of `NodeSteps` for the nodes of one blade; which of them stick throughout, and
+    which have a normal spring that never lifts off.
+    """
     e = model.elements
     n, d, K = solution.w.shape
     t = e.tangents
@@ -236,9 +269,8 @@ def _node_steps(
         B1[:, :, 0, 0] = (e.kn[:, None] * (N > 0)).T
         B1[:, :, f:, 0] = by_load[..., 1] * e.kn[:, None]
         B0[:, :, f:, 0] = by_load[..., 0] * e.kn[:, None]
-    stuck &= (N > 0).all(axis=1)
-    parts = (_of_all_blades(part, blades) for part in (A, B1, B0, share))
-    return *parts, np.tile(stuck, blades)
+    closed = (N > 0).all(axis=1)
+    return A, B1, B0, share, stuck & closed, closed & bool(f)
 
 
 def _of_all_blades(part: np.ndarray, blades: int) -> np.ndarray:
@@ -256,40 +288,3 @@ def _rates(w: np.ndarray) -> np.ndarray:
     rate[:, :, 1::2] = h * w[:, :, 2::2]
     rate[:, :, 2::2] = -h * w[:, :, 1::2]
     return rate
-
-
-def _without_stuck(
-    model: ReducedModel,
-    system: SectorModes,
-    stuck: np.ndarray,
-) -> tuple[SectorModes, np.ndarray, np.ndarray]:
-    """The bodies with the springs of nodes that stick throughout, and U, R of the other nodes."""
-    d = model.directions
-    rows = np.repeat(stuck, d)
-    springs = np.tile(model.springs.ravel(), system.blades)
-    closed = np.flatnonzero(rows & (springs > 0))
-    others = np.flatnonzero(~rows)
-    U = system.contact[others]
-    R = system.residual[np.ix_(others, others)]
-    if not len(closed):
-        return system, U, R
-    own = system.contact[closed]
-    inverse = np.linalg.inv(np.diag(1 / springs[closed]) + system.residual[np.ix_(closed, closed)])
-    across = system.residual[np.ix_(others, closed)]
-    U = U - across @ inverse @ own
-    R = R - across @ inverse @ across.T
-    K = np.diag(system.stiffness) + own.T @ inverse @ own
-    values, vectors = np.linalg.eigh((K + K.T) / 2)
-    circulatory = system.circulatory
-    if circulatory is not None:
-        circulatory = vectors.T @ circulatory @ vectors
-    changed = replace(
-        system,
-        stiffness=np.maximum(values, 0.0),
-        damping=vectors.T @ system.damping @ vectors,
-        contact=U @ vectors,
-        residual=R,
-        circulatory=circulatory,
-        turn=vectors.T @ system.turn @ vectors,
-    )
-    return changed, changed.contact, R

@@ -18,6 +18,7 @@ from ...hbm.model import ReducedModel
 from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import Solution, size
 from ...hbm.solve import solve
+from ...hbm.solver.newton import DEFAULT_OPTIONS
 from ...hbm.stability import (
     MAX_OPERATIONS,
     STABLE,
@@ -36,13 +37,18 @@ if TYPE_CHECKING:
 
 # local maxima of a curve that are judged first
 MAX_JUDGED_MAXIMA = 4
-# operations of all verdicts on a curve, some 0.7 s: about what its points take
-CURVE_OPERATIONS = 2e10
+# operations of all verdicts on a curve, some 0.5 s: less than its points take
+CURVE_OPERATIONS = 1.2e10
+# of solving a point again with more harmonics
+RICHER_OPERATIONS = 5e8
 # points that are judged in addition, as long as the highest one that is not unstable is not judged
 POINTS_JUDGED_IN_ADDITION = 2
 # with which points of one harmonic are judged
 JUDGED_HARMONICS = 7
 JUDGED_SAMPLES = 128
+# a motion that Newton's method does not reach from the point is not looked for: one such search
+# cost twice the verdicts of a curve
+JUDGED_OPTIONS = replace(DEFAULT_OPTIONS, fallbacks=False)
 # harmonics with whose bodies a travelling wave is asked whether it repeats
 RING_HARMONICS = (7, 15, 31)
 
@@ -69,7 +75,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
     last whichever point is then the highest of those that are not unstable.
     """
     found = [Verdict(UNKNOWN, reason="it was left out for its cost") for _ in points]
-    costs = [verdict_operations(model, point) for point in points]
+    costs = [_judging_operations(model, point) for point in points]
     maxima = _maxima(points)
     budget = CURVE_OPERATIONS
     judged: set[int] = set()
@@ -97,6 +103,12 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
     )
 
 
+def _judging_operations(model: ReducedModel, point: Solution) -> float:
+    """Operations of the verdict on a point, with those of `_judged_motion`."""
+    own = verdict_operations(model, point)
+    return own + RICHER_OPERATIONS * (own > 0 and point.harmonics == 1)
+
+
 def _judged_motion(model: ReducedModel, point: Solution) -> Solution:
     """The point itself, or its motion with more harmonics where it has the first one alone: stick
     and slip of that one may be called unstable where the motion is not.
@@ -105,7 +117,9 @@ def _judged_motion(model: ReducedModel, point: Solution) -> Solution:
         return point
     samples = max(point.samples, JUDGED_SAMPLES)
     try:
-        richer = solve(model, point.omega, JUDGED_HARMONICS, samples, start=point)
+        richer = solve(
+            model, point.omega, JUDGED_HARMONICS, samples, start=point, options=JUDGED_OPTIONS
+        )
     except (InputError, NotSolvedError):
         return point
     return richer if richer.converged else point

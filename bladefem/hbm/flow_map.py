@@ -1,0 +1,330 @@
+"""The map of disturbances of a periodic motion over part of a period.
+
+Bodies step exactly between two instants (`bladefem.hbm.linearised_flow.group_steps`), the contact
+forces follow implicitly from the derivatives of the friction law's own steps
+(`bladefem.hbm.linearised_flow.contact_steps`). All disturbances are carried at once, so that nearly
+all operations are products of matrices.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from ..util.numba_options import INNER_KERNEL, KERNEL
+from .closed_contacts import OpenContacts
+from .linear.array_copy import copy_matrix
+from .linearised_flow import group_steps
+
+# modes of a group up to which plain loops are faster than a product of matrices
+SMALL_GROUP = 3
+
+
+class NodeSteps(NamedTuple):
+    """Derivatives of the steps of a period, step k to instant k, of n nodes with d directions."""
+
+    # (S, n, d, d) of the force by the force before
+    before: np.ndarray
+    # (S, n, d, d) by the displacements after and before the step [N/m]
+    after_motion: np.ndarray
+    before_motion: np.ndarray
+    # (S, n) of each step for which the force before it acts
+    share: np.ndarray
+
+
+class _Bodies(NamedTuple):
+    """Steps of the bodies on states (q, v) group by group, and of forces in contact."""
+
+    # (groups + 1,) first mode of each group
+    starts: np.ndarray
+    # E of the groups one after the other
+    flow: np.ndarray
+    # (2M, m) of forces from an instant on until half the step after: what the step before it left,
+    # and the step after it
+    carried: np.ndarray
+    # (2M, m) parts of it: forces after the step before, and before the step after
+    old: np.ndarray
+    new: np.ndarray
+    # (2M, m) states at the end of a step by the forces after it
+    ended: np.ndarray
+    # (n d, M) readings in the order of the groups; (n d, m) flexibility, and what the forces after
+    # a step move at its end
+    reading: np.ndarray
+    flexibility: np.ndarray
+    moved: np.ndarray
+    # (n d,) number of the force in each direction, -1: none
+    force: np.ndarray
+
+
+def flow_map(contacts: OpenContacts, nodes: NodeSteps, dt: float, steps: int) -> np.ndarray:
+    """(2M+m, 2M+m) map of disturbances of (q, v, f) over the first steps of a period.
+
+    Args:
+        nodes: of the nodes of the contacts.
+        dt: of a step [s]; steps: at most those of a period.
+    """
+    bodies, order = _bodies(contacts, dt)
+    found = _carry(bodies, NodeSteps(*map(np.ascontiguousarray, nodes)), steps)
+    M = len(contacts.stiffness)
+    state = np.concatenate([order, np.arange(2 * M, len(found))])
+    mapped = np.empty_like(found)
+    mapped[np.ix_(state, state)] = found
+    return mapped
+
+
+def _bodies(contacts: OpenContacts, dt: float) -> tuple[_Bodies, np.ndarray]:
+    """Bodies for `_carry`, and which of the states (q, v) each of theirs is."""
+    M = len(contacts.stiffness)
+    starts = [0]
+    flows = []
+    parts: tuple[list[np.ndarray], ...] = ([], [], [])
+    modes = []
+    order = []
+    for group, (E, G0, G1) in group_steps(
+        contacts.stiffness, contacts.damping, contacts.groups, dt
+    ):
+        starts.append(starts[-1] + len(group))
+        flows.append(E.ravel())
+        push = -contacts.push[group]
+        for part, found in zip(parts, (G0 @ push, E @ (G1 @ push), G1 @ push), strict=True):
+            part.append(found)
+        modes.append(group)
+        order.extend([group, M + group])
+    new, old, ended = (np.concatenate(part) for part in parts)
+    by_group = np.concatenate(modes)
+    reading = np.ascontiguousarray(contacts.reading[:, by_group])
+    states = np.concatenate(order)
+    displaced = np.empty((M, contacts.push.shape[1]))
+    # rows of the displacements among the states
+    displaced[states[states < M]] = ended[states < M]
+    moved = contacts.reading @ displaced
+    bodies = _Bodies(
+        np.array(starts),
+        np.concatenate(flows),
+        old + new,
+        old,
+        new,
+        ended,
+        reading,
+        np.ascontiguousarray(contacts.flexibility),
+        moved,
+        contacts.force,
+    )
+    return bodies, states
+
+
+@njit(**KERNEL)
+def _carry(bodies, nodes, steps):
+    """(2M+m, 2M+m) map, states in the order of the groups.
+
+    The state between two steps is kept without the forces after the first one, which act in
+    ``carried`` together with those before the second. The two differ where a node changes its state
+    inside a step.
+    """
+    S, _n, d, _ = nodes.before.shape
+    rows, M = bodies.reading.shape
+    m = bodies.carried.shape[1]
+    size = 2 * M + m
+    node_of = _nodes_of_forces(bodies.force, d, m)
+    X, F = _unit_disturbances(bodies, nodes.share[0], node_of)
+    Q = np.empty((M, size))
+    free = np.empty((rows, size))
+    W = np.empty((rows, size))
+    flexible = np.empty((rows, m))
+    rhs = np.empty((m, size))
+    next_X = np.empty((2 * M, size))
+    pushed = np.empty((2 * M, size))
+    inverse = np.empty((m, m))
+    _flexibility(bodies, nodes.share[0], node_of, flexible)
+    _displacements(bodies.starts, X, Q)
+    np.dot(bodies.reading, Q, out=free)
+    np.dot(flexible, F, out=W)
+    _subtract_from(free, W)
+    for k in range(1, steps + 1):
+        j = k % S
+        last = k - 1
+        _free_step(bodies, X, next_X)
+        X, next_X = next_X, X
+        np.dot(bodies.carried, F, out=pushed)
+        _add_matrix(pushed, X)
+        _changed_forces(bodies, nodes.share[last], nodes.share[j], node_of, F, X)
+        _displacements(bodies.starts, X, Q)
+        np.dot(bodies.reading, Q, out=free)
+        _known_forces(bodies.force, nodes, j, free, W, F, rhs)
+        if k == 1 or _differ(nodes, j, last):
+            _flexibility(bodies, nodes.share[j], node_of, flexible)
+            inverse = _inverse_of_contact(nodes.after_motion[j], bodies.force, flexible)
+        np.dot(inverse, rhs, out=F)
+        np.dot(flexible, F, out=W)
+        _subtract_from(free, W)
+    return _whole_state(bodies, nodes.share[steps % S], node_of, X, F)
+
+
+@njit(**INNER_KERNEL)
+def _nodes_of_forces(force, d, m):
+    """(m,) node of each force."""
+    node_of = np.zeros(m, dtype=np.int64)
+    for row in range(len(force)):
+        if force[row] >= 0:
+            node_of[force[row]] = row // d
+    return node_of
+
+
+@njit(**INNER_KERNEL)
+def _unit_disturbances(bodies, share, node_of):
+    """Each state and each force disturbed by one: states (2M, 2M+m) without the forces after the
+    step, and forces (m, 2M+m).
+    """
+    states, m = bodies.ended.shape
+    X = np.zeros((states, states + m))
+    F = np.zeros((m, states + m))
+    for i in range(states):
+        X[i, i] = 1.0
+    for c in range(m):
+        F[c, states + c] = 1.0
+        for i in range(states):
+            X[i, states + c] = -2.0 * (1.0 - share[node_of[c]]) * bodies.ended[i, c]
+    return X, F
+
+
+@njit(**INNER_KERNEL)
+def _whole_state(bodies, share, node_of, X, F):
+    """(2M+m, k) states with the forces after the last step, and these forces."""
+    states, m = bodies.ended.shape
+    for c in range(m):
+        weight = 2.0 * (1.0 - share[node_of[c]])
+        for i in range(states):
+            _add_row(weight * bodies.ended[i, c], F[c], X[i])
+    full = np.empty((states + m, X.shape[1]))
+    copy_matrix(X, full)
+    copy_matrix(F, full[states:])
+    return full
+
+
+@njit(**INNER_KERNEL)
+def _free_step(bodies, X, target):
+    """target (2M, k) becomes E X, group by group."""
+    first = 0
+    for g in range(len(bodies.starts) - 1):
+        start = 2 * bodies.starts[g]
+        end = 2 * bodies.starts[g + 1]
+        b = end - start
+        E = bodies.flow[first : first + b * b].reshape((b, b))
+        first += b * b
+        if b > 2 * SMALL_GROUP:
+            np.dot(E, X[start:end], out=target[start:end])
+            continue
+        for i in range(b):
+            for c in range(X.shape[1]):
+                target[start + i, c] = E[i, 0] * X[start, c]
+            for k in range(1, b):
+                _add_row(E[i, k], X[start + k], target[start + i])
+
+
+@njit(**INNER_KERNEL)
+def _displacements(starts, X, Q):
+    """Q (M, k) becomes the displacements among the states X (2M, k)."""
+    for g in range(len(starts) - 1):
+        for i in range(starts[g], starts[g + 1]):
+            for c in range(X.shape[1]):
+                Q[i, c] = X[starts[g] + i, c]
+
+
+@njit(**INNER_KERNEL)
+def _changed_forces(bodies, before, after, node_of, F, X):
+    """Add to the states what forces of nodes that change inside a step do more than for half of it.
+
+    Args:
+        before, after: (n,) shares of the step before and of this one.
+    """
+    for c in range(len(node_of)):
+        more_before = 1.0 - 2.0 * before[node_of[c]]
+        more_after = 2.0 * after[node_of[c]] - 1.0
+        if more_before != 0.0 or more_after != 0.0:
+            for i in range(X.shape[0]):
+                weight = more_before * bodies.old[i, c] + more_after * bodies.new[i, c]
+                _add_row(weight, F[c], X[i])
+
+
+@njit(**INNER_KERNEL)
+def _known_forces(force, nodes, j, free, W, F, rhs):
+    """rhs (m, k) becomes what the forces after a step do not decide themselves."""
+    d = nodes.before.shape[2]
+    rhs[:] = 0.0
+    for row in range(len(force)):
+        own = force[row]
+        if own < 0:
+            continue
+        i = row // d
+        a = row - i * d
+        for b in range(d):
+            other = i * d + b
+            if force[other] >= 0:
+                _add_row(nodes.before[j, i, a, b], F[force[other]], rhs[own])
+            _add_row(nodes.after_motion[j, i, a, b], free[other], rhs[own])
+            _add_row(nodes.before_motion[j, i, a, b], W[other], rhs[own])
+
+
+@njit(**INNER_KERNEL)
+def _flexibility(bodies, share, node_of, flexible):
+    """flexible (n d, m) becomes the displacements at the end of a step for forces after it."""
+    for c in range(len(node_of)):
+        weight = 2.0 * (1.0 - share[node_of[c]])
+        for row in range(flexible.shape[0]):
+            flexible[row, c] = bodies.flexibility[row, c] - weight * bodies.moved[row, c]
+
+
+@njit(**INNER_KERNEL)
+def _inverse_of_contact(B, force, flexible):
+    """(m, m) inverse of 1 + B times the flexibility, for node blocks B (n, d, d)."""
+    d = B.shape[1]
+    matrix = np.eye(flexible.shape[1])
+    for row in range(len(force)):
+        if force[row] >= 0:
+            i = row // d
+            for b in range(d):
+                _add_row(B[i, row - i * d, b], flexible[i * d + b], matrix[force[row]])
+    return np.ascontiguousarray(np.linalg.inv(matrix))
+
+
+@njit(**INNER_KERNEL)
+def _differ(nodes, j, last):
+    """Whether the derivatives of two steps differ."""
+    n, d = nodes.before.shape[1:3]
+    for i in range(n):
+        if nodes.share[j, i] != nodes.share[last, i]:
+            return True
+        for a in range(d):
+            for b in range(d):
+                if nodes.after_motion[j, i, a, b] != nodes.after_motion[last, i, a, b]:
+                    return True
+    return False
+
+
+# Sums of matrices by plain loops, see `bladefem.hbm.linear.array_copy`.
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _add_matrix(part, target):
+    """target (n, k) becomes target + part (n, k)."""
+    for i in range(part.shape[0]):
+        for j in range(part.shape[1]):
+            target[i, j] += part[i, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _subtract_from(whole, part):
+    """part (n, k) becomes whole - part."""
+    for i in range(part.shape[0]):
+        for j in range(part.shape[1]):
+            part[i, j] = whole[i, j] - part[i, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def _add_row(factor, row, target):
+    """target (k,) becomes target + factor * row (k,)."""
+    if factor != 0.0:
+        for c in range(target.size):
+            target[c] += factor * row[c]
