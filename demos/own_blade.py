@@ -23,7 +23,8 @@ if "REMAKE" in os.environ:
         scenes / "wedge.toml",
         ["aerofoil.span=110 mm", "aerofoil.twist=15 deg", "damper.angle=60 deg"],
     )
-    parts = (drawn.aerofoil, drawn.platform, drawn.shank, drawn.disc, drawn.damper)
+    blade = (drawn.aerofoil, drawn.platform, drawn.shank, drawn.disc)
+    parts = (*blade, drawn.damper, drawn.root, drawn.shroud)
     write_blade_step(scenes / "own_blade.step", *parts)
 
 # %% [markdown]

@@ -6,11 +6,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .parameters import Aerofoil, Disc, Platform, Shank, Wedge
+from .fillet import with_fillet
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
 from .profile import sector_profile
-from .sector import blade_solid
+from .root import root_slots
+from .sector import NO_SHROUD, PLAIN, blade_solid
 from .sector_check import check_sector
 from .session import gmsh_session
+from .shroud import shroud_block
 
 
 def write_blade_step(
@@ -20,8 +23,11 @@ def write_blade_step(
     shank: Shank,
     disc: Disc,
     wedge: Wedge,
+    root: Root = PLAIN,
+    shroud: Shroud = NO_SHROUD,
 ) -> Path:
-    """Write one sector of the wheel, from bore to tip; returns the file.
+    """Write one sector of the wheel, from bore to tip, as ``wedge_sector`` draws it: with its
+    fillet; returns the file.
 
     Args:
         wedge: its angle is that of the platform's inclined undersides.
@@ -29,13 +35,15 @@ def write_blade_step(
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    check_sector(aerofoil, platform, shank, disc, wedge)
+    check_sector(aerofoil, platform, shank, disc, wedge, root, shroud)
+    aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, MeshSize())
+    shape = sector_profile(platform, shank, disc, wedge)
+    block = shroud_block(shroud, aerofoil, disc, shape.top)
+    slots = root_slots(root, shank, disc)
     file = Path(file)
     with gmsh_session() as gmsh:
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
-        blade = blade_solid(
-            gmsh, aerofoil, platform, shank, disc, sector_profile(platform, shank, disc, wedge)
-        )
+        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape, block, slots)
         gmsh.model.occ.dilate([(3, blade)], 0, 0, 0, 1e3, 1e3, 1e3)
         gmsh.model.occ.remove([e for e in gmsh.model.occ.getEntities(3) if e != (3, blade)])
         gmsh.model.occ.synchronize()

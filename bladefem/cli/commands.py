@@ -14,6 +14,7 @@ from ..scene.kinds import kind_named, load_function
 from ..scene.tables import Scene
 from ..scene.units import shortened
 from ..util.communicator import Communicator
+from ..util.picture_files import PICTURES
 from . import tables
 
 if TYPE_CHECKING:
@@ -40,9 +41,6 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     text = on_root(comm, table)
     if comm is None or comm.rank == 0:
         print(text)
-
-
-PICTURES = (".png", ".pdf", ".svg", ".jpg")
 
 
 def refuse_picture(file: str) -> None:

@@ -22,6 +22,7 @@ from ..io.stage_cache import read_results
 from ..io.stored_stage import stored_stage
 from ..scene.tables import Scene
 from ..scene.toml import load_scene
+from ..util.picture_files import PICTURES
 from ..view import contact, hysteresis, modes, response
 from .tables import COLUMNS
 
@@ -60,7 +61,15 @@ class Arrays:
         return self.data[name]
 
     def plot(self, file: str | Path | None = None, **options: Any) -> object:
-        """The picture, written to a file where one is named; returns the matplotlib figure."""
+        """The picture, written to a file where one is named; returns the matplotlib figure.
+
+        Raises:
+            InputError: a file that is no picture, or a label that the results do not have.
+        """
+        if file is not None and Path(file).suffix.lower() not in PICTURES:
+            raise InputError(
+                f"plot: '{file}', expected a file name that ends with {' or '.join(PICTURES)}"
+            )
         return self.draw(self.data, file, **options)
 
     def __repr__(self) -> str:
@@ -213,7 +222,14 @@ class RunFolder:
             order = self.scene.excitation.engine_order
             sectors = 0 if self.mesh.sector is None else self.mesh.sector.count
             wanted = min(known, key=lambda n: abs(n - _folded(order, sectors)))
+        if wanted not in known:
+            raise InputError(
+                f"plot: nodal_diameter = {wanted} is not there, expected one of "
+                f"{', '.join(str(n) for n in known)}"
+            )
         part = data.sel(nodal_diameter=wanted)
+        if not 1 <= mode <= part.sizes["mode"]:
+            raise InputError(f"plot: mode = {mode}, expected 1 to {part.sizes['mode']}")
         single = None if wanted < 0 else int(wanted)
         shapes = ModeSet(
             part["frequency"].to_numpy(),

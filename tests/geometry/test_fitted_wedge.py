@@ -14,9 +14,11 @@ from bladefem.errors import InputError
 from bladefem.fem.loads import body_volume
 from bladefem.scene.toml import scene_of
 from geometry.example_step import write_blade_step
+from geometry.fillet import with_fillet
 from geometry.fitted_wedge import flanks_between
-from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
 from geometry.profile import sector_profile
+from geometry.section import section_outline
 from geometry.session import gmsh_session
 from geometry.step_file import FittedDamper, _import_shapes, axis_rotation, read_step
 
@@ -35,7 +37,7 @@ def step(tmp_path_factory):
 @pytest.fixture(scope="module")
 def mesh(step):
     fitted = FittedDamper(SEATS, Wedge())
-    return read_step(step, SIZE, 1.0, BLADE[3].sectors, names=["tip = face_21"], fitted=fitted)
+    return read_step(step, SIZE, 1.0, BLADE[3].sectors, names=["tip = face_24"], fitted=fitted)
 
 
 def seat_corners(side: int) -> np.ndarray:
@@ -66,6 +68,35 @@ def test_all_pairs_match_and_other_names_stay(mesh):
         assert np.abs(moved - mesh.points[slave]).max() < 1e-12
     assert {"tip", "clamp", "face_12"} <= set(mesh.faces)
     assert not set(SEATS) & set(mesh.faces)
+
+
+def test_the_step_file_has_the_fillet_of_the_parametric_sector(step, tmp_path):
+    """What it adds to the volume: r^2 (1 - pi/4) along the outline of the root section, less where
+    the arc is cut short above the platform.
+    """
+    sharp = (replace(BLADE[0], fillet=0.0), *BLADE[1:])
+    plain = write_blade_step(tmp_path / "sharp.step", *sharp, Wedge())
+    volumes = []
+    for file in (step, plain):
+        with gmsh_session() as gmsh:
+            _import_shapes(gmsh, file, 1.0)
+            volumes.append(gmsh.model.occ.getMass(*gmsh.model.getEntities(3)[0]))
+    radius = with_fillet(*BLADE, Wedge(), MeshSize()).fillet
+    outline = section_outline(BLADE[0], 0.0, 0.0)
+    length = np.linalg.norm(np.diff(outline, axis=0, append=outline[:1]), axis=1).sum()
+    whole = radius**2 * (1 - pi / 4) * length
+    assert 0.75 * whole < volumes[0] - volumes[1] < 1.05 * whole
+
+
+def test_the_step_file_has_root_and_shroud(tmp_path):
+    shroud = Shroud(thickness=0.004)
+    found = {}
+    for name, more in {"plain": (), "both": (Root(lobes=2), shroud)}.items():
+        file = write_blade_step(tmp_path / f"{name}.step", *BLADE, Wedge(), *more)
+        with gmsh_session() as gmsh:
+            _import_shapes(gmsh, file, 1.0)
+            found[name] = len(gmsh.model.getEntities(2))
+    assert found["both"] > found["plain"] + 10
 
 
 def variations():

@@ -172,6 +172,26 @@ def test_unknown_labels_are_named(run, labels, said):
         run.response.sel(**labels)
 
 
+def test_a_file_that_is_no_picture_is_refused(run, tmp_path):
+    with pytest.raises(InputError, match=r"a\.doc', expected a file name that ends with \.png"):
+        run.response.plot(tmp_path / "a.doc")
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"mode": 3}, "mode = 3, expected 1 to 2"),
+        ({"mode": 0}, "mode = 0, expected 1 to 2"),
+        ({"nodal_diameter": 4}, "nodal_diameter = 4 is not there, expected one of 9"),
+    ],
+)
+def test_a_mode_that_is_not_there_is_named(run, asked, said):
+    coordinates = {"nodal_diameter": [9], "mode": [1, 2]}
+    data = xr.Dataset({"frequency": (("nodal_diameter", "mode"), [[1.0, 2.0]])}, coordinates)
+    with pytest.raises(InputError, match=said):
+        run._draw_modes(data, **{"nodal_diameter": 9, **asked})
+
+
 def test_a_folder_without_a_run_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no scene\.toml in it"):
         bladefem.open(tmp_path)
