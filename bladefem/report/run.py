@@ -52,6 +52,7 @@ from .fatigue import (
     utilisation_table,
     worst_utilisation,
 )
+from .flow import flow_drawing, flow_headlines, flow_tables
 from .headlines import Headline
 from .influences import influence_sentence, influence_table
 from .linear import linear_sentence
@@ -139,7 +140,7 @@ def write_run(
 def _all_tables(result: SolvedRun, cycles: list[ContactCycle]) -> dict[str, pd.DataFrame]:
     patches = list(result.contact.problem.patches)
     coefficient = result.scene.contact.wear_coefficient
-    tables = {**_tables(result), **_wheel_tables(result)}
+    tables = {**_tables(result), **flow_tables(result), **_wheel_tables(result)}
     if coefficient is not None:
         tables["contact/wear"] = wear_table(patches, cycles, coefficient)
     return tables
@@ -157,6 +158,7 @@ def _all_drawings(
         "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
         "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
         **utilisation_drawing(result),
+        **flow_drawing(result),
         **({} if result.wheel is None else pattern_drawings(result.wheel)),
     }
 
@@ -181,7 +183,9 @@ def _write_page(
         figures,
         messages,
         result.timings,
-        page=Page(_live(result, tables, cycles), more=_wheel_headlines(result)),
+        page=Page(
+            _live(result, tables, cycles), more=[*flow_headlines(result), *_wheel_headlines(result)]
+        ),
     )
 
 

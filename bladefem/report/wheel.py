@@ -295,6 +295,8 @@ def _optimum_sentences(found: Amplification) -> list[str]:
         f"{robust.load.value:.4g} N (95 % interval {robust.load.low:.4g} to "
         f"{robust.load.high:.4g} N), {1e6 * robust.height.value:.4g} um "
         f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
+        "between the loads studied both optima are those of a parabola; the intervals know the "
+        f"sample of wheels, not the parabola: robust optimum {_bracket(found, robust.load.value)}",
     ]
     if robust.at_end > 0.025:
         sentences.append(

@@ -353,6 +353,25 @@ class Mistuning:
 
 
 @dataclass(frozen=True)
+class Aerodynamics:
+    """What the flow does to the mode studied, by nodal diameter or by the distance of blades; of
+    wheels. Shares of the mode's own frequency and of critical damping.
+    """
+
+    waves: tuple[str, ...] | None = quantity(
+        None,
+        help="damping and frequency shift of waves, texts like '-5: -0.12 %; 0.05 %' (nodal "
+        "diameter, backward ones negative); linear between those given",
+    )
+    influence: tuple[str, ...] | None = quantity(
+        None,
+        help="in place of them influence coefficients, texts like '-1: 0.08 %; 120 deg': force on "
+        "a blade by the motion of the one that many places ahead, over twice the modal stiffness; "
+        "90 deg damps",
+    )
+
+
+@dataclass(frozen=True)
 class Fatigue:
     """What the blade's material lasts: Goodman's line by two values, or Haigh's diagram."""
 
@@ -562,6 +581,7 @@ class Scene:
     excitation: Excitation = field(default_factory=Excitation)
     study: Study = field(default_factory=Study)
     mistuning: Mistuning = field(default_factory=Mistuning)
+    aerodynamics: Aerodynamics = field(default_factory=Aerodynamics)
     fatigue: Fatigue = field(default_factory=Fatigue)
     model: Model = field(default_factory=Model)
     solver: Solver = field(default_factory=Solver)

@@ -147,3 +147,40 @@ def _phase_colours(phase: np.ndarray) -> np.ndarray:
     from matplotlib import colormaps
 
     return colormaps["twilight"]((phase % (2 * np.pi)) / (2 * np.pi))
+
+
+def draw_waves(
+    diameters: np.ndarray,
+    net: np.ndarray,
+    blade: float,
+    excited: int,
+    friction: float | None,
+    file: str | Path,
+) -> None:
+    """Damping of the waves of a wheel in a flow.
+
+    Args:
+        diameters: (N,) ascending, backward ones negative.
+        net: (N,) share of critical damping of blade and flow, without dampers.
+        blade: the same of the blade alone.
+        excited: nodal diameter of the engine order.
+        friction: largest damping by the dampers; None where they are not needed.
+    """
+    with canvas(file, size=(7.6, 3.9)) as ax:
+        colours = [COLOURS[1] if value < 0 else COLOURS[0] for value in net]
+        ax.bar(diameters, 100 * net, color=colours, width=0.8)
+        ax.axhline(0.0, color="black", linewidth=0.8)
+        ax.axhline(
+            100 * blade, color=COLOURS[6], linewidth=1.2, linestyle="--", label="without flow"
+        )
+        height = float(net[list(diameters).index(excited)])
+        ax.plot([excited], [100 * height], "v", color="black", label="engine order")
+        if (net < 0).any():
+            label = "fed by the flow"
+            if friction is not None:
+                label += f": friction holds up to {100 * friction:.3g} %"
+            ax.plot([], [], "s", color=COLOURS[1], label=label)
+        ax.set_xlabel("nodal diameter, negative: backward")
+        ax.set_ylabel("damping without dampers [%]")
+        ax.set_title("Damping of the waves in the flow")
+        ax.legend(loc="best")

@@ -99,7 +99,7 @@ def input_files(scene: Scene) -> tuple[Path, ...]:
 
 KIND = Kind(
     name="imported",
-    tables=("imported", "damper", "mistuning", *ENGINE_TABLES),
+    tables=("imported", "damper", "mistuning", "aerodynamics", *ENGINE_TABLES),
     builder="geometry.imported:read_geometry",
     shape=("imported", "mesh", "damper"),
     runner="bladefem.report.run:report_run",

@@ -98,7 +98,7 @@ def face_names(scene: Scene) -> tuple[str, ...]:
 
 KIND = Kind(
     name="wedge sector",
-    tables=(*SHAPE, *EXTRAS, "mistuning", *ENGINE_TABLES),
+    tables=(*SHAPE, *EXTRAS, "mistuning", "aerodynamics", *ENGINE_TABLES),
     builder="geometry.sector:wedge_sector",
     shape=(*SHAPE, "mesh", *EXTRAS),
     runner="bladefem.report.run:report_run",

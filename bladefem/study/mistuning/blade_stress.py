@@ -29,6 +29,7 @@ from ..pipeline.damped_motion import (
     node_forces,
     stress_of_motion,
 )
+from ..pipeline.flow import family_modes, flowing_modes, scene_flow
 from ..pipeline.ports import Ports, blade_ports
 from ..pipeline.stages import MODES_SHOWN, Bodies, wheel_modes
 
@@ -102,27 +103,28 @@ def blade_motion(
     fields = np.zeros((H, len(bodies.mesh.points), bodies.mesh.dimension), complex)
     factorised = lru_cache(maxsize=1)(bodies.factorised)
     dampings = response_damping(bodies, shapes.modes)
+    ratio = bodies.scene.operation.damping
+    flow = scene_flow(bodies.scene, count)
+    numbers = family_modes(ports, shapes.modes, flow)
     for found, damping in zip(shapes.modes, dampings, strict=True):
         n = found.nodal_diameter or 0
         highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
-        # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
-        waves = [
-            (h, d)
-            for h in range(H)
-            for d in sorted({n, -n % count})
-            if (h + 1) * solution.omega < highest
-        ]
-        if not waves:
+        harmonics = [h for h in range(H) if (h + 1) * solution.omega < highest]
+        if not harmonics:
             continue
-        mirrored = np.array([d != n for _, d in waves])
-        loads = np.array([by_diameter[d, h] for h, d in waves]).T
-        loads = ports.matrix @ np.where(mirrored, loads.conj(), loads)
-        omega = np.array([(h + 1) * solution.omega for h, _ in waves])
-        omega = omega * np.where(mirrored, -1.0, 1.0)
-        u = forced_motion(factorised(n), found, loads, omega, damping).displacement
-        u = np.where(mirrored, u.conj(), u)
-        for k, (h, d) in enumerate(waves):
-            fields[h] += u[..., k] * np.exp(2j * np.pi * d * blade / count) / count
+        flex = factorised(n)
+        # forward and backward waves feel another flow
+        for d in sorted({n, -n % count}):
+            mirrored = d != n
+            loads = by_diameter[d, harmonics].T
+            loads = ports.matrix @ (loads.conj() if mirrored else loads)
+            # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
+            omega = (np.array(harmonics) + 1) * solution.omega * (-1.0 if mirrored else 1.0)
+            part = flowing_modes(flow, found, damping, ratio, d, numbers.get(n, 0))
+            u = forced_motion(flex, part[0], loads, omega, part[1]).displacement
+            u = u.conj() if mirrored else u
+            turn = np.exp(2j * np.pi * d * blade / count) / count
+            fields[harmonics] += turn * u.transpose(2, 0, 1)
     seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     probe = fields.reshape(H, -1) @ seen
     known = solution.probe[blade, 1:, 0]

@@ -22,6 +22,7 @@ from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.contact_cycle import element_labels
 from ..pipeline.coriolis import with_coriolis
+from ..pipeline.flow import scene_flow, wheel_influence
 from ..pipeline.stages import Bodies, Reduced, reduce_sector, with_damper_mass
 from .validate import read_orders
 
@@ -98,11 +99,9 @@ def whole_wheel(
     """
     reduced = with_coriolis(scene, with_damper_mass(sector.reduced, case.mass))
     count = reduced.sectors
+    bodies = {d: truncate_modes(reduced.sector[d], settings.modes) for d in range(count // 2 + 1)}
     sides = tuple(
-        pair_model(
-            truncate_modes(reduced.sector[d], settings.modes), reduced.following, 2 * pi * d / count
-        )
-        for d in range(count // 2 + 1)
+        pair_model(body, reduced.following, 2 * pi * d / count) for d, body in bodies.items()
     )
     model = joint_model(
         scene, mesh, reduced, patches, case, settings.harmonics, settings.damper, sides
@@ -121,6 +120,7 @@ def whole_wheel(
         model.damping,
         damper,
         model.damper_damping,
+        influence=wheel_influence(scene_flow(scene, count), bodies),
         coupled=False,
         start=model.start,
     )

@@ -18,6 +18,7 @@ from ...errors import InputError
 from ...hbm.model import Damping, ReducedModel, in_series
 from ...reduction.assemble import pair_models, recombine_contact, wheel_models
 from ...scene.tables import Scene
+from .flow import flowing_sides, scene_flow
 from .stages import Reduced
 
 # of [damper] axial: a stop
@@ -216,5 +217,6 @@ def _sides(
             n: reduced.sector[min(reduced.sector, key=lambda known: abs(known - n))]
             for n in range(reduced.sectors // 2 + 1)
         }
-        return wheel_models(nearest, reduced.following, order, reduced.sectors, harmonics)
+        sides = wheel_models(nearest, reduced.following, order, reduced.sectors, harmonics)
+        return flowing_sides(scene_flow(scene, reduced.sectors), nearest, sides, order)
     return pair_models(reduced.sector[0], reduced.following, scene.excitation.phase, harmonics)

@@ -26,6 +26,7 @@ from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .contact_cycle import element_labels
 from .coriolis import response_damping
+from .flow import family_modes, flowing_modes, scene_flow
 from .ports import blade_ports
 from .stages import Bodies, is_wheel
 
@@ -101,9 +102,10 @@ def damped_motion(
     loads = blade_loads(bodies, patches, case, solution, points)
     seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     waves = [_diameter(bodies, h) for h in range(1, solution.harmonics + 1)]
+    flow = scene_flow(scene, sector_of(mesh).count if is_wheel(mesh) else 0)
+    numbers = family_modes(ports, modes, flow)
     fields = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
     for found, damping in zip(modes, response_damping(bodies, modes), strict=True):
-        # harmonics of the same nodal diameter are solved together
         highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
         own = [
             h
@@ -112,13 +114,19 @@ def damped_motion(
         ]
         if not own:
             continue
-        mirrored = np.array([waves[h][1] for h in own])
-        flex = (factorised or bodies.factorised)(found.nodal_diameter or 0)
-        # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
-        omega = (np.array(own) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
-        seen_loads = np.where(mirrored, loads[own].conj().T, loads[own].T)
-        u = forced_motion(flex, found, seen_loads, omega, damping).displacement
-        fields[own] = np.where(mirrored, u.conj(), u).transpose(2, 0, 1)
+        n = found.nodal_diameter or 0
+        flex = (factorised or bodies.factorised)(n)
+        # harmonics of the same nodal diameter together, but for what a flow does to each wave
+        for group in [own] if flow is None else [[h] for h in own]:
+            mirrored = np.array([waves[h][1] for h in group])
+            # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
+            omega = (np.array(group) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
+            seen_loads = np.where(mirrored, loads[group].conj().T, loads[group].T)
+            wave = (group[0] + 1) * scene.excitation.engine_order
+            ratio = scene.operation.damping
+            part = flowing_modes(flow, found, damping, ratio, wave, numbers.get(n, 0))
+            u = forced_motion(flex, part[0], seen_loads, omega, part[1]).displacement
+            fields[group] = np.where(mirrored, u.conj(), u).transpose(2, 0, 1)
     probe = np.array([seen @ u.reshape(-1) for u in fields])
     known = solution.probe[1:, 0]
     mismatch = float(abs(probe - known).max() / max(abs(known).max(), np.finfo(float).tiny))

@@ -4,12 +4,14 @@ by the next run.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal, overload
 
 from ...contact.peak_pressure import peak_remarks
 from ...data import Patch
 from ...errors import InputError, suggestion
+from ...scene.aerodynamics import refuse_flow
 from ...scene.tables import Scene
 from ...scene.validate import refuse_response
 from ...scene.warnings import implausible_values
@@ -22,6 +24,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import mode_strength
 from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
+from .flutter import find_flutter, flutter_sentences
 from .history import refuse_jamming
 from .response_stage import run_response
 from .run_records import ModalRun, ReducedRun, Run, SeatedRun, SolvedRun
@@ -109,6 +112,7 @@ def run(
     responds = until in STAGES[3:]
     if responds:
         refuse_response(scene)
+        refuse_flow(scene)
     keep = StageRunner(
         folder, comm, StageClock({}, [*map(warning, implausible_values(scene))], progress)
     )
@@ -129,7 +133,11 @@ def run(
     reduced = _run_reduction(seated, bodies, patches, keep)
     if until == "reduction":
         return reduced
-    return run_response(reduced, bodies, patches, keep)
+    with keep.clock("flutter"):
+        flutter = find_flutter(reduced, bodies, patches, keep)
+    if flutter is not None:
+        keep.clock.messages.extend(flutter_sentences(flutter))
+    return run_response(replace(reduced, flutter=flutter), bodies, patches, keep)
 
 
 def _run_mesh(scene: Scene, keep: StageRunner) -> Run:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ...errors import InputError
+from ...scene.aerodynamics import refuse_flow
 from ...scene.kinds import kind_named, load_function
 from ...scene.tables import Scene
 from ...scene.units import show
@@ -19,6 +20,7 @@ def refuse_run(scene: Scene) -> None:
     haigh_diagram(scene.fatigue)
     check_mistuning(scene)
     kind = kind_named(scene.kind)
+    refuse_flow(scene)
     if kind.preflight is not None:
         load_function(kind.preflight)(scene)
     if kind.has_seats:

@@ -31,6 +31,7 @@ from .stages import Reduced
 
 if TYPE_CHECKING:
     from ..mistuning.pattern_response import PatternResponse
+    from .flutter import FlutterResult
 
 # results of a run to the stage that finds them
 STAGE_OF = {
@@ -41,6 +42,7 @@ STAGE_OF = {
     "strength": "reduction",
     "settings": "reduction",
     "reduced": "reduction",
+    "flutter": "response",
     "response": "response",
     "damped": "response",
     "wheel": "response",
@@ -161,6 +163,8 @@ class ReducedRun(SeatedRun):
     reduced: Reduced
     # of the stiffness, by the body's mesh
     mode_errors: ModeErrors
+    # of the waves in the scene's flow; None without one
+    flutter: FlutterResult | None = None
 
 
 @dataclass(frozen=True, repr=False, kw_only=True)

@@ -93,6 +93,7 @@ STAGE_INPUTS = {
         after=("contact", "reduction"),
         fields=(
             "accuracy",
+            "aerodynamics",
             "contact",
             "damper.axial",
             "operation",
@@ -123,7 +124,7 @@ STAGE_INPUTS = {
     ),
     "damped motion": StageInputs(
         after=("contact", "reduction"),
-        fields=("accuracy", "operation", "excitation", "damper.axial"),
+        fields=("accuracy", "aerodynamics", "operation", "excitation", "damper.axial"),
         code=("bladefem.study",),
     ),
     # many drawn wheels under one load

@@ -1,0 +1,84 @@
+"""Tables and picture of the waves in a scene's flow, for the report of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..study.pipeline.run_records import SolvedRun
+from ..view.wheel import draw_waves
+from .headlines import Headline
+
+
+def flow_tables(run: SolvedRun) -> dict[str, pd.DataFrame]:
+    """Damping of each wave, and the limit cycles of the least damped one; empty without a flow."""
+    found = run.flutter
+    if found is None:
+        return {}
+    order = np.argsort(found.diameters)
+    tables = {
+        "response/flow": pd.DataFrame(
+            {
+                "nodal_diameter": found.diameters[order],
+                "frequency_shift": found.shift[order],
+                "flow_damping": found.flow[order],
+                "net_damping": found.net[order],
+            }
+        )
+    }
+    if found.held:
+        tables["response/flutter"] = pd.DataFrame(
+            [
+                {
+                    "load": one.load,
+                    **({} if one.mass is None else {"mass": one.mass}),
+                    "nodal_diameter": found.worst,
+                    "frequency": one.frequency,
+                    "limit_cycle": one.amplitude,
+                    "flutter_amplitude": one.largest,
+                    "most_friction": one.friction,
+                }
+                for one in found.held
+            ]
+        )
+    return tables
+
+
+def flow_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
+    """Damping over the nodal diameters; empty without a flow."""
+    found = run.flutter
+    if found is None:
+        return {}
+    order = np.argsort(found.diameters)
+    own = run.scene.excitation.engine_order % len(found.net)
+    friction = max((one.friction for one in found.held), default=None)
+    return {
+        "response/flow_damping": lambda file: draw_waves(
+            found.diameters[order],
+            found.net[order],
+            float((found.net - found.flow)[0]),
+            int(found.diameters[own]),
+            friction,
+            file,
+        )
+    }
+
+
+def flow_headlines(run: SolvedRun) -> list[Headline]:
+    """The limit cycle under the load where it is smallest."""
+    found = run.flutter
+    if found is None or not found.held:
+        return []
+    one = min(found.held, key=lambda held: held.amplitude)
+    grows = "" if np.isnan(one.largest) else f"; grows from {1e6 * one.largest:.4g} µm on"
+    return [
+        Headline(
+            "flutter held by friction",
+            f"{1e6 * one.amplitude:.4g} µm",
+            "in one harmonic, by the nonlinear mode",
+            f"{abs(found.worst)} nodal diameters under {one.load:.4g} N{grows}",
+        )
+    ]

@@ -1,0 +1,255 @@
+"""Flutter of a scene's wheel: which waves the flow feeds, and the limit cycles at which friction
+holds the least damped one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+
+from ...data import Patch
+from ...errors import InputError
+from ...hbm.model import ReducedModel
+from ...hbm.nonlinear_modes import NonlinearMode, nonlinear_mode
+from ...reduction.assemble import folded_diameter, pair_model
+from ...reduction.truncate import truncate_modes
+from ...util.arrays import IntegerArray, RealArray
+from ...wheel.aerodynamics import limit_cycles, with_flow
+from ..adaptive.family import coarsened_elements
+from ..adaptive.settings import Settings
+from .assemble_model import LoadCase, joint_model
+from .case_models import load_cases
+from .contact_cycle import element_labels
+from .flow import Flow, family_numbers, port_shapes, scene_flow
+from .run_records import ReducedRun
+from .stage_inputs import stage_key
+from .stage_runner import StageRunner
+from .stages import Bodies, Reduced, reduce_sector, with_damper_mass
+
+# amplitudes of each load, from sticking contacts to where friction does nearly nothing, over the
+# amplitude at which all contacts together begin to slip
+AMPLITUDES = 50
+LOWEST_RATIO, HIGHEST_RATIO = 0.2, 300.0
+# further ones between two of them where friction balances the flow
+CLOSER_AMPLITUDES = 8
+# modal amplitude at which nothing slips [m kg^1/2]
+STICKING_AMPLITUDE = 1e-10
+
+
+@dataclass(frozen=True)
+class HeldFlutter:
+    """The least damped wave under one load."""
+
+    # [N], and of the damper [kg]
+    load: float
+    mass: float | None
+    # limit cycle at the probe [m] and where [Hz]
+    amplitude: float
+    frequency: float
+    # amplitude at the probe from which motions grow [m]; NaN where none that was looked at does
+    largest: float
+    # largest damping by friction [1]
+    friction: float
+
+
+@dataclass(frozen=True)
+class FlutterResult:
+    """Waves of 0..N-1 nodal diameters in a flow."""
+
+    # (N,) relative frequency shift, damping by the flow and with that of the blade [1]
+    shift: RealArray
+    flow: RealArray
+    net: RealArray
+    # empty where no wave is fed
+    held: tuple[HeldFlutter, ...]
+
+    @property
+    def diameters(self) -> IntegerArray:
+        """(N,) nodal diameters; negative ones run backwards."""
+        d = np.arange(len(self.net))
+        return np.where(2 * d <= len(d), d, d - len(d))
+
+    @property
+    def worst(self) -> int:
+        """Nodal diameter of the least damped wave."""
+        return int(self.diameters[np.argmin(self.net)])
+
+    @property
+    def onset(self) -> float:
+        """Factor of the whole influence at which the first wave flutters; infinite where none
+        does.
+        """
+        blade = float((self.net - self.flow)[0])
+        lowest = float(self.flow.min())
+        return blade / -lowest if lowest < 0 else np.inf
+
+
+def find_flutter(
+    run: ReducedRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: StageRunner,
+) -> FlutterResult | None:
+    """Damping of all waves, and limit cycles under each load of the study; None without a flow.
+
+    Raises:
+        InputError: friction holds the flutter under some load at no amplitude.
+    """
+    scene = run.scene
+    flow = scene_flow(scene, run.reduced.sectors)
+    if flow is None:
+        return None
+    fed = flow.influence.imag
+    found = FlutterResult(flow.influence.real, fed, fed + scene.operation.damping, ())
+    if found.net.min() > 0:
+        return found
+    n, _ = folded_diameter(1, found.worst % len(fed), len(fed))
+    wanted = sorted({0, n, flow.own})
+    modes = run.settings.modes
+    sector = keep(
+        "flutter_sector",
+        stage_key("reduction", scene, "flutter", np.array(wanted), modes),
+        lambda: reduce_sector(bodies, patches, wanted, modes),
+    )
+    cases = load_cases(scene, run.mesh, run.contact)
+
+    def compute() -> tuple[HeldFlutter, ...]:
+        return tuple(_held(run, sector, patches, case, flow, found.worst) for case in cases)
+
+    key = stage_key("response", scene, "flutter", found.worst, [(c.load, c.mass) for c in cases])
+    return replace(found, held=keep("flutter", key, compute))
+
+
+def _held(
+    run: ReducedRun,
+    sector: Reduced,
+    patches: list[Patch],
+    case: LoadCase,
+    flow: Flow,
+    wave: int,
+) -> HeldFlutter:
+    """The limit cycle of a wave under one load, by its nonlinear mode in one harmonic."""
+    n, _ = folded_diameter(1, wave % len(flow.influence), len(flow.influence))
+    mode = family_numbers({d: port_shapes(b) for d, b in sector.sector.items()}, flow)[n]
+    model = _wave_model(run, sector, patches, case, flow, wave, mode)
+    samples = max(run.settings.samples, 32)
+    (stuck,) = nonlinear_mode(model, [STICKING_AMPLITUDE], mode, 1, samples)
+    slips = _slip_amplitude(model, stuck)
+    amplitudes = slips * np.geomspace(LOWEST_RATIO, HIGHEST_RATIO, AMPLITUDES)
+    blades = model.blades(1)
+    damping = float(blades.viscous[-1][mode] / (2 * blades.omega[-1][mode]))
+    points = _closed_in(model, amplitudes, mode, samples, damping)
+    try:
+        cycles = limit_cycles(points, damping)
+    except InputError as error:
+        raise InputError(
+            f"aerodynamics: waves of {wave} nodal diameters under {case.load:g} N: {error}"
+        ) from None
+    seen = [float(abs(p.probe[1, 0])) / p.amplitude for p in points if p.converged]
+    known = [p.amplitude for p in points if p.converged]
+
+    def at_probe(amplitude: float) -> float:
+        return amplitude * float(np.interp(amplitude, known, seen))
+
+    stable = next((c for c in cycles if c.stable), None)
+    if stable is None:
+        raise InputError(
+            f"aerodynamics: waves of {wave} nodal diameters under {case.load:g} N: flutter, no "
+            "limit cycle between sticking and free dampers, expected less negative damping"
+        )
+    beyond = [c.amplitude for c in cycles if not c.stable and c.amplitude > stable.amplitude]
+    return HeldFlutter(
+        case.load,
+        case.mass,
+        at_probe(stable.amplitude),
+        stable.omega / (2 * pi),
+        at_probe(min(beyond)) if beyond else float("nan"),
+        max(p.zeta for p in points if p.converged),
+    )
+
+
+def _closed_in(
+    model: ReducedModel,
+    amplitudes: np.ndarray,
+    mode: int,
+    samples: int,
+    damping: float,
+) -> list[NonlinearMode]:
+    """The nonlinear mode at some amplitudes, and closer where its damping balances the rest."""
+    points = list(nonlinear_mode(model, [float(a) for a in amplitudes], mode, 1, samples))
+    known = [p for p in points if p.converged]
+    net = np.array([p.zeta for p in known]) + damping
+    for i in np.flatnonzero(np.sign(net[1:]) != np.sign(net[:-1])):
+        between = np.geomspace(known[i].amplitude, known[i + 1].amplitude, CLOSER_AMPLITUDES + 2)
+        closer = [float(a) for a in between[1:-1]]
+        points += nonlinear_mode(model, closer, mode, 1, samples)
+    return sorted(points, key=lambda p: p.amplitude)
+
+
+def _slip_amplitude(model: ReducedModel, stuck: NonlinearMode) -> float:
+    """Modal amplitude at which the friction forces of sticking contacts add up to their limits."""
+    e = model.elements
+    tangents = stuck.w[:, -e.tangents :, 1:]
+    motion = np.linalg.norm(tangents.reshape(len(e.kt), -1), axis=1) / stuck.amplitude
+    limit = float((e.mu * np.maximum(e.n0, 0.0)).sum())
+    return limit / float((e.kt * motion)[e.n0 > 0].sum())
+
+
+def _wave_model(
+    run: ReducedRun,
+    sector: Reduced,
+    patches: list[Patch],
+    case: LoadCase,
+    flow: Flow,
+    wave: int,
+    number: int,
+) -> ReducedModel:
+    """Blade and damper in one wave, with the flow on it: the mean and one harmonic."""
+    settings: Settings = run.settings
+    count = len(flow.influence)
+    n, mirrored = folded_diameter(1, wave % count, count)
+    bodies = [truncate_modes(sector.sector[d], settings.modes) for d in (0, n)]
+    if mirrored:
+        body = bodies[1]
+        bodies[1] = replace(body, shapes=body.shapes.conj(), residual=body.residual.conj())
+    sides = [
+        pair_model(body, sector.following, phase)
+        for body, phase in zip(bodies, (0.0, 2 * pi * wave / count), strict=True)
+    ]
+    sides[1] = with_flow(sides[1], flow.stiffness(sides[1].omega, wave, number))
+    reduced = with_damper_mass(sector, case.mass)
+    model = joint_model(
+        run.scene, run.mesh, reduced, patches, case, 1, settings.damper, tuple(sides)
+    )
+    nodes = len(case.elements.kt)
+    points = settings.points
+    groups = np.arange(nodes) if points is None else element_labels(patches, points)
+    return coarsened_elements(model, groups)
+
+
+def flutter_sentences(found: FlutterResult) -> list[str]:
+    """What the flow does, in words."""
+    d = int(np.argmin(found.net))
+    way = "backward" if found.worst < 0 else "forward"
+    share = (
+        f"least damped wave: {abs(found.worst)} nodal diameters, {way}, "
+        f"{100 * found.net[d]:.3g} % of critical ({100 * found.flow[d]:+.3g} % by the flow)"
+    )
+    if not found.held:
+        onset = "" if np.isinf(found.onset) else f"; {found.onset:.3g} times this flow flutters"
+        return [f"flow: no wave flutters; {share}{onset}"]
+    fed = int((found.net < 0).sum())
+    sentences = [
+        f"flow: {fed} waves flutter without dampers, from {found.onset:.3g} times this flow on; "
+        f"{share}"
+    ]
+    for one in found.held:
+        beyond = "" if np.isnan(one.largest) else f", and grows from {1e6 * one.largest:.4g} um on"
+        sentences.append(
+            f"flutter under {one.load:g} N: friction holds it in a limit cycle of "
+            f"{1e6 * one.amplitude:.4g} um at {one.frequency:.5g} Hz{beyond} (one harmonic; forced "
+            "responses leave it out)"
+        )
+    return sentences

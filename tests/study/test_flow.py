@@ -1,0 +1,148 @@
+"""A scene's flow: the same in the tuned sector, in the whole wheel and in the finite elements; the
+limit cycle of fed waves against the balance; bad input.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from mistuned import COARSE_MISTUNED, MISTUNED
+
+from bladefem.errors import InputError
+from bladefem.hbm.solve import solve
+from bladefem.report.flow import flow_drawing, flow_headlines, flow_tables
+from bladefem.scene.aerodynamics import refuse_flow, wave_influence
+from bladefem.scene.toml import load_scene, vary
+from bladefem.study.adaptive.family import family_member
+from bladefem.study.mistuning.blade_stress import WheelShapes, all_modes, blade_motion
+from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
+from bladefem.study.pipeline import flutter as subject
+from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.case_models import family_of_case, load_cases
+from bladefem.study.pipeline.damped_motion import damped_motion
+from bladefem.study.pipeline.flow import scene_flow
+from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
+from bladefem.study.pipeline.stages import Bodies
+from bladefem.wheel.model import frequency_pattern
+from bladefem.wheel.solve import solve_wheel
+
+# waves of ten nodal diameters backwards are fed, those of the engine order are damped
+INFLUENCE = ("0: 0.05 %; 90 deg", "1: 0.15 %; 20 deg", "-1: 0.12 %; 200 deg")
+COUNT = 36
+
+
+@pytest.fixture(scope="module")
+def reduced():
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    run = pipeline.run(scene, None, until="reduction")
+    scene = vary(scene, aerodynamics__influence=list(INFLUENCE))
+    return replace(run, scene=scene)
+
+
+def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced):
+    """Damped waves of the engine order; every blade of the wheel moves as the sector."""
+    scene = reduced.scene
+    patches = list(reduced.contact.problem.patches)
+    bodies = Bodies(scene, reduced.mesh)
+    (case,) = load_cases(scene, reduced.mesh, reduced.contact)
+    settings = reduced.settings
+    family = family_of_case(scene, reduced.mesh, reduced.reduced, patches, case)
+    model = family_member(family, settings).model
+    omega = 1.02 * model.side(1).omega[0]
+    one = solve(model, omega, 1, 72)
+    sector = reduce_wheel(bodies, patches, settings.modes, reduced.clamped, 3)
+    wheel = whole_wheel(scene, reduced.mesh, sector, patches, case, settings)
+    found = solve_wheel(wheel, omega, 1, 72)
+    assert one.converged and found.converged
+    turn = np.exp(2j * np.pi * 9 / COUNT * np.arange(COUNT))
+    scale = abs(one.probe).max()
+    np.testing.assert_allclose(found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-7 * scale)
+    motion = damped_motion(bodies, patches, reduced.modes, case, one, settings.points)
+    assert motion.mismatch < 2e-3
+    # the flow is felt, and without it the finite elements would move otherwise
+    still = Bodies(vary(scene, aerodynamics__influence=None), reduced.mesh)
+    other = damped_motion(still, patches, reduced.modes, case, one, settings.points)
+    assert other.mismatch > 5 * motion.mismatch
+    pattern = frequency_pattern(sector.families, np.zeros((COUNT, 3)))
+    _, readings = blade_readings(bodies, reduced.clamped, 3)
+    shapes = WheelShapes(bodies, patches, all_modes(bodies), readings)
+    blade = blade_motion(shapes, wheel, pattern, case, found, 5, settings.points)
+    assert blade.mismatch < 2e-3
+
+
+def test_limit_cycle_is_where_the_balance_ends_without_force(reduced):
+    """The resonance of fed waves under less and less force tends to the limit cycle."""
+    patches = list(reduced.contact.problem.patches)
+    keep = StageRunner(None, None, StageClock({}, []))
+    found = subject.find_flutter(reduced, Bodies(reduced.scene, reduced.mesh), patches, keep)
+    waves = wave_influence(reduced.scene, COUNT)
+    np.testing.assert_allclose(found.net, 1e-3 + waves.imag)
+    (held,) = found.held
+    assert found.net.min() < 0 < found.net[9]
+    assert 0 < held.amplitude < held.largest
+    flow = scene_flow(reduced.scene, COUNT)
+    n = abs(found.worst)
+    sector = subject.reduce_sector(
+        Bodies(reduced.scene, reduced.mesh), patches, sorted({0, n, 9}), reduced.settings.modes
+    )
+    (case,) = load_cases(reduced.scene, reduced.mesh, reduced.contact)
+    model = subject._wave_model(reduced, sector, patches, case, flow, found.worst, 0)
+    last = None
+    for force in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
+        driven = replace(model, excitation={1: np.array([force])})
+        last = solve(driven, 2 * np.pi * held.frequency, 1, 128, start=last)
+        assert last.converged
+    assert abs(last.probe[1, 0]) == pytest.approx(held.amplitude, rel=0.02)
+    said = subject.flutter_sentences(found)
+    assert "waves flutter without dampers" in said[0] and "limit cycle" in said[1]
+    shown = replace(reduced, flutter=found)
+    tables = flow_tables(shown)
+    assert len(tables["response/flow"]) == COUNT
+    assert tables["response/flutter"]["limit_cycle"][0] == held.amplitude
+    assert len(flow_headlines(shown)) == len(flow_drawing(shown)) == 1
+
+
+def test_flutter_that_no_friction_holds_is_one_sentence(reduced):
+    patches = list(reduced.contact.problem.patches)
+    keep = StageRunner(None, None, StageClock({}, []))
+    strong = vary(reduced.scene, aerodynamics__influence=None)
+    strong = vary(strong, aerodynamics__waves=["9: 1 %", "-10: -9 %"])
+    with pytest.raises(InputError, match=r"waves of -10 nodal diameters under 80 N: .*flutter"):
+        subject.find_flutter(
+            replace(reduced, scene=strong), Bodies(strong, reduced.mesh), patches, keep
+        )
+
+
+def test_waves_and_coefficients():
+    scene = load_scene(MISTUNED)
+    scene = vary(scene, aerodynamics__waves=["0: 0.4 %; 0.1 %", "18: -0.2 %"])
+    waves = wave_influence(scene, COUNT)
+    assert waves[0] == pytest.approx(0.001 + 0.004j) and waves[18] == pytest.approx(-0.002j)
+    # linear round the wheel, the same both ways
+    assert waves[9] == pytest.approx(0.0005 + 0.001j) and waves[27] == pytest.approx(waves[9])
+    scene = vary(scene, aerodynamics__waves=None)
+    scene = vary(scene, aerodynamics__influence=["1: 1 %; 90 deg"])
+    waves = wave_influence(scene, COUNT)
+    # a neighbour's motion damps waves that lead it by nothing, and feeds those in antiphase
+    assert waves[0].imag == pytest.approx(0.01) and waves[18].imag == pytest.approx(-0.01)
+    assert waves[9].real == pytest.approx(-0.01)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (["aerodynamics.waves=9: -0.3 %"], "excitation.engine_order = 9 have -0.2 %"),
+        (["aerodynamics.waves=30.5: 1 %"], "expected a whole number and two values"),
+        (["aerodynamics.waves=40: 1 %"], "expected a nodal diameter from -18 to 36"),
+        (["aerodynamics.waves=5: 1 furlong"], "aerodynamics.waves '5: 1 furlong'"),
+        (["aerodynamics.influence=19: 1 %; 0 deg"], "a distance of half the wheel at most"),
+        (
+            ["aerodynamics.influence=1: 1 %", "aerodynamics.waves=1: 1 %"],
+            "either the waves or the influence",
+        ),
+        (["aerodynamics.waves=9: 1 %", "model.reduction=craig-bampton"], 'expected "rubin"'),
+    ],
+)
+def test_bad_flow_is_refused_before_long_work(overrides, message):
+    with pytest.raises(InputError, match=message):
+        refuse_flow(load_scene(MISTUNED, overrides))
