@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
+from ..errors import InputError
 from .body import rigid_modes
 from .constraint import Constrained, expand_to_mesh, unknowns
 from .linalg import (
@@ -28,6 +29,12 @@ from .linalg import (
 
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
 UNHELD_FREQUENCY_RATIO = 1e-12
+# the same: squared frequency of a rigid motion that is more than rounding and second-order terms
+HELD_FREQUENCY_RATIO = 1e-10
+# of the mean diagonal of K times a motion: a force on it that is rounding
+RIGID_FORCE = 1e-10
+# corrections of rigid motions, each of which leaves a hundredth of the error
+RIGID_PASSES = 3
 
 
 @dataclass(frozen=True)
@@ -43,22 +50,61 @@ class Flexibility:
     MR: np.ndarray
 
 
-def flexible(con: Constrained, prop: float = 1.0) -> Flexibility:
+def flexible(con: Constrained, prop: float = 1.0, settled: bool = True) -> Flexibility:
     """Factorise K for modes, reduction and contact alike.
 
     Args:
         prop: stiffness of the props over the mean diagonal of K; floating bodies only, without
             influence.
+        settled: K is that of a state in balance; False on the way to one, where unbalanced forces
+            act on rigid motions too.
+
+    A rotation that a loaded body can follow turns its deformation too: there the motion without
+    force is the rigid one and what that deformation adds, a static answer.
 
     Raises:
+        InputError: a loaded body can move rigidly, and the load resists or drives that.
         NotSolvedError: from MUMPS.
     """
     R = rigid_basis(con)
     if not R.shape[1]:
         return Flexibility(con, factorise(con.K), R, R)
-    return Flexibility(
-        con, factorise(con.K, springs=_place_springs(con, R, prop)), R, apply_block(con.M, R)
-    )
+    factor = factorise(con.K, springs=_place_springs(con, R, prop))
+    flex = Flexibility(con, factor, R, apply_block(con.M, R))
+    if not settled:
+        return flex
+    for _ in range(RIGID_PASSES):
+        force = apply_block(con.K, flex.R)
+        limit = RIGID_FORCE * mean_diagonal(con.K)
+        if _size(con, force) <= limit * _size(con, flex.R):
+            return flex
+        R = _orthonormal(con, flex.R - compliance(flex, force))
+        flex = Flexibility(con, factor, R, apply_block(con.M, R))
+    _check_settled(flex)
+    return flex
+
+
+def _check_settled(flex: Flexibility) -> None:
+    """Refuse a load that resists or drives a rigid motion."""
+    con = flex.con
+    pull = inner_products(con.body.comm, flex.R, apply_block(con.K, flex.R))
+    if abs(pull).max() > HELD_FREQUENCY_RATIO * mean_diagonal(con.K) / mean_diagonal(con.M):
+        raise InputError(
+            "support: it leaves the body free to turn or slide while rotation or heat loads it "
+            "there, so that it has no steady place, expected supports that hold it, or "
+            "operation.stiffening = false"
+        )
+
+
+def _size(con: Constrained, X: np.ndarray) -> float:
+    """Largest length of the columns (n_own, r) over all ranks."""
+    return float(np.sqrt(abs(inner_products(con.body.comm, X, X)).max()))
+
+
+def _orthonormal(con: Constrained, basis: np.ndarray) -> np.ndarray:
+    """The motions (n_own, r) with mass 1 and none in common."""
+    gram = inner_products(con.body.comm, basis, apply_block(con.M, basis))
+    return np.asarray(basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T)
 
 
 def compliance(flex: Flexibility, B: np.ndarray) -> np.ndarray:
@@ -111,8 +157,7 @@ def rigid_basis(con: Constrained) -> np.ndarray:
     basis = (q @ null)[con.own]
     if not basis.shape[1]:
         return basis
-    gram = inner_products(body.comm, basis, apply_block(con.M, basis))
-    basis = basis @ np.linalg.inv(np.linalg.cholesky(gram)).conj().T
+    basis = _orthonormal(con, basis)
     return basis if body.spring is None else _unsprung_motions(con, body.spring, basis)
 
 

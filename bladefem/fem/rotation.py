@@ -370,7 +370,7 @@ def _solve_newton(
     def advance(state: _Trial) -> _Trial:
         held = in_step(replace(con.body, K=_tangent_matrix(forms, state.u, speed2)), clamp)
         try:
-            step = compliance(flexible(held), -state.unbalanced)
+            step = compliance(flexible(held, settled=False), -state.unbalanced)
         except NotSolvedError as failure:
             raise StepError(
                 Outcome.SINGULAR,

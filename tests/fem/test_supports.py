@@ -6,16 +6,25 @@ import numpy as np
 import pytest
 from structured import box, sector
 
+from bladefem.data import ModeSet
 from bladefem.errors import InputError
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, transformation
+from bladefem.fem.flexibility import flexible
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import body_under_rotation, preload
+from bladefem.fem.rotation import (
+    body_under_rotation,
+    linear_tangent,
+    preload,
+    thermal_displacement,
+)
 from bladefem.fem.supports import AreaSpring, supported
+from bladefem.fem.temperature import Temperatures
 from bladefem.scene.support import area_springs, held_letters
 from bladefem.scene.tables import Material, Support
 from bladefem.scene.toml import scene_of
+from bladefem.study.modes.survey import rigid_mode_remarks
 
 SIZE = (0.04, 0.02, 0.03)
 STEEL = Material()
@@ -143,6 +152,45 @@ def test_directions_at_the_nodes_turn_with_the_body(letters):
             for some in (mesh, turned)
         ]
         np.testing.assert_allclose(*found, rtol=1e-8, atol=1e-3)
+
+
+def test_a_wheel_that_may_turn_under_its_bore_is_refused_under_rotation():
+    """Held radially, it is pulled along the tangents that its nodes move on; at rest it turns
+    freely, one mode of frequency 0 in nodal diameter 0.
+    """
+    body = supported(assemble(sector(12, (2, 2, 1)), "blade", Material()), "", [], [("x0", "ra")])
+    still = modes(constrain(body, None, 0), 3).frequencies
+    assert (still == 0).tolist() == [True, False, False]
+    turning = body_under_rotation(body, 800.0, None, linear=True)
+    with pytest.raises(InputError, match=r"free to turn or slide.*operation.stiffening = false"):
+        modes(constrain(turning, None, 0), 3)
+    held = supported(assemble(sector(12, (2, 2, 1)), "blade", Material()), "", [], [("x0", "rta")])
+    assert modes(constrain(body_under_rotation(held, 800.0, None, linear=True), None, 0), 3)
+
+
+def test_a_free_bar_with_thermal_stress_keeps_its_rigid_motions():
+    """Uneven heat loads it in itself: turned, its deformation turns along, which no linear rigid
+    motion does; the residuals of all modes stay small.
+    """
+    mesh = box((6, 2, 1), (0.1, 0.03, 0.02), "tetra10")
+    place = mesh.points / [0.1, 0.03, 0.02]
+    heat = Temperatures(300.0 + 200.0 * place[:, 1] ** 2 + 100.0 * place[:, 0] ** 2, 300.0)
+    body = assemble(mesh, "blade", Material(expansion=1.2e-5), heat=heat)
+    body = replace(body, hold="")
+    moved = thermal_displacement(flexible(constrain(body, None)))
+    found = modes(constrain(replace(body, K=linear_tangent(body, moved, 0.0)), None), 8)
+    assert np.count_nonzero(found.frequencies == 0) == 6
+    assert found.residuals.max() < 1e-5
+
+
+def test_rigid_modes_are_counted_in_words():
+    sets = [
+        ModeSet(np.array([0.0, 0.0, 5.0]), np.zeros((3, 1, 3)), 0, np.zeros(3)),
+        ModeSet(np.array([4.0, 5.0]), np.zeros((2, 1, 3)), 1, np.zeros(2)),
+    ]
+    (said,) = rigid_mode_remarks(sets)
+    assert "2 in nodal diameter 0;" in said
+    assert rigid_mode_remarks(sets[1:]) == []
 
 
 def test_directions_that_are_not_there_are_refused():

@@ -30,7 +30,6 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
-from ...scene.validate import refuse_given_mesh
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..pipeline.stages import Bodies, blade_dofs, build_mesh, find_modes
@@ -95,7 +94,10 @@ def mesh_convergence(
     """
     if not kind_named(scene.kind).meshed_here(scene):
         if len(sizes):
-            refuse_given_mesh(scene)
+            raise InputError(
+                f"converge = {', '.join(f'{size:g}' for size in sizes)} m: kind '{scene.kind}' has "
+                "a mesh of its own, expected --converge without sizes, which halves its elements"
+            )
         return _halved_mesh_convergence(scene, diameters, count, comm, progress)
     if len(sizes) < 3 or not all(a > b > 0 for a, b in pairwise(sizes)):
         raise InputError(

@@ -100,6 +100,7 @@ def survey_modes(
         folder, "survey", key, lambda: _all_modes(bodies, wanted.direct), comm
     )
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
+    messages += rigid_mode_remarks(sets)
     run = ModalRun(**{**vars(start), "messages": messages}, modes=sets)
     clock = _stage_seconds(run, "modes", clock)
     result = Survey(
@@ -127,6 +128,18 @@ def survey_modes(
         )
         clock = _stage_seconds(run, "forced response", clock)
     return result if other is None else _compare_modes(result, *other)
+
+
+def rigid_mode_remarks(sets: Sequence[ModeSet]) -> list[str]:
+    """How many modes of frequency zero there are; nothing where the body is held."""
+    found = {s.nodal_diameter: int(np.count_nonzero(s.frequencies == 0)) for s in sets}
+    rigid = {n: count for n, count in found.items() if count}
+    if not rigid:
+        return []
+    where = ", ".join(
+        f"{count}" if n is None else f"{count} in nodal diameter {n}" for n, count in rigid.items()
+    )
+    return [f"rigid modes, of frequency 0: {where}; the supports leave the body free in them"]
 
 
 def excited_set(run: ModalRun) -> ModeSet:
