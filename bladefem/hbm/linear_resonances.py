@@ -55,7 +55,7 @@ def stuck_resonances(model: ReducedModel, h: int = 1) -> np.ndarray:
     """(m,) circular frequencies omega at which harmonic h meets a mode with all contacts sticking
     [rad/s].
     """
-    return _stuck_modes(model, h)[0]
+    return _known_stuck_modes(model, h)[0].copy()
 
 
 def stuck_partners(model: ReducedModel) -> np.ndarray:
@@ -65,9 +65,14 @@ def stuck_partners(model: ReducedModel) -> np.ndarray:
     It need not be the one of the same number: on soft contacts a damper has modes of its own below
     the blade's.
     """
-    omega, shapes = _stuck_modes(model, 1)
+    omega, shapes = _known_stuck_modes(model, 1)
     blade = model.side(1).omega
     return omega[np.argmax(np.abs(shapes[: len(blade)][blade > 0]), axis=1)]
+
+
+def _known_stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
+    """``_stuck_modes``, which each sweep, its band and the search of a peak ask for, made once."""
+    return model.once(("stuck modes", h), lambda: _stuck_modes(model, h))
 
 
 def _stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:

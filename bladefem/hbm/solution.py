@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,7 +94,7 @@ def size(solution: Solution, probe: int = 0) -> float:
     measured by [m].
     """
     moving = solution.probe[1:, probe]
-    return float(np.sqrt(np.vdot(moving, moving).real))
+    return math.sqrt(np.vdot(moving, moving).real)
 
 
 def probe_motion(

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from bladefem.hbm import linear_resonances
 from bladefem.hbm.linear_resonances import free_resonances, stuck_partners, stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.study.adaptive.choice import default_band
@@ -32,3 +33,21 @@ def test_stuck_mode_of_a_blade_is_not_the_dampers_own(kt, mass, number, frequenc
     low, high = default_band(model, 2)
     assert low < min(free, partner) < max(free, partner) < high
     assert high - low < 1.5 * abs(free - partner)
+
+
+def test_stuck_modes_are_computed_once_a_model(monkeypatch):
+    """Sweeps, their bands and peaks ask for them again and again."""
+    calls = []
+    compute = linear_resonances._stuck_modes
+
+    def counted(model, h):
+        calls.append(h)
+        return compute(model, h)
+
+    monkeypatch.setattr(linear_resonances, "_stuck_modes", counted)
+    model = reference_model(points=2)
+    first = linear_resonances.stuck_resonances(model)
+    linear_resonances.stuck_resonances(model)[:] = 0.0
+    linear_resonances.stuck_partners(model)
+    assert calls == [1]
+    assert np.array_equal(linear_resonances.stuck_resonances(model), first)

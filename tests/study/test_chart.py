@@ -16,7 +16,7 @@ from bladefem.hbm.solve import solve
 from bladefem.report.chart import write_chart
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
-from bladefem.study.adaptive.settings import Settings, first_for
+from bladefem.study.adaptive.settings import Settings, first_for, first_settings, scene_line
 from bladefem.study.chart.chart import method_chart
 from bladefem.study.chart.cpu_clock import running_clock
 from bladefem.study.chart.meshes import mesh_table, mesh_variants
@@ -183,6 +183,17 @@ def test_exact_events_and_shooting_agree_with_the_balance():
     balance = solve(model, omega, 15, 4096).probe[1, 0]
     assert exact_balance(15)(model, omega, None).first == pytest.approx(balance, rel=1e-5)
     assert exact_shooting(model, omega, None).first == pytest.approx(balance, rel=1e-4)
+
+
+def test_the_line_to_take_makes_a_scene_run_with_these_settings(tmp_path):
+    taken = Settings(12, 7, 256, "elastic")
+    file = tmp_path / "taken.toml"
+    file.write_text(f"{scene_line(taken)}\n{PLANE.read_text()}")
+    read = first_settings(load_scene(file))
+    same = ("modes", "harmonics", "samples", "damper")
+    assert all(getattr(read, name) == getattr(taken, name) for name in same)
+    assert read.chosen == ("points",)
+    assert "points = 4 under [contact]" in scene_line(Settings(12, 7, 256, "elastic", 4))
 
 
 def test_methods_in_time_refuse_what_they_cannot_do():

@@ -89,6 +89,21 @@ class Settings:
         )
 
 
+def scene_line(settings: Settings) -> str:
+    """What makes a scene run with these settings: a line of TOML for its beginning.
+
+    >>> print(scene_line(Settings(10, 3, 64, "rigid", 4)))
+    model = {modes = 10, harmonics = 3, samples = 64, damper = "rigid"}, points = 4 under [contact]
+    """
+    model = (
+        f"model = {{modes = {settings.modes}, harmonics = {settings.harmonics}, "
+        f'samples = {settings.samples}, damper = "{settings.damper}"}}'
+    )
+    return (
+        model if settings.points is None else f"{model}, points = {settings.points} under [contact]"
+    )
+
+
 def first_for(modes: int, dampers: bool = False) -> Settings:
     """Where the choice starts for a model without a scene: everything open.
 

@@ -14,7 +14,7 @@ from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_of
-from ..adaptive.settings import first_for, restarted_settings
+from ..adaptive.settings import first_for, restarted_settings, scene_line
 from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
 from ..pipeline.pipeline import run
 from ..pipeline.stages import Bodies, Reduced
@@ -75,6 +75,7 @@ def scene_chart(
         ),
     )
     made.remarks.insert(0, f"normal load {case.load:g} N on each seat")
+    made.remarks.append(f"take this, at the beginning of the scene: {scene_line(made.settings)}")
     if sizes is None:
         return made
     return replace(
