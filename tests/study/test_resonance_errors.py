@@ -170,3 +170,20 @@ def test_a_curve_starts_with_the_harmonics_that_are_excited():
     start = replace(first_for(1), points=None, chosen=("harmonics", "samples"))
     found = resonance_curve(family, start, (0.9 / (2 * np.pi), 1.6 / (2 * np.pi)), 1, 0.05)
     assert found.settings.harmonics >= 5
+
+
+def test_a_poor_model_has_the_errors_that_a_richer_one_still_shows(monkeypatch):
+    """One harmonic sees little of what more contact points change: 36 N on the shipped wedge."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+
+    def found(family, old, point, new, accuracy, fallbacks=True):
+        more = 0.25 if new.harmonics == 1 else 0.55
+        return peak_with(4, (1.0 + 0.15 * (new.harmonics > 1)) * (1 + more * (new.points != 4)))
+
+    monkeypatch.setattr(resonance_choice, "peak_from", found)
+    start = replace(first_for(family.modes), points=4, harmonics=1)
+    settings, peak, errors = resonance_choice.choose_at_peak(
+        family, start, peak_with(4, 1.0), 0.05, ("points",)
+    )
+    assert settings.harmonics > 1 and peak.height == pytest.approx(1.15)
+    assert settings.error == errors.total == pytest.approx(0.55 / 1.55)

@@ -18,7 +18,8 @@ from bladefem.study.pipeline import stability
 from bladefem.study.pipeline.kept_band import KeptBand, kept_band
 from bladefem.study.pipeline.response_remarks import search_sentence
 from bladefem.study.pipeline.stability import (
-    judged_blades,
+    Disturbances,
+    judged_disturbances,
     model_in_time,
     stability_of,
     stability_sentence,
@@ -48,10 +49,16 @@ def test_the_sentence_says_which_disturbances_a_wave_was_judged_against():
     settings = first_for(3)
     wave = Family(lambda s: Member(rich, np.arange(1)), 3, harmonics=8)
     alone = Family(lambda s: Member(bouncing(), np.arange(1)), 3, harmonics=8)
-    assert [judged_blades(family, settings) for family in (wave, alone)] == [4, 1]
+    blades = [judged_disturbances(family, settings).blades for family in (wave, alone)]
+    assert blades == [4, 1]
     verdicts = [(np.array([STABLE]), np.array([0.5]))]
-    said = stability_sentence(verdicts, 4)
+    said = stability_sentence(verdicts, Disturbances(4))
     assert "repeat after 4 blades" in said and "not those of other nodal diameters" in said
+    # engine order 9 of 36: harmonics 0 to 3 are diameters 0, 9, 18 and 9 again
+    wheel = judged_disturbances(wave, settings, 9, 36)
+    assert wheel.diameters == (0, 9, 18) and wheel.possible == 19
+    said = stability_sentence(verdicts, wheel)
+    assert "(nodal diameters 0, 9, 18), not those of the other 16 nodal diameters" in said
     assert "blades" not in stability_sentence(verdicts)
 
 

@@ -267,9 +267,10 @@ def choose_at_peak(
     A respect in which the richer model was not solved is not refined, one whose error was
     negligible not judged again, nor one that could not be judged where contacts lift off. There
     refining ends once it does not halve an error that is far beyond the accuracy, unless there are
-    few contact points. Harmonics that are missing come first there: with few of them more contact
-    points lead away from the truth (36 N on the shipped wedge: 440 um with 7 harmonics and 4
-    points, 452 with 31; 909 with 3 and 16 points).
+    few contact points; what is left of it then in the richer model the poorer one has as well.
+    Harmonics that are missing come first there: with few of them more contact points lead away from
+    the truth (36 N on the shipped wedge: 440 um with 7 harmonics and 4 points, 452 with 31; 909
+    with 3 and 16 points).
 
     Args:
         peak: found with `settings`.
@@ -290,7 +291,8 @@ def choose_at_peak(
         far = errors.total > FAR_BEYOND * accuracy and _lift_off(peak, errors)
         stalled = before is not None and errors.total > before[2].total / 2
         if far and before is not None and stalled and not _few_points(settings, errors, fixed):
-            return min(before, (settings, peak, errors), key=lambda found: found[2].total)
+            poorer = _seen_from(errors, before)
+            return min(poorer, (settings, peak, errors), key=lambda found: found[2].total)
         before = settings, peak, errors
         known = {
             name: (errors.height[name], errors.frequency[name])
@@ -332,6 +334,31 @@ def settings_of_lift_off(settings: Settings) -> Settings:
     richer = enriched_settings(settings, "harmonics") or settings
     few = richer.points is not None and richer.points < LIFTING_POINTS
     return replace(richer, points=LIFTING_POINTS) if few and "points" in richer.chosen else richer
+
+
+def _seen_from(
+    errors: PeakErrors,
+    before: tuple[Settings, Peak, PeakErrors],
+) -> tuple[Settings, Peak, PeakErrors]:
+    """A choice whose errors are at least those that a richer model still has, where they are known.
+
+    A poor model may be blind: with one harmonic 36 N on the shipped wedge give 376 um, and more
+    contact points change that by 21 %; with seven they give 440 um, where a march in time keeps,
+    and more points change that by 36 %.
+    """
+    settings, peak, own = before
+    height, frequency = (
+        {
+            name: max(change, richer[name]) if np.isfinite(richer[name]) else change
+            for name, change in poorer.items()
+        }
+        for poorer, richer in (
+            (own.height, errors.height),
+            (own.frequency, errors.frequency),
+        )
+    )
+    seen = replace(own, height=height, frequency=frequency)
+    return replace(settings, error=seen.total), peak, seen
 
 
 def _with_errors_before(

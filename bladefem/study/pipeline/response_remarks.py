@@ -15,6 +15,7 @@ from .load_interval import interval_sentence
 from .loads import Curve
 from .resonance_list import reach_sentence
 from .stability import (
+    Disturbances,
     folded_sentence,
     ripple_sentence,
     stability_sentence,
@@ -32,13 +33,13 @@ def response_remarks(
     settings: Settings,
     curves: list[Curve],
     nodes: int,
-    blades: int = 1,
+    judged: Disturbances,
 ) -> list[str]:
     """What a reader of the results has to know.
 
     Args:
         nodes: contact points of a seat.
-        blades: after which the wave repeats, and the disturbances that it was judged against.
+        judged: what verdicts looked at.
     """
     remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
     if scene.model.static == "uncoupled":
@@ -49,7 +50,7 @@ def response_remarks(
         )
     if scene.study.stability:
         verdicts = [(c.stability, c.multiplier) for c in curves]
-        remarks.append(method(stability_sentence(verdicts, blades)))
+        remarks.append(method(stability_sentence(verdicts, judged)))
     remarks.extend(map(method, filter(None, [ripple_sentence(curves, scene.accuracy)])))
     remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
     unstable = (unstable_sentence(c, scene.accuracy) for c in curves)

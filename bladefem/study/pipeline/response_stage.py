@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, sector_of
 
 from ...data import Patch
 from ...errors import NotSolvedError
@@ -28,10 +28,10 @@ from .loads import Curve, study_loads
 from .response_remarks import best_load_remarks, response_remarks, stress_message
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
-from .stability import judged_blades
+from .stability import Disturbances, judged_disturbances
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
-from .stages import Bodies, with_damper_mass
+from .stages import Bodies, is_wheel, with_damper_mass
 from .utilisation import utilisation_message
 
 
@@ -70,7 +70,8 @@ def run_response(
             "errors by the body's mesh are not estimated: the reduced model has other modes than "
             "those of the stage, or its elements are far too large"
         )
-    response = _load_responses(scene, cases, family, settings, keep, softer)
+    sectors = sector_of(mesh).count if is_wheel(mesh) else 0
+    response = _load_responses(scene, cases, family, settings, keep, softer, sectors)
     with clock("influences"):
         found = _influences(scene, mesh, before.contact, family, best, keep)
     curves = response.curves
@@ -132,7 +133,13 @@ def _load_responses(
     settings: Settings,
     keep: StageRunner,
     softer: SofterBody | None,
+    sectors: int,
 ) -> Response:
+    """Curves of all loads, and what is left without friction.
+
+    Args:
+        sectors: of the wheel; 0 without one.
+    """
     clock = keep.clock
     with clock("response"):
         curves = study_loads(
@@ -154,8 +161,11 @@ def _load_responses(
         rich = family_member(models, settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
     nodes = -(-len(cases[0].elements.kt) // 2)
-    blades = judged_blades(models, settings) if scene.study.stability else 1
-    clock.messages.extend(response_remarks(scene, settings, curves, nodes, blades))
+    judged = Disturbances()
+    if scene.study.stability:
+        order = scene.excitation.engine_order
+        judged = judged_disturbances(models, settings, order, sectors)
+    clock.messages.extend(response_remarks(scene, settings, curves, nodes, judged))
     return Response(settings, curves, limits)
 
 

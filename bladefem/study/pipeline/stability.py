@@ -193,22 +193,63 @@ def _without_residual(body: PortModel) -> PortModel:
     return replace(body, shapes=body.shapes.real, residual=0 * body.residual.real)
 
 
-def judged_blades(models: Family, settings: Settings) -> int:
-    """Blades after which disturbances that are judged repeat; 1 where all move in phase, or no wave
-    can be judged.
+@dataclass(frozen=True)
+class Disturbances:
+    """Those that the points of a travelling wave were judged against."""
+
+    # after which they repeat, as the wave does; 1 where all move in phase, or no wave can be judged
+    blades: int = 1
+    # nodal diameters that they are made of, and how many the wheel has; none without a wheel
+    diameters: tuple[int, ...] = ()
+    possible: int = 0
+
+    @property
+    def sentence(self) -> str:
+        """What was looked at, and what was not; "" where nothing is left."""
+        if self.blades == 1:
+            return ""
+        found = f"disturbances that repeat after {self.blades} blades, as the wave does, were"
+        if not self.diameters:
+            return f"{found} looked at, not those of other nodal diameters"
+        listed = ", ".join(map(str, self.diameters))
+        others = self.possible - len(self.diameters)
+        return (
+            f"{found} looked at (nodal diameters {listed}), not those of the other {others} nodal "
+            "diameters"
+        )
+
+
+def judged_disturbances(
+    models: Family,
+    settings: Settings,
+    engine_order: int = 0,
+    sectors: int = 0,
+) -> Disturbances:
+    """What the verdicts on a family of models look at.
+
+    Args:
+        sectors: of the wheel; 0 without one.
     """
     try:
-        return blades_of_wave(model_in_time(models, settings))
+        blades = blades_of_wave(model_in_time(models, settings))
     except InputError:
-        return 1
+        return Disturbances()
+    if not sectors:
+        return Disturbances(blades)
+    turned = ((h * engine_order) % sectors for h in range(blades))
+    diameters = sorted({min(n, sectors - n) for n in turned})
+    return Disturbances(blades, tuple(diameters), sectors // 2 + 1)
 
 
-def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]], blades: int = 1) -> str:
+def stability_sentence(
+    parts: Sequence[tuple[np.ndarray, np.ndarray]],
+    judged: Disturbances = Disturbances(),
+) -> str:
     """What was found on all curves, for the report.
 
     Args:
         parts: verdicts and multipliers of each curve.
-        blades: after which the wave repeats, and the disturbances that it was judged against.
+        judged: what they looked at.
     """
     verdict, largest = (np.concatenate(column) for column in zip(*parts, strict=True))
     counts = {name: int((verdict == name).sum()) for name in (UNIQUE, STABLE, UNSTABLE, UNKNOWN)}
@@ -229,12 +270,7 @@ def stability_sentence(parts: Sequence[tuple[np.ndarray, np.ndarray]], blades: i
             " (of curves whose verdicts would cost more than their points, the local maxima, the "
             "neighbours of the highest and points spread evenly are judged)"
         )
-    wave = ""
-    if blades > 1:
-        wave = (
-            f"; disturbances that repeat after {blades} blades, as the wave does, were looked at, "
-            "not those of other nodal diameters"
-        )
+    wave = f"; {judged.sentence}" if judged.sentence else ""
     return (
         f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
         f"{counts[UNKNOWN]} not judged{left_out}{wave}"
