@@ -28,7 +28,7 @@ from .compat import (
     vector_space,
 )
 from .elasticity import Law, elastic_law
-from .memory import check_memory
+from .memory import MemoryPlan, check_memory
 from .temperature import (
     Temperatures,
     cell_temperatures,
@@ -40,6 +40,7 @@ from .temperature import (
 
 # degrees of quadrature for properties that vary in an element
 EXTRA_DEGREE = 2
+IN_MEMORY = MemoryPlan(0.0)
 
 
 @dataclass(frozen=True)
@@ -72,6 +73,8 @@ class Body:
     directions: tuple[tuple[str, str], ...] = ()
     # None: properties are the constants of the materials
     heat: Temperatures | None = None
+    # where factors are kept
+    plan: MemoryPlan = IN_MEMORY
 
     @property
     def scalar_rows(self) -> np.ndarray:
@@ -112,7 +115,7 @@ def assemble(
     dim = mesh.dimension
     if heat is not None and plane == "strain":
         raise InputError("temperature: not known in plane strain, expected plane stress or a solid")
-    check_memory(dim * len(used), comm)
+    plan = check_memory(dim * len(used), comm)
     domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
     space = vector_space(domain, CELLS[mesh.cell_type][1])
     own = {n: materials[n] for n in names}
@@ -136,6 +139,7 @@ def assemble(
         plane,
         comm,
         heat=heat,
+        plan=plan,
     )
 
 

@@ -116,6 +116,7 @@ def eliminate_interior(
     order: np.ndarray | None = None,
     keep: bool = True,
     shared: SharedBoundary | None = None,
+    on_disk: bool = False,
 ) -> Core:
     """Eliminate the interior (collective where it is shared).
 
@@ -123,6 +124,7 @@ def eliminate_interior(
         order: see ``ordering.interior_first``.
         keep: keep the factors, for solves; else for :func:`count_negative` alone.
         shared: of the ranks' parts, where A is this rank's share.
+        on_disk: see :func:`mumps.factorise_matrix`.
 
     Raises:
         NotSolvedError: from MUMPS, on any rank.
@@ -130,7 +132,7 @@ def eliminate_interior(
     A.sort_indices()
     matrix = shared_matrix(A.shape, A.indptr, A.indices, A.data)
     factor = _factorise_together(
-        lambda: factorise_matrix(matrix, definite, rim, order, keep), shared
+        lambda: factorise_matrix(matrix, definite, rim, order, keep, on_disk), shared
     )
     matrix.destroy()
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
@@ -164,12 +166,20 @@ class Elimination:
     rim: np.ndarray
     order: np.ndarray | None
     shared: SharedBoundary | None
+    # where the factors are kept
+    on_disk: bool = False
     done: Core | None = None
 
     def core(self) -> Core:
         """The eliminated interior (collective where it is shared)."""
         if self.done is None:
-            self.done = eliminate_interior(self.A, self.rim, order=self.order, shared=self.shared)
+            self.done = eliminate_interior(
+                self.A,
+                self.rim,
+                order=self.order,
+                shared=self.shared,
+                on_disk=self.on_disk,
+            )
         return self.done
 
     def release(self) -> None:

@@ -67,9 +67,11 @@ def flexible(con: Constrained, prop: float = 1.0, settled: bool = True) -> Flexi
         NotSolvedError: from MUMPS.
     """
     R = rigid_basis(con)
+    on_disk = con.body.plan.on_disk
     if not R.shape[1]:
-        return Flexibility(con, factorise(con.K), R, R)
-    factor = factorise(con.K, springs=_place_springs(con, R, prop))
+        return Flexibility(con, factorise(con.K, on_disk=on_disk), R, R)
+    springs = _place_springs(con, R, prop)
+    factor = factorise(con.K, springs=springs, on_disk=on_disk)
     flex = Flexibility(con, factor, R, apply_block(con.M, R))
     if not settled:
         return flex

@@ -94,12 +94,14 @@ def factorise(
     A: Matrix,
     definite: bool = True,
     springs: np.ndarray | None = None,
+    on_disk: bool = False,
 ) -> Factor:
     """Factorise a symmetric or Hermitian matrix.
 
     Args:
         definite: Cholesky; else L D L^T with the count of negative eigenvalues.
         springs: (n_own,) added to the diagonal first; of a folded matrix on the cut face only.
+        on_disk: keep the factors on disk; those of a folded matrix are where its core wants them.
 
     Raises:
         NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds
@@ -122,7 +124,7 @@ def factorise(
         diagonal.array = np.repeat(springs, 2) if doubled else springs
         matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
-    return Factor(factorise_matrix(matrix, definite), doubled)
+    return Factor(factorise_matrix(matrix, definite, on_disk=on_disk), doubled)
 
 
 def release(A: Matrix, factor: Factor) -> None:

@@ -17,6 +17,9 @@ those of blades.
 from __future__ import annotations
 
 import ctypes
+import os
+import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import InputError
@@ -27,15 +30,23 @@ BYTES_PER_RANK = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
 ONE_CORE = (3.29e3, 180.5)
 DOUBLED = (1.9e4, 160.0)
+ON_DISK = (3.29e3, 90.0)
+# on disk: bytes b dofs^(4/3)
+FACTOR_BYTES = 160.0
 
 
-def modal_solve_memory(dofs: int, ranks: int = 1) -> float:
+def modal_solve_memory(
+    dofs: int,
+    ranks: int = 1,
+    on_disk: bool = False,
+) -> float:
     """Peak memory of a modal solve [bytes], all ranks together.
 
     Args:
         dofs: degrees of freedom of the body, three a node.
+        on_disk: factors are not kept in memory.
     """
-    linear, factors = ONE_CORE if ranks == 1 else DOUBLED
+    linear, factors = ON_DISK if on_disk else ONE_CORE if ranks == 1 else DOUBLED
     return ranks * BYTES_PER_RANK + linear * dofs + factors * dofs ** (4 / 3)
 
 
@@ -65,12 +76,32 @@ def give_back() -> None:
         trim(0)
 
 
+@dataclass(frozen=True)
+class MemoryPlan:
+    """How a solve fits into memory, all ranks together."""
+
+    # peak [bytes]
+    memory: float
+    # factors that are kept on disk [bytes]; 0 where they are kept in memory
+    disk: float = 0.0
+
+    @property
+    def on_disk(self) -> bool:
+        """MUMPS works out of core: factors are written to disk and read again in every solve."""
+        return self.disk > 0
+
+
+def factor_folder() -> Path:
+    """Where MUMPS puts factors that are kept on disk: its own environment variable, or /tmp."""
+    return Path(os.environ.get("MUMPS_OOC_TMPDIR") or "/tmp")
+
+
 def check_memory(
     dofs: int,
     comm: MPI.Comm,
     free: float | None = None,
-) -> float:
-    """The memory that a solve will take [bytes], all ranks together.
+) -> MemoryPlan:
+    """How a solve fits into memory: all of it, or with the factors on disk (collective).
 
     Args:
         free: memory that may be used on this machine [bytes]; what is available when left out.
@@ -78,17 +109,42 @@ def check_memory(
     Raises:
         InputError: it does not fit; the message says what to change.
     """
-    total = modal_solve_memory(dofs, comm.size)
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
-    share = total * here.size / comm.size
+    part = here.size / comm.size
     here.Free()
     free = available_memory() if free is None else free
-    short = comm.allreduce(max(share - free, 0.0), MPI.MAX)
-    if short > 0:
-        fits = (free / share) ** (3 / 4) * dofs
+    least = comm.allreduce(free / part, MPI.MIN)
+    total = modal_solve_memory(dofs, comm.size)
+    if total <= least:
+        return MemoryPlan(total)
+    smaller = modal_solve_memory(dofs, comm.size, on_disk=True)
+    # for the factors of the count, too, which are made while the others are there
+    disk = FACTOR_BYTES * dofs ** (4 / 3)
+    folder = factor_folder()
+    room = shutil.disk_usage(folder).free / part if folder.is_dir() else 0.0
+    room = comm.allreduce(room, MPI.MIN)
+    if smaller <= least and disk <= room:
+        return MemoryPlan(smaller, disk)
+    share = smaller * part
+    if smaller <= least:
         raise InputError(
-            f"the model has {dofs} degrees of freedom and needs about {share / 1e9:.1f} GB here, "
-            f"{free / 1e9:.1f} GB are free; expected at most about {fits:.2g} degrees of freedom "
-            "(a larger mesh.size), or ranks on more machines"
+            f"the model has {dofs} degrees of freedom and needs about {disk * part / 1e9:.1f} GB "
+            f"on disk, {room * part / 1e9:.1f} GB are free in {folder}; expected another folder in "
+            "MUMPS_OOC_TMPDIR, a larger mesh.size, or more memory"
         )
-    return total
+    fits = (free / share) ** (3 / 4) * dofs
+    raise InputError(
+        f"the model has {dofs} degrees of freedom and needs about {share / 1e9:.1f} GB here with "
+        f"the factors on disk, {free / 1e9:.1f} GB are free; expected at most about {fits:.2g} "
+        "degrees of freedom (a larger mesh.size), or ranks on more machines"
+    )
+
+
+def storage_remark(plan: MemoryPlan) -> list[str]:
+    """One sentence where factors are on disk."""
+    if not plan.on_disk:
+        return []
+    return [
+        f"factors are kept on disk, about {plan.disk / 1e9:.1f} GB in {factor_folder()}: in memory "
+        "they would not fit"
+    ]

@@ -51,6 +51,7 @@ def factorise_matrix(
     schur: np.ndarray | None = None,
     order: np.ndarray | None = None,
     keep: bool = True,
+    on_disk: bool = False,
 ) -> Factorised:
     """Factorise a symmetric matrix.
 
@@ -60,6 +61,7 @@ def factorise_matrix(
         order: (n,) place of each row in the elimination (one rank only); MUMPS chooses when left
             out.
         keep: keep the factors; without them only the count and the Schur complement are left.
+        on_disk: keep them on disk, in the folder MUMPS_OOC_TMPDIR (/tmp where that is not set).
 
     Raises:
         NotSolvedError: the matrix is singular or not definite, or memory ran out; the message holds
@@ -70,6 +72,8 @@ def factorise_matrix(
     pc = _prepare_solver(A, PETSc.PC.Type.CHOLESKY)
     F = pc.getFactorMatrix()
     F.setMumpsIcntl(14, EXTRA_MEMORY_PERCENT)
+    if on_disk and keep:
+        F.setMumpsIcntl(22, 1)
     if not definite:
         # the last block is counted too
         F.setMumpsIcntl(13, 1)

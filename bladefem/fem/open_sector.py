@@ -146,7 +146,8 @@ def _opened(
     nodal = _of_one_direction(M, places, body.dim)
     # what building the matrices took is of no more use
     give_back()
-    return Opened(T, places, K, M, nodal, core.Elimination(K, rim, order, shared), boundary)
+    elimination = core.Elimination(K, rim, order, shared, body.plan.on_disk)
+    return Opened(T, places, K, M, nodal, elimination, boundary)
 
 
 def _open_matrices(

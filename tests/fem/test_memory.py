@@ -1,10 +1,24 @@
 """The estimate of memory and its refusal."""
 
+import numpy as np
 import pytest
+from structured import box, sector
 
 from bladefem.errors import InputError
+from bladefem.fem import memory
+from bladefem.fem.all_diameters import all_diameters
+from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
-from bladefem.fem.memory import available_memory, check_memory, modal_solve_memory
+from bladefem.fem.constraint import constrain
+from bladefem.fem.flexibility import flexible
+from bladefem.fem.memory import (
+    available_memory,
+    check_memory,
+    modal_solve_memory,
+    storage_remark,
+)
+from bladefem.fem.modes import modes
+from bladefem.scene.tables import Material
 
 
 @pytest.mark.parametrize(
@@ -31,4 +45,46 @@ def test_too_large_is_refused_with_advice():
 
 
 def test_small_fits():
-    assert 0 < check_memory(1000, MPI.COMM_SELF) < available_memory()
+    plan = check_memory(1000, MPI.COMM_SELF)
+    assert 0 < plan.memory < available_memory() and not plan.on_disk
+
+
+def between_the_ways(dofs):
+    """Free memory in which a solve fits with the factors on disk only."""
+    return (modal_solve_memory(dofs) + modal_solve_memory(dofs, on_disk=True)) / 2
+
+
+def test_short_memory_puts_factors_on_disk(monkeypatch, tmp_path):
+    """The same frequencies; the plan says so, and the files are gone afterwards."""
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
+    mesh = sector(8, (5, 3, 2), bump=0.2)
+    body = assemble(mesh, "blade", Material(), MPI.COMM_SELF)
+    expected = all_diameters(body, 6)
+    dofs = 3 * int((body.rows >= 0).sum())
+    monkeypatch.setattr(memory, "available_memory", lambda: between_the_ways(dofs))
+    small = assemble(mesh, "blade", Material(), MPI.COMM_SELF)
+    assert small.plan.on_disk and str(tmp_path) in storage_remark(small.plan)[0]
+    flex = flexible(constrain(small, "clamp", 1))
+    assert any(tmp_path.iterdir())
+    flex.con.K.core.release()
+    for a, b in zip(all_diameters(small, 6), expected, strict=True):
+        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-8)
+    assert not any(tmp_path.iterdir())
+
+
+def test_blades_without_cut_faces_too(monkeypatch, tmp_path):
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
+    mesh = box((6, 2, 2), (0.1, 0.02, 0.02))
+    expected = modes(constrain(assemble(mesh, "blade", Material(), MPI.COMM_SELF)), 5)
+    monkeypatch.setattr(memory, "available_memory", lambda: between_the_ways(3 * len(mesh.points)))
+    con = constrain(assemble(mesh, "blade", Material(), MPI.COMM_SELF))
+    flex = flexible(con)
+    assert any(tmp_path.iterdir())
+    found = modes(con, 5, flex)
+    np.testing.assert_allclose(found.frequencies, expected.frequencies, rtol=1e-8)
+
+
+def test_a_full_disk_is_named(monkeypatch, tmp_path):
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path / "missing"))
+    with pytest.raises(InputError, match=r"GB on disk, 0\.0 GB are free in .*missing"):
+        check_memory(100_000, MPI.COMM_SELF, free=between_the_ways(100_000))
