@@ -1,82 +1,159 @@
-"""Does it pay to use more ranks? Modes and reduction of a scene on the ranks that it is started on.
+"""Does it pay to use more ranks? Modes of all nodal diameters and the reduction on 1, 2 and 4.
 
-    ./run mpirun 1 benchmarks/ranks.py [--set mesh.size="6 mm"]
-    ./run mpirun 2 benchmarks/ranks.py
+    ./run python benchmarks/ranks.py                          (some 8 minutes on an idle machine)
+    ./run python benchmarks/ranks.py --write                  and put the table into docs/
+    ./run python benchmarks/ranks.py --set mesh.size="6 mm"   a smaller sector
 
-One row a step: wall-clock time, CPU time of the rank that worked longest, and in the end the
-largest memory of a rank. On a machine that does something else as well, the CPU time is what to
-compare. The mesh is drawn first and not counted.
+One row a number of ranks: wall-clock times, CPU time of the rank that worked longest (waiting ranks
+spin, and it counts), the largest memory of a rank after modes and at the end, and the largest
+difference of frequencies and residual flexibilities from those of one rank. Only on a machine that
+does nothing else the wall-clock times count. The mesh is drawn first and not counted.
 """
 
 from __future__ import annotations
 
 import argparse
+import pickle
 import resource
+import subprocess
+import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 import bladefem
-from bladefem.fem.compat import MPI
-from bladefem.study.modes.clamped_aerofoil import clamped_blade
-from bladefem.study.pipeline.stages import (
-    Bodies,
-    blade_dofs,
-    build_mesh,
-    condense_contact,
-    contact_patches,
-    find_modes,
-    on_one_rank,
-    reduce_sector,
-)
 
-SCENE = Path(__file__).parent.parent / "scenes" / "wedge.toml"
+HERE = Path(__file__).resolve()
+SCENE = HERE.parent.parent / "scenes" / "wedge.toml"
+DOCS = HERE.parent.parent / "docs" / "verification.md"
+START, END = "<!-- ranks: begin -->", "<!-- ranks: end -->"
+# at least 150 000 degrees of freedom with the wedge scene
+SIZE = "3.2 mm"
 DIAMETERS = [0, 9, 18]
 # kept in the reduction
 MODES = 20
+RANKS = (1, 2, 4)
+HEADER = (
+    "| ranks | modes, wall [s] | CPU [s] | reduction, wall [s] | CPU [s] | memory of a rank [GiB] "
+    "| difference |\n| ---: | ---: | ---: | ---: | ---: | ---: | ---: |\n"
+)
 
 
-def timed(name: str, work: Callable[[], object]) -> tuple[float, float]:
-    """Wall-clock time and the largest CPU time of a rank [s], printed by rank 0."""
+def timed(work: Callable[[], Any]) -> tuple[float, float, Any]:
+    """Wall-clock time, the largest CPU time of a rank [s], and what came out."""
+    from bladefem.fem.compat import MPI
+
     comm = MPI.COMM_WORLD
     comm.Barrier()
     wall = time.perf_counter()
-    # waiting ranks spin: what a rank does after its own work is not counted
     cpu = time.process_time()
-    work()
+    result = work()
     used = comm.allreduce(time.process_time() - cpu, MPI.MAX)
     comm.Barrier()
-    elapsed = time.perf_counter() - wall
+    return time.perf_counter() - wall, used, result
+
+
+def on_ranks(folder: Path) -> None:
+    """The row of one number of ranks, written by rank 0."""
+    from bladefem.fem.compat import MPI
+    from bladefem.study.pipeline.stages import (
+        Bodies,
+        contact_patches,
+        reduce_sector,
+        sector_of,
+        wheel_modes,
+    )
+
+    comm = MPI.COMM_WORLD
+    scene, mesh = pickle.loads((folder / "mesh.pkl").read_bytes())
+    patches = contact_patches(mesh)
+    bodies = Bodies(scene, mesh, comm)
+    every = list(range(sector_of(mesh).count // 2 + 1))
+
+    def modes() -> list[np.ndarray]:
+        return [found.frequencies for found in wheel_modes(bodies, 10, every)]
+
+    def memory() -> float:
+        own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
+        return comm.allreduce(own, MPI.MAX)
+
+    row = dict(zip(("modes", "modes_cpu", "frequencies"), timed(modes), strict=True))
+    row["memory_modes"] = memory()
+    reduction = timed(lambda: reduce_sector(bodies, patches, DIAMETERS, MODES))
+    row |= dict(zip(("reduction", "reduction_cpu"), reduction[:2], strict=True))
+    row["residual"] = [reduction[2].sector[n].residual for n in DIAMETERS]
+    row["memory"] = memory()
     if comm.rank == 0:
-        print(f"{name:12s} {elapsed:8.1f} {used:8.1f}", flush=True)
-    return elapsed, used
+        (folder / f"row{comm.size}.pkl").write_bytes(pickle.dumps(row))
+
+
+def difference(row: dict[str, Any], one: dict[str, Any]) -> float:
+    """Largest relative difference of frequencies and residual flexibilities."""
+    pairs = zip(
+        [*row["frequencies"], *row["residual"]],
+        [*one["frequencies"], *one["residual"]],
+        strict=True,
+    )
+    return max(float(abs(a - b).max() / abs(b).max()) for a, b in pairs)
+
+
+def line(ranks: int, row: dict[str, Any], one: dict[str, Any]) -> str:
+    """A row of the table."""
+    cells = [
+        f"{ranks}",
+        *(f"{row[k]:.1f}" for k in ("modes", "modes_cpu", "reduction", "reduction_cpu")),
+        f"{row['memory']:.2f}",
+        "-" if row is one else f"{difference(row, one):.0e}",
+    ]
+    return "| " + " | ".join(cells) + " |\n"
+
+
+def write_table(text: str, dofs: int) -> None:
+    """The table between its marks in docs/verification.md."""
+    page = DOCS.read_text()
+    head, rest = page.split(START)
+    tail = rest.split(END)[1]
+    lead = f"{dofs} degrees of freedom:\n\n"
+    DOCS.write_text(f"{head}{START}\n{lead}{text}{END}{tail}")
 
 
 def main() -> None:
-    """Print the table of one number of ranks."""
+    """All numbers of ranks, one after the other."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--scene", default=str(SCENE))
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE")
+    parser.add_argument("--ranks", type=int, nargs="+", default=RANKS)
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    comm = MPI.COMM_WORLD
-    scene = bladefem.load_scene(options.scene, options.set)
-    mesh = build_mesh(scene, comm)
-    patches = contact_patches(mesh)
-    bodies = Bodies(scene, mesh, comm)
-    if comm.rank == 0:
-        print(f"{comm.size} ranks, {blade_dofs(mesh)} degrees of freedom")
-        print("step         wall [s]  CPU [s]")
-    rows = [
-        timed("modes", lambda: find_modes(bodies, DIAMETERS, reduced=MODES)),
-        timed("clamped", lambda: on_one_rank(bodies, clamped_blade)),
-        timed("contact", lambda: on_one_rank(bodies, lambda b: condense_contact(b, patches))),
-        timed("reduction", lambda: reduce_sector(bodies, patches, DIAMETERS, MODES)),
-    ]
-    own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
-    memory = comm.allreduce(own, MPI.MAX)
-    if comm.rank == 0:
-        print(f"{'sum':12s} {sum(r[0] for r in rows):8.1f} {sum(r[1] for r in rows):8.1f}")
-        print(f"memory of the largest rank {memory:.2f} GiB")
+    if options.child:
+        on_ranks(Path(options.child))
+        return
+    from geometry.isolated_process import build_isolated
+
+    scene = bladefem.load_scene(options.scene, [f"mesh.size={SIZE}", *options.set])
+    mesh = build_isolated(scene)
+    dofs = mesh.dimension * len(np.unique(mesh.bodies["blade"]))
+    print(f"{dofs} degrees of freedom", flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / "mesh.pkl").write_bytes(pickle.dumps((scene, mesh)))
+        text = HEADER
+        rows: list[dict[str, Any]] = []
+        for n in options.ranks:
+            start = ["mpirun", "--oversubscribe", "--bind-to", "none", "-n", str(n)]
+            child = [sys.executable, str(HERE), "--child", str(folder)]
+            subprocess.run([*start, *child], check=True)
+            rows.append(pickle.loads((folder / f"row{n}.pkl").read_bytes()))
+            text += line(n, rows[-1], rows[0])
+            print(text.splitlines()[-1], f"after modes {rows[-1]['memory_modes']:.2f}", flush=True)
+    print(text)
+    if options.write:
+        write_table(text, dofs)
 
 
 if __name__ == "__main__":

@@ -401,9 +401,10 @@ def wheel_modes(
         mine.kept[KEPT_MODES] = kept
         return found
 
-    if comm.size == 1:
-        return of_some(comm, wanted)
     size = group or bodies.ranks_of_sector
+    if size == comm.size:
+        # one group: each rank has the results already
+        return of_some(comm, wanted)
     return shared_out(comm, wanted, size, of_some, _real_or_complex(sectors))
 
 
@@ -571,14 +572,14 @@ def _reduced_diameters(
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
 
     wanted = sorted(set(diameters))
-    if comm.size == 1:
+    size = bodies.ranks_of_sector
+    if size == comm.size:
         return solved(bodies, wanted)
 
     def of_some(part: Communicator, some: list[int]) -> list[PortModel]:
         models = solved(bodies.of_group(part), some)
         return [models[n] for n in some]
 
-    size = bodies.ranks_of_sector
     cost = _real_or_complex(sector_of(bodies.mesh).count)
     return dict(zip(wanted, shared_out(comm, wanted, size, of_some, cost), strict=True))
 

@@ -1,0 +1,81 @@
+"""A million degrees of freedom: ten modes of one complex nodal diameter of a sector, on one rank.
+
+    python benchmarks/million.py [dofs] [core|disk]
+
+The way (factors in memory, or on disk in MUMPS_OOC_TMPDIR) is chosen by the memory model when left
+out. Mesh, then solve in a process of its own: time, processor time, peak memory against the
+model's, and the certificate of the modes. Estimate for a million on one core: mesh 4 minutes,
+solve 6 to 8 minutes of processor time; 16 GB in memory, 11 GB with the factors on disk (about 10 GB
+of it).
+"""
+
+from __future__ import annotations
+
+import json
+import pickle
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from fem_ccx import SECTORS, measured
+
+from bladefem.scene.tables import Scene
+from geometry.isolated_process import build_isolated
+
+# element size [m] and degrees of freedom of a sector, and how these grow
+KNOWN_SIZE, KNOWN_DOFS, GROWTH = 1.41e-3, 472e3, 2.47
+RUN = """
+import json, pickle, sys, time
+from bladefem.fem import body, memory
+if sys.argv[2] != "auto":
+    plan = memory.MemoryPlan(1.0, 1.0 if sys.argv[2] == "disk" else 0.0)
+    body.check_memory = lambda dofs, comm: plan
+from bladefem.fem.constraint import constrain
+from bladefem.fem.modes import modes
+from bladefem.scene.tables import Material
+mesh = pickle.load(open(sys.argv[1], "rb"))
+start = time.perf_counter()
+blade = body.assemble(mesh, "blade", Material())
+found = modes(constrain(blade, "clamp", 5), 10)
+print(json.dumps({
+    "wall": time.perf_counter() - start,
+    "on_disk": blade.plan.on_disk,
+    "frequencies": found.frequencies.tolist(),
+    "residual": float(found.residuals.max()),
+}))
+"""
+
+
+def main() -> None:
+    """Mesh and solve, one line each."""
+    from bladefem.fem.memory import modal_solve_memory
+
+    wanted = float(sys.argv[1]) if len(sys.argv) > 1 else 1e6
+    way = sys.argv[2] if len(sys.argv) > 2 else "auto"
+    size = KNOWN_SIZE * (KNOWN_DOFS / wanted) ** (1 / GROWTH)
+    scene = Scene()
+    scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))
+    clock = time.perf_counter()
+    mesh = build_isolated(replace(scene, mesh=replace(scene.mesh, size=size)))
+    dofs = 3 * len(np.unique(mesh.bodies["blade"]))
+    print(f"{dofs} degrees of freedom, mesh in {time.perf_counter() - clock:.0f} s", flush=True)
+    with tempfile.TemporaryDirectory() as name:
+        (Path(name) / "mesh.pkl").write_bytes(pickle.dumps(mesh))
+        del mesh
+        command = [sys.executable, "-c", RUN, "mesh.pkl", way]
+        out, cpu, memory = measured(command, Path(name))
+    found = json.loads(out.strip().splitlines()[-1])
+    model = modal_solve_memory(dofs, on_disk=found["on_disk"]) / 1e9
+    print(
+        f"factors {'on disk' if found['on_disk'] else 'in memory'}: {found['wall']:.0f} s, "
+        f"{cpu:.0f} s of processor time, {memory:.1f} GB (model {model:.1f} GB); "
+        f"residuals up to {found['residual']:.0e}"
+    )
+    print(" ".join(f"{f:.4f}" for f in found["frequencies"]), "Hz")
+
+
+if __name__ == "__main__":
+    main()
