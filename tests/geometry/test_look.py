@@ -90,7 +90,7 @@ def test_a_file_without_solids(tmp_path):
 def test_a_drawing_is_looked_at_by_its_own_faces():
     """The numbers are those that imported.names and imported.seats take."""
     found = look_at("scenes/own_blade.step")
-    assert [face.name for face in found.faces] == [f"face_{i}" for i in range(1, 22)]
+    assert [face.name for face in found.faces] == [f"face_{i}" for i in range(1, 25)]
     assert found.scale == 1.0
     right, left = (next(f for f in found.faces if f.name == n) for n in ("face_14", "face_11"))
     assert right.plane
