@@ -17,6 +17,9 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.reduction.beam import beam_matrices
 from bladefem.reduction.matrices import port_model_from_matrices
 
+# along a patch, that neighbours in a wheel move it by
+SMOOTH_FUNCTIONS = 24
+
 
 @dataclass(frozen=True)
 class Problem:
@@ -157,3 +160,28 @@ PROBLEMS = {
     "3-D patch": patch,
     "3-D patch, pressed": pressed_patch,
 }
+
+
+def sectors(model: ReducedModel, harmonics: int) -> ReducedModel:
+    """The model as a sector of a wheel whose wave repeats after four blades: the harmonics 0..H
+    fall into nodal diameters 0, n, 2 n, -n, 0, ...
+
+    What neighbours add to the residual flexibility is smooth over the patch, as through a disc, and
+    complex but for the diameters of standing waves; so are the modes' shapes.
+    """
+    side = model.sides[0]
+    contact = side.ports["contact"]
+    place = np.linspace(0, 1, contact.stop - contact.start)
+    smooth = np.cos(np.pi * np.outer(place, np.arange(SMOOTH_FUNCTIONS)))
+    size = 0.3 * abs(side.residual).max() / SMOOTH_FUNCTIONS**2
+    random = np.random.default_rng(5)
+    real, imaginary = random.standard_normal((2, SMOOTH_FUNCTIONS, SMOOTH_FUNCTIONS))
+    bodies = []
+    for wave in (0, 1, 0, -1):
+        half = real + 1j * wave * imaginary + len(bodies) % 3 * np.eye(SMOOTH_FUNCTIONS)
+        residual = side.residual.astype(complex)
+        residual[contact, contact] += smooth @ (size * half @ half.conj().T) @ smooth.T
+        shapes = side.shapes.astype(complex)
+        shapes[contact] *= np.exp(0.3j * wave * place)[:, None]
+        bodies.append(replace(side, residual=residual, shapes=shapes))
+    return replace(model, sides=tuple(bodies[h % 4] for h in range(harmonics + 1)))

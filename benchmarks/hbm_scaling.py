@@ -25,14 +25,19 @@ Measured (CPU seconds, one thread of a busy machine, 57 GFlop/s in matrix produc
       196   0.083    0.049     0.0008   0.0028                             33                    6
       400   0.48     0.29      0.0010   0.0072                            116                    9
      1024   4.6      4.2       0.0022   0.037                             587                    8
+    the latter as sectors of a wheel
+      100   0.089     0.006     0.0073   0.0014                             21                    9
+      196   0.14      0.35      0.023    0.0028                             96                    6
+      400   0.54      1.5       0.025    0.0072                            339                    8
+     1024   5.7                 0.038    0.037                                                    8
 Forces grow linearly. With all modes the condensation grows with the cube, about twice its limit;
 the rest are products with a matrix for each harmonic. With few modes a frequency costs a system as
 large as the modes; most of a point are products of the residual flexibility, which all harmonics
 share, with the forces of all harmonics at once, in the iterations of 5 to 9 Newton steps. Memory
 grows with the square of the nodes, time with their power 1.2 from 100 to 196 nodes, 2.5 above,
-where the matrix has left the caches. Bodies that differ with the harmonic, as sectors in nodal
-diameters do, keep a matrix for each: 2.2 s and 0.8 GB at 400 nodes; squared that would be 15 s and
-5 GB at 1024.
+where the matrix has left the caches. Sectors, whose flexibility differs with the nodal diameter of
+each harmonic, share one as well (`bladefem.hbm.linear.common_basis`): a matrix for each harmonic
+took 2.2 s and 0.8 GB at 400 nodes.
 25 nodes: H 1 to 31 takes 0.006 to 0.27 s and 2 to 42 MiB a point.
 """
 
@@ -48,7 +53,7 @@ from itertools import chain
 from pathlib import Path
 
 import numpy as np
-from hbm_models import patch
+from hbm_models import patch, sectors
 
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import ReducedModel
@@ -58,6 +63,7 @@ from bladefem.hbm.solver.residual import Balance, evaluate_balance, start_in_sti
 from bladefem.reduction.truncate import truncate_modes
 
 SIDES, HARMONICS, MODES = (3, 5, 7, 10, 14, 20, 32), (1, 3, 7, 15, 31), 60
+SECTORS = "sectors"
 # harmonics of the second table, and the largest side of a patch with all its modes: at 32 one point
 # takes minutes and 3 GB
 H_NODES, LARGEST_WHOLE = 5, 20
@@ -83,13 +89,11 @@ def resident(name: str) -> float:
 
 def models(side: int) -> dict[str, ReducedModel]:
     """The patch with all its modes, and with the lowest few and the residual flexibility of the
-    others.
+    others; and the latter as a sector of a wheel.
     """
     whole = patch(side, max(side**2 // 3, 3)).model
-    return {
-        "all": whole,
-        str(MODES): replace(whole, sides=(truncate_modes(whole.sides[0], MODES),)),
-    }
+    few = replace(whole, sides=(truncate_modes(whole.sides[0], MODES),))
+    return {"all": whole, str(MODES): few, SECTORS: sectors(few, H_NODES)}
 
 
 def measure(model: ReducedModel, modes: str, H: int, speed: float) -> dict[str, float]:
@@ -108,6 +112,7 @@ def measure(model: ReducedModel, modes: str, H: int, speed: float) -> dict[str, 
     solved = m if modes == "all" else k
     products = (8 / 3 + 8) * solved**3 + (0 if modes == "all" else 8 * m * k)
     return {
+        "sectors": float(modes == SECTORS),
         "nodes": nodes,
         "H": H,
         "modes": k,
@@ -171,15 +176,17 @@ def draw(rows: list[dict[str, float]], file: Path) -> None:
         "dense memory": (":", "its matrix"),
     }
     by_nodes = rows[len(HARMONICS) :]
-    whole = [row for row in by_nodes if row["modes"] != MODES]
-    few = [row for row in by_nodes if row["modes"] == MODES]
+    few = [row for row in by_nodes if row["modes"] == MODES and not row["sectors"]]
+    cyclic = [row for row in by_nodes if row["sectors"]]
+    whole = [row for row in by_nodes if row not in few and row not in cyclic]
     for column, along, part, title, colour in (
         (0, "nodes", whole, "all modes", "C0"),
         (0, "nodes", few, f"{MODES} modes", "C1"),
+        (0, "nodes", cyclic, f"{MODES} modes, sectors", "C2"),
         (1, "H", rows[: len(HARMONICS)], "all modes", "C0"),
     ):
         for name, (style, label) in curves.items():
-            if not name.startswith("dense") or part is not few:
+            if not name.startswith("dense") or part not in (few, cyclic):
                 axis = axes[int("memory" in name), column]
                 titled = label if name.startswith("dense") else f"{label}, {title}"
                 axis.loglog(

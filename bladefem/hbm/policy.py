@@ -90,6 +90,13 @@ def linear_solver(unknowns: int) -> str:
     return ITERATIONS_THEN_LU if unknowns <= DENSE_FALLBACK_UNKNOWNS else ITERATIONS
 
 
+def shared_basis_size(dofs: int) -> int:
+    """Vectors up to which one flexibility serves all harmonics, with what each of them adds in a
+    basis of that size; 0 where a matrix for each harmonic is faster.
+    """
+    return dofs // LOW_RANK_RATIO if dofs >= SHARED_FLEXIBILITY_DOFS else 0
+
+
 def updates_by_modes(dofs: int, modes: int) -> bool:
     """True if the contact springs are added by the modes."""
     return LOW_RANK_RATIO * modes <= dofs

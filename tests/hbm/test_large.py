@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hbm_models import patch
+from hbm_models import patch, sectors
 from plain_linear import plain_jacobian
 
 from bladefem.hbm import policy
 from bladefem.hbm.linear import condensation
-from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.linear.common_basis import common_basis
+from bladefem.hbm.linear.condensation import condense, own_flexibility, truncate_harmonics
 from bladefem.hbm.linear.contact_flexibility import by_harmonic
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver import residual as residual_module
@@ -134,6 +135,50 @@ def test_a_hundred_nodes_are_solved_as_by_the_dense_jacobian(monkeypatch, hundre
     assert dense.route == "NumPy Newton, dense LU"
     np.testing.assert_allclose(lean.w, dense.w, rtol=0, atol=1e-8 * abs(dense.w).max())
     np.testing.assert_allclose(lean.probe, dense.probe, rtol=0, atol=1e-8 * abs(dense.probe).max())
+
+
+@pytest.mark.parametrize("coupled", [False, True])
+def test_sectors_share_one_flexibility_too(monkeypatch, hundred_nodes, coupled):
+    """Points of contact bodies that differ with the nodal diameter are those of matrices for each
+    harmonic; damping may couple their modes.
+    """
+    few = replace(hundred_nodes, sides=(truncate_modes(hundred_nodes.sides[0], 8),))
+    model = sectors(few, 3)
+    if coupled:
+        random = np.random.default_rng(3).standard_normal((8, 8))
+        damping = 0.01 * (np.diag(model.sides[0].omega) + random @ random.T / 8)
+        sides = tuple(replace(side, damping=damping) for side in model.sides)
+        model = replace(model, sides=sides)
+    linear = condense(model, 0.9, 3)
+    A, mean, R, U, T = linear.condensed.flex
+    assert len(A) == 0 and 24 < U.shape[1] < 100 and np.isrealobj(U)
+    lean = solve(model, 0.9, 3, 88)
+    assert min(lean.states[name] for name in ("stick", "slip", "lift")) > 0
+    monkeypatch.setattr(policy, "SHARED_FLEXIBILITY_DOFS", 10**6)
+    plain = replace(model)
+    apart = condense(plain, 0.9, 3)
+    assert len(apart.condensed.flex[0])
+    for name in ("A", "G", "stuck", "free"):
+        one, other = getattr(linear, name), getattr(apart, name)
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * abs(other).max())
+    np.testing.assert_allclose(own_flexibility(linear), own_flexibility(apart), rtol=1e-9)
+    less = truncate_harmonics(linear, 1)
+    np.testing.assert_allclose(less.A, apart.A[:2], rtol=0, atol=1e-9 * abs(apart.A).max())
+    other = solve(plain, 0.9, 3, 88)
+    assert lean.converged and other.converged
+    np.testing.assert_allclose(lean.w, other.w, rtol=0, atol=1e-8 * abs(other.w).max())
+    np.testing.assert_allclose(lean.probe, other.probe, rtol=0, atol=1e-8 * abs(other.probe).max())
+
+
+def test_bodies_without_likeness_keep_a_matrix_for_each_harmonic(hundred_nodes):
+    """A basis would be as large as the contact."""
+    random = np.random.default_rng(2).standard_normal((300, 300))
+    residual = np.stack([np.eye(300), random @ random.T, random.T @ random])
+    assert common_basis(residual.astype(complex), np.ones((3, 300, 2))) is None
+    assert common_basis(residual[:, :9, :9], np.ones((3, 9, 2))) is None
+    assert common_basis(residual[:1], np.ones((1, 300, 151))) is None
+    found = common_basis(residual[:1], np.ones((1, 300, 2)))
+    assert found.vectors.shape == (300, 1) and not found.differences.any()
 
 
 @pytest.mark.parametrize("blocks", [False, True])

@@ -119,11 +119,13 @@ def own_flexibility(linear: Linear) -> ComplexArray:
     force on itself without contact springs [m/N]. G is not formed.
     """
     bodies = linear.bodies
+    _, _, rest, basis, added = linear.condensed.bare
+    if len(added):
+        return np.diagonal(rest) + np.sum((basis @ added[1]) * basis, axis=1)
     shapes = bodies.contact[min(1, len(bodies.contact) - 1)]
     modal, coupled = linear.modal
     moved = shapes @ coupled[1] if len(coupled) else shapes * modal[1]
-    shared = len(bodies.rest) > 0
-    rest = bodies.rest if shared else bodies.residual[min(1, len(bodies.residual) - 1)]
+    rest = bodies.residual[min(1, len(bodies.residual) - 1)]
     return np.diagonal(rest) + np.sum(moved * shapes.conj(), axis=1)
 
 
@@ -140,7 +142,10 @@ def truncate_harmonics(linear: Linear, H: int) -> Linear:
     condensed = linear.condensed
     A, mean, R, U, T = condensed.flex
     fewer = condensed._replace(
-        flex=(A[few], mean, R, U, T[few]), G=condensed.G[few], modal=condensed.modal[few]
+        flex=(A[few], mean, R, U, T[few]),
+        bare=(*condensed.bare[:4], condensed.bare[4][few]),
+        G=condensed.G[few],
+        modal=condensed.modal[few],
     )
     modal = linear.modal[0][few], linear.modal[1][few]
     less = replace(linear, modal=modal, condensed=fewer)

@@ -2,8 +2,8 @@
 
 Where there are few modes for the contact degrees of freedom, neither flexibility without springs,
 G = R + C D C^H, is formed, nor is a system as large as the contact solved: see `woodbury`. Where
-they are the same for all harmonics as well, not even the flexibility with springs is formed: see
-`bladefem.hbm.linear.contact_flexibility`.
+there are many contact degrees of freedom, not even the flexibility with springs is formed: see
+`common_basis`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from numba import njit
 from ...util.numba_options import INNER_KERNEL, KERNEL
 from ..solver.newton_compiled import Condensed, motion_scale
 from .array_copy import copy_matrix, copy_vector
-from .contact_flexibility import by_harmonic
+from .contact_flexibility import by_harmonic, form_matrices
 
 
 @njit(**KERNEL)
@@ -42,17 +42,17 @@ def linear_part(omega, bodies, springs, H):
             free[h, i] = bodies.direct[h, i] + moved[i]
     copy_vector(bodies.mean_stuck, stuck[0])
     few = bodies.A.shape[0] > 0
-    formed = not few or full.shape[0] > 0
+    shared = bodies.R.shape[0] > 0
+    formed = not shared and (not few or full.shape[0] > 0)
+    X = _flexibilities_in_basis(bodies, D, full)
+    bare = (np.empty((0, 0, 0), np.complex128), bodies.mean_G, bodies.rest, bodies.basis, X)
     G = np.zeros((H + 1, m, m) if formed else (1, 0, 0), np.complex128)
     for h in range(1, G.shape[0]):
         _receptance(bodies, D, full, h, G[h])
-    if bodies.R.shape[0]:
-        T = np.zeros((H + 1, D.shape[1], D.shape[1]), np.complex128)
-        for h in range(1, H + 1):
-            system = _stuck_impedances(omega * h, Z[h], bodies.N[0], bodies.coupled, h)
-            copy_matrix(np.linalg.solve(system, _identity(D.shape[1])), T[h])
+    if shared:
+        T = _sprung_in_basis(omega, Z, bodies)
         flex = (np.empty((0, 0, 0), np.complex128), bodies.mean_A, bodies.R, bodies.shared, T)
-        _stick_by_modes(T, bodies.shared, bodies.stuck, bodies.sprung, stuck)
+        _stick_in_basis(bodies.R, bodies.shared, T, springs, free, stuck)
     else:
         A = np.empty((H + 1, m, m), np.complex128)
         copy_matrix(bodies.mean_A, A[0])
@@ -66,7 +66,7 @@ def linear_part(omega, bodies, springs, H):
     motion = _real_coefficients(stuck)
     scale, least = motion_scale(still, motion, bodies.compression)
     condensed = Condensed(
-        flex, G, motion, springs, scale, least, contact, residual, bodies.rest, D, bodies.motions
+        flex, bare, G, motion, springs, scale, least, contact, residual, D, bodies.motions
     )
     return (D, full), condensed, free, stuck
 
@@ -75,6 +75,10 @@ def linear_part(omega, bodies, springs, H):
 def unsprung_flexibility(bodies, D, full):
     """(H+1, m, m) flexibility without contact springs, from the modal ones of `linear_part`."""
     m = bodies.contact.shape[1]
+    if bodies.R.shape[0]:
+        X = _flexibilities_in_basis(bodies, D, full)
+        none = np.empty((0, 0, 0), np.complex128)
+        return form_matrices((none, bodies.mean_G, bodies.rest, bodies.basis, X))
     G = np.empty((D.shape[0], m, m), np.complex128)
     copy_matrix(bodies.mean_G, G[0])
     for h in range(1, D.shape[0]):
@@ -95,8 +99,6 @@ def _receptance(bodies, D, full, h, G):
     """Fill G (m, m) = R + C D C^H of harmonic h > 0."""
     shapes = bodies.contact[min(h, bodies.contact.shape[0] - 1)]
     residual = bodies.residual[min(h, bodies.residual.shape[0] - 1)]
-    # the same for all harmonics, where that is
-    rest = bodies.rest
     m = G.shape[0]
     real = _real_part(shapes)
     if full.shape[0] == 0 and real.shape[0]:
@@ -106,15 +108,13 @@ def _receptance(bodies, D, full, h, G):
         loss = np.dot(real * D[h].imag, across)
         for i in range(m):
             for j in range(m):
-                own = complex(rest[i, j]) if rest.shape[0] else residual[i, j]
-                G[i, j] = own + complex(stiff[i, j], loss[i, j])
+                G[i, j] = residual[i, j] + complex(stiff[i, j], loss[i, j])
         return
     left = np.dot(shapes, full[h]) if full.shape[0] else shapes * D[h]
     moved = np.dot(left, np.ascontiguousarray(shapes.conj().T))
     for i in range(m):
         for j in range(m):
-            own = complex(rest[i, j]) if rest.shape[0] else residual[i, j]
-            G[i, j] = own + moved[i, j]
+            G[i, j] = residual[i, j] + moved[i, j]
 
 
 @njit(**INNER_KERNEL)
@@ -201,14 +201,59 @@ def _stuck_impedances(w, Z, N, coupled, h):
 
 
 @njit(**INNER_KERNEL)
-def _stick_by_modes(T, U, still, push, stuck):
-    """Fill stuck (H+1, m) but for the mean from T (H+1, M, M)."""
+def _flexibilities_in_basis(bodies, D, full):
+    """(H+1, q, q) what each harmonic adds to the shared residual flexibility in the basis, but for
+    the mean; (0, 0, 0) in the first form.
+    """
+    q = bodies.basis.shape[1]
+    out = np.zeros((D.shape[0] if bodies.R.shape[0] else 0, q, q), np.complex128)
+    for h in range(1, out.shape[0]):
+        shapes = bodies.coordinates[min(h, bodies.coordinates.shape[0] - 1)]
+        left = np.dot(shapes, full[h]) if full.shape[0] else shapes * D[h]
+        moved = np.dot(left, np.ascontiguousarray(shapes.conj().T))
+        own = bodies.differences[min(h, bodies.differences.shape[0] - 1)]
+        for i in range(q):
+            for j in range(q):
+                out[h, i, j] = own[i, j] + moved[i, j]
+    return out
+
+
+@njit(**INNER_KERNEL)
+def _sprung_in_basis(omega, Z, bodies):
+    """(H+1, q, q) T of the second form, but for the mean."""
+    fixed = bodies.sprung_differences
+    q = bodies.basis.shape[1]
+    T = np.zeros((Z.shape[0], q, q), np.complex128)
     for h in range(1, T.shape[0]):
-        modal = np.dot(T[h], push[h])
-        for i in range(U.shape[0]):
-            stuck[h, i] = still[h, i]
-            for k in range(U.shape[1]):
-                stuck[h, i] += U[i, k] * modal[k]
+        s = min(h, fixed.shape[0] - 1)
+        shapes = bodies.sprung_coordinates[s]
+        system = _stuck_impedances(omega * h, Z[h], bodies.N[s], bodies.coupled, h)
+        across = np.ascontiguousarray(shapes.conj().T)
+        moved = np.dot(shapes, np.linalg.solve(system, across))
+        for i in range(q):
+            for j in range(q):
+                T[h, i, j] = fixed[s, i, j] + moved[i, j]
+    return T
+
+
+@njit(**INNER_KERNEL)
+def _stick_in_basis(R, U, T, springs, free, stuck):
+    """Fill stuck (H+1, m) but for the mean: (1 - R K - U T U^T K) free."""
+    m = springs.size
+    H = T.shape[0] - 1
+    sprung = np.empty((m, 2 * H))
+    for h in range(1, H + 1):
+        for i in range(m):
+            sprung[i, 2 * h - 2] = springs[i] * free[h, i].real
+            sprung[i, 2 * h - 1] = springs[i] * free[h, i].imag
+    moved = np.dot(R, sprung)
+    pushed = np.dot(np.ascontiguousarray(U.T), sprung)
+    shapes = U.astype(np.complex128)
+    for h in range(1, H + 1):
+        by_basis = np.dot(shapes, np.dot(T[h], pushed[:, 2 * h - 2] + 1j * pushed[:, 2 * h - 1]))
+        for i in range(m):
+            own = complex(moved[i, 2 * h - 2], moved[i, 2 * h - 1])
+            stuck[h, i] = free[h, i] - own - by_basis[i]
 
 
 @njit(**INNER_KERNEL)

@@ -6,8 +6,9 @@ one of two forms:
 
 - A (H+1, m, m) complex, the others empty;
 - A empty, A_0 = mean (m, m), A_h = R + U T_h U^T from R (m, m) and U (m, M), real, and T (H+1, M,
-  M): see `woodbury`. Neither does a point of many contacts form its matrices, nor do iterations
-  read them: with 1024 nodes and H = 5 they would take 0.9 GB, R takes 75 MB.
+  M), for M vectors of a basis: see `common_basis`. Neither does a point of many contacts form its
+  matrices, nor do iterations read them: with 1024 nodes and H = 5 they would take 0.9 GB, R takes
+  75 MB.
 """
 
 from __future__ import annotations
@@ -198,17 +199,11 @@ def seen_by(flex, Z):
 
 
 @njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
-def apply_modes(C, R, rest, D, x, out):
+def apply_modes(C, R, D, x, out):
     """out (m, K) += (R + C D C^H) x for x (m, K) but for the mean, from C (S, m, M), R (S', m, m)
-    and D (H+1, M); R = rest (m, m) real for all harmonics where that is not empty.
+    and D (H+1, M).
     """
     m = x.shape[0]
-    shared = rest.shape[0] > 0
-    if shared:
-        moved_rest = np.dot(rest, x)
-        for i in range(m):
-            for k in range(1, x.shape[1]):
-                out[i, k] += moved_rest[i, k]
     M = C.shape[2]
     along = np.ascontiguousarray(x.T)
     q = np.empty(M, np.complex128)
@@ -227,8 +222,7 @@ def apply_modes(C, R, rest, D, x, out):
             moved = 0.0j
             for k in range(M):
                 moved += shapes[i, k] * q[k]
-            if not shared:
-                for j in range(m):
-                    moved += own[i, j] * complex(along[c, j], -along[s, j])
+            for j in range(m):
+                moved += own[i, j] * complex(along[c, j], -along[s, j])
             out[i, c] += moved.real
             out[i, s] -= moved.imag

@@ -17,6 +17,7 @@ from .. import policy
 from ..model import ReducedModel
 from ..solver.deflation import common_motions
 from .bodies import Stack
+from .common_basis import CommonBasis, common_basis
 from .mean_motion import unheld_mean_motions, with_springs
 from .woodbury import bodies_of, frequency_independent_parts
 
@@ -37,7 +38,7 @@ class Bodies(NamedTuple):
     # (S, m, M) shapes, the damper's reversed
     contact: np.ndarray
     # (S, m, m); (1, 0, 0) in the second form of `bladefem.hbm.linear.contact_flexibility`, where
-    # `rest` has it
+    # `rest`, `basis` and `differences` have it
     residual: np.ndarray
     # (S, p, M) shapes
     probe: np.ndarray
@@ -50,7 +51,7 @@ class Bodies(NamedTuple):
     # (H+1, p) the same of the probes
     straight: np.ndarray
     # (S, m, m), U (S, m, M), UH (S, M, m), N (S, M, M) of `woodbury.frequency_independent_parts`;
-    # empty where there are too many modes for it; A (1, 0, 0) in the second form, where R has it
+    # empty where there are too many modes for it; of the second form there is N alone
     A: np.ndarray
     U: np.ndarray
     UH: np.ndarray
@@ -59,11 +60,18 @@ class Bodies(NamedTuple):
     stuck: np.ndarray
     # (H+1, M) what pushes the modes then
     sprung: np.ndarray
-    # residual flexibility without springs (m, m), R (m, m) and U (m, M) of the second form, real;
-    # empty in the first
+    # residual flexibility without springs (m, m) and basis V (m, q) of `common_basis`, real, and
+    # their R (m, m) and U (m, q) of the second form, real; in the basis the differences (S, q, q)
+    # and the shapes of the modes (S, q, M), without and with contact springs. Empty in the first
+    # form
     rest: np.ndarray
+    basis: np.ndarray
     R: np.ndarray
     shared: np.ndarray
+    differences: np.ndarray
+    coordinates: np.ndarray
+    sprung_differences: np.ndarray
+    sprung_coordinates: np.ndarray
     # (m, q) common motions of `bladefem.hbm.solver.deflation`, real
     motions: np.ndarray
     # (m, m) of the mean, real, and as its stuck (m,) and G (m, m) whatever the frequency
@@ -101,17 +109,20 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
     spare = ((0, 0), (0, 0), (0, contact.shape[2] - blades.shapes.shape[2]))
     push, direct, straight = _excitation(blades, model.loads(H), spare)
     mean = _mean_parts(model, blades, (own[0], contact[0], residual[0]), (push[0], direct[0]))
+    basis = common_basis(residual, contact)
+    if basis is not None:
+        # not kept twice
+        residual = np.zeros((1, 0, 0))
+    by_modes = basis is None and policy.updates_by_modes(dofs, contact.shape[2])
     fixed = (
         frequency_independent_parts(residual, contact, springs)
-        if policy.updates_by_modes(dofs, contact.shape[2])
+        if by_modes
         else (np.zeros((0, 0, 0)),) * 4
     )
     excited = _excited_modes(fixed, springs, push, direct)
-    one = _one_for_all(fixed, residual, dofs)
-    if len(one[0]):
-        # not kept twice
-        unused = np.zeros((1, 0, 0))
-        residual, fixed = unused, (unused, *fixed[1:])
+    joined, shared = _shared_parts(basis, springs)
+    if basis is not None:
+        fixed = (*fixed[:3], joined)
     parts = [
         contact,
         residual,
@@ -130,7 +141,7 @@ def _pack_bodies(model: ReducedModel, H: int) -> Bodies:
             hysteretic,
             joined_blocks(bodies, [body.coupled for body in bodies]),
             *(np.ascontiguousarray(part, dtype=complex) for part in parts),
-            *one,
+            *shared,
             common_motions(model, H),
             *mean,
             model.compression,
@@ -206,16 +217,33 @@ def _mean_flexibility(
     return np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
 
 
-def _one_for_all(
-    fixed: tuple[np.ndarray, ...], residual: np.ndarray, dofs: int
-) -> tuple[np.ndarray, ...]:
-    """Residual flexibility (m, m) without springs, R (m, m) and U (m, M) of `flex`; empty where it
-    takes its first form.
-    """
-    A, U = fixed[:2]
-    if dofs < policy.SHARED_FLEXIBILITY_DOFS or len(U) != 1 or np.iscomplexobj(A) or np.any(U.imag):
-        return (np.zeros((0, 0)),) * 3
-    return tuple(np.ascontiguousarray(part[0].real) for part in (residual, A, U))
+def _shared_parts(
+    basis: CommonBasis | None, springs: np.ndarray
+) -> tuple[np.ndarray, tuple[np.ndarray, ...]]:
+    """N (S, M, M), and `rest` to `sprung_coordinates` of the `Bodies`."""
+    if basis is None:
+        none = np.zeros((0, 0))
+        parts = np.zeros((0, 0, 0), dtype=complex)
+        return parts, (none, none, none, none, parts, parts, parts, parts)
+    V = basis.vectors
+    R, U, _, _ = frequency_independent_parts(basis.residual[None], V[None], springs)
+    shared = np.ascontiguousarray(U[0].real)
+    by_springs = V.T @ (springs[:, None] * shared)
+    E, P = basis.differences, basis.shapes
+    # the same update once more, for what each harmonic adds
+    sprung = np.linalg.solve(np.eye(V.shape[1]) + E @ by_springs, np.concatenate([E, P], axis=2))
+    sprung_E, sprung_P = np.split(sprung, [V.shape[1]], axis=2)
+    joined = P.conj().swapaxes(1, 2) @ (by_springs @ sprung_P)
+    return joined, (
+        basis.residual,
+        V,
+        R[0],
+        shared,
+        E,
+        P,
+        np.ascontiguousarray(sprung_E),
+        np.ascontiguousarray(sprung_P),
+    )
 
 
 def _excited_modes(

@@ -59,7 +59,10 @@ class Condensed(NamedTuple):
 
     # flexibility with contact springs, see `bladefem.hbm.linear.contact_flexibility`
     flex: tuple
-    # (H+1, m, m) the same without springs, but for the mean; (1, 0, 0) where `modal` tells it
+    # the same without springs in the second form, but for the mean; with (0, 0, 0) in place of T in
+    # the first
+    bare: tuple
+    # (H+1, m, m) the same in the first form; (1, 0, 0) in the second, and where `modal` tells it
     G: np.ndarray
     # (m, K) displacement in full stick [m]
     stuck: np.ndarray
@@ -68,11 +71,9 @@ class Condensed(NamedTuple):
     # size of the linear motion, and the least size that a motion is measured by [m]
     scale: float
     least: float
-    # (S, m, M), residual (S, m, m), or rest (m, m) real for all harmonics, and modal (H+1, M):
-    # these give G by `apply_modes`; or empty
+    # (S, m, M), residual (S, m, m) and modal (H+1, M): these give G by `apply_modes`; or empty
     shapes: np.ndarray
     residual: np.ndarray
-    rest: np.ndarray
     modal: np.ndarray
     # (m, q) that the contacts have in common, see `bladefem.hbm.solver.deflation`
     motions: np.ndarray
@@ -136,10 +137,12 @@ def balance_residual(w, linear, preload, F, p, r):
         for k in range(K):
             sprung[i, k] = springs[i] * r[i, k] if k else 0.0
             bare[i, k] = r[i, k]
-    if G.shape[1]:
+    if linear.bare[4].shape[0]:
+        apply_flexibility(linear.bare, sprung, bare)
+    elif G.shape[1]:
         apply_matrices(G, sprung, bare)
     else:
-        apply_modes(linear.shapes, linear.residual, linear.rest, linear.modal, sprung, bare)
+        apply_modes(linear.shapes, linear.residual, linear.modal, sprung, bare)
     return max(
         frobenius_norm(r) / max(frobenius_norm(w), linear.least),
         frobenius_norm(bare) / linear.scale,
