@@ -28,6 +28,7 @@ def backbone(options: argparse.Namespace, comm: Communicator | None) -> None:
             [
                 tables.frame_table(readable_texts(prediction_table(found))),
                 "",
+                *remarks,
                 *backbone_sentences(found),
                 f"written: {', '.join(map(str, files))}",
             ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.interpolate import LinearNDInterpolator, NearestNDInterpolator
 from scipy.spatial import QhullError
@@ -26,7 +28,7 @@ def mesh_temperatures(mesh: Mesh, given: GivenTemperatures) -> RealArray:
     """(n_points,) temperatures [K] from those of places, or of nodes of the user's own mesh.
 
     Nodes that no temperature is given for, such as those in the middle of edges, take what lies
-    between the others of their cells.
+    between the others of their cells; a body of another file takes the temperatures next to it.
 
     Raises:
         InputError: as `interpolate_temperatures`, a number that the mesh does not have, nodes
@@ -54,6 +56,13 @@ def mesh_temperatures(mesh: Mesh, given: GivenTemperatures) -> RealArray:
     found = np.full(len(mesh.points), np.nan)
     found[row] = given.values
     found = _filled_cells(mesh, found)
+    for name, cells in mesh.bodies.items():
+        nodes = np.unique(cells)
+        if (mesh.numbers[nodes] < 0).all():
+            # of a file of its own, whose numbers are not those of the first
+            alone = replace(mesh, bodies={name: cells}, pairs={})
+            near = interpolate_temperatures(alone, mesh.points[row], given.values)
+            found[nodes] = near[nodes]
     bodies = _body_nodes(mesh)
     missing = bodies[np.isnan(found[bodies])]
     if len(missing):

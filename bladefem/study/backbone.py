@@ -18,9 +18,11 @@ from ..hbm.nonlinear_modes import force_at_resonance, nonlinear_mode
 from ..io.stage_cache import cached_stage, found_remark, on_root
 from ..util.arrays import BooleanArray, RealArray
 from ..util.communicator import Communicator
+from ..util.message import warning
 from ..util.progress import Progress, without_progress
 from .adaptive.family import family_member
 from .pipeline.case_models import family_of_case, load_cases
+from .pipeline.coriolis import without_coriolis
 from .pipeline.loads import Curve
 from .pipeline.run_records import SolvedRun
 from .pipeline.stage_inputs import stage_key
@@ -100,8 +102,8 @@ def run_backbones(
     comm: Communicator | None = None,
     progress: Progress = without_progress,
 ) -> tuple[list[Backbone], list[str]]:
-    """The nonlinear mode under every load of a run, and remarks on those that were found in the
-    folder; computed on one rank.
+    """The nonlinear mode under every load of a run, and remarks on what they leave out and on those
+    that were found in the folder; computed on one rank.
 
     Raises:
         InputError: a model is too large for dense factors, or its mode is no elastic one.
@@ -113,11 +115,19 @@ def run_backbones(
     patches = list(run.contact.problem.patches)
     cases = {(case.load, case.mass): case for case in load_cases(scene, run.mesh, run.contact)}
     found = []
-    remarks = []
+    remarks: list[str] = []
+    reduced = without_coriolis(run.reduced)
+    if reduced is not run.reduced:
+        remarks.append(
+            warning(
+                "nonlinear modes leave out the Coriolis forces that the responses have: "
+                "resonances predicted by them lie beside those of the balance"
+            )
+        )
 
     def alone(curve: Curve) -> Backbone:
         case = cases[curve.load, curve.mass]
-        family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+        family = family_of_case(scene, run.mesh, reduced, patches, case)
         model = family_member(family, curve.settings).model
         return curve_backbone(model, curve, scene.excitation.mode - 1, ends)
 

@@ -21,6 +21,7 @@ from bladefem.fem.rotation import linear_tangent, unit_speed_displacement
 from bladefem.hbm.linear.bodies import Damping, port_receptance
 from bladefem.hbm.linear_resonances import wave_frequencies
 from bladefem.scene.tables import Material
+from bladefem.study.modes.linear_response import Forced, probe_response
 
 GOLDEN = json.loads((Path(__file__).parent / "ccx_decks.json").read_text())
 AXIS = (0.0, 0.0, 1.0)
@@ -97,6 +98,32 @@ def test_craig_bampton_has_the_same_coriolis_forces(ring):
     fixed = port_model(con, P, names, 40, kind="craig-bampton", spin=spin)
     ours, theirs = (wave_frequencies(model.omega, model.damping)[:6] for model in (free, fixed))
     np.testing.assert_allclose(ours, theirs, rtol=1e-4)
+
+
+def test_linear_response_in_a_rotating_frame():
+    """Foucault's pendulum under a force along x: x = (w0^2 - W^2 - w^2) F / determinant, and the two
+    resonances lie at w0 - W and w0 + W.
+    """
+    w0, speed, force = 300.0, 40.0, 2.0
+    omega = np.full(2, np.sqrt(w0**2 - speed**2))
+    shapes = np.zeros((2, 1, 3))
+    shapes[[0, 1], 0, [0, 1]] = 1.0
+    response = Forced(
+        1,
+        omega,
+        shapes,
+        np.array([force, 0.0]),
+        np.zeros((1, 3)),
+        Damping(),
+        None,
+        speed * np.array([[0.0, -2.0], [2.0, 0.0]]),
+    )
+    np.testing.assert_allclose(response.waves, [w0 - speed, w0 + speed], rtol=1e-12)
+    for w in (100.0, 250.0, 355.0):
+        own = omega[0] ** 2 - w**2
+        exact = own * force / (own**2 - (2 * speed * w) ** 2)
+        found = probe_response(response, np.array([1.0, 0.0, 0.0]), np.array([w / (2 * np.pi)]))
+        np.testing.assert_allclose(found, exact, rtol=1e-10)
 
 
 def test_standing_bodies_have_no_such_damping(ring):

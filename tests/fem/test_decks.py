@@ -245,6 +245,26 @@ def test_sector_and_damper_in_two_files(tmp_path):
     assert mesh.bodies["damper"].shape == mesh.bodies["blade"].shape
 
 
+def test_a_damper_of_another_file_is_as_hot_as_what_it_touches(tmp_path):
+    """Numbers are those of the first file; a body far from all given nodes is refused."""
+    bar, m = decks.bar()
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(m, {})))
+    given = GivenTemperatures(400.0 + 1000.0 * m.points[:, 0], None, 1 + np.arange(len(m.points)))
+    low = np.ptp(m.points[:, 2])
+    for lift, fits in ((0.2 * low, True), (9 * low, False)):
+        small = m.points * [0.5, 0.5, 0.1] + [0.03, 0.0, lift]
+        block = decks.flat_deck(decks.Model(small, m.blocks, {}, {}), {})
+        (tmp_path / "b.inp").write_text("\n".join(block))
+        mesh = read_mesh(tmp_path / "a.inp", more=[f"damper = {tmp_path / 'b.inp'}"])
+        if not fits:
+            with pytest.raises(InputError, match="away from all given places"):
+                mesh_temperatures(mesh, given)
+            continue
+        found = mesh_temperatures(mesh, given)
+        np.testing.assert_allclose(found, 400.0 + 1000.0 * mesh.points[:, 0], rtol=1e-9)
+    assert bar.cell_type == mesh.cell_type
+
+
 @pytest.mark.parametrize(
     "lines, words",
     [

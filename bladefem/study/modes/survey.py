@@ -21,6 +21,7 @@ from ...io.stage_cache import cached_stage, found_remark, on_root
 from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
+from ...util.message import method
 from ...util.progress import Progress, without_progress
 from ..pipeline import pipeline
 from ..pipeline.run_records import ModalRun
@@ -129,6 +130,8 @@ def survey_modes(
         result = replace(
             result, answer=forced_response_answer(bodies, wanted.loads, wanted.damping)
         )
+        if result.answer is not None and result.answer.response.coriolis is not None:
+            messages.append(method("the forced response has Coriolis forces"))
         clock = _stage_seconds(run, "forced response", clock)
     return result if other is None else _compare_modes(result, *other)
 
