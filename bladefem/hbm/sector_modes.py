@@ -63,7 +63,7 @@ def sector_modes(model: ReducedModel) -> SectorModes:
         InputError: the wave does not repeat after the harmonics that the model has bodies for.
     """
     r = blades_of_wave(model)
-    parts = [_ring(body, r, sign) for body, sign in _bodies(model, r)]
+    parts = [_ring(body, r, sign) for body, sign in wave_bodies(model, r)]
     return SectorModes(
         r,
         np.concatenate([part.stiffness for part in parts]),
@@ -145,7 +145,7 @@ def _circulation(body: PortModel) -> np.ndarray:
     return np.zeros((0, 0)) if body.circulatory is None else body.circulatory
 
 
-def _bodies(model: ReducedModel, r: int) -> list[tuple[Stack, float]]:
+def wave_bodies(model: ReducedModel, r: int) -> list[tuple[Stack, float]]:
     """Each body's stack of harmonics 0..r-1 at least, and the sign of its motion."""
     stacks = bodies_of(model, max(r - 1, 0))
     return list(zip(stacks, (1.0, -1.0), strict=False))

@@ -213,18 +213,22 @@ def linearised_contacts(
     solution: Solution,
     system: SectorModes,
     S: int,
+    copies: int = 1,
 ) -> tuple[OpenContacts, NodeSteps]:
     """Bodies with the springs of closed contacts of all blades, and the steps of the other nodes,
     at S instants a period.
+
+    Args:
+        copies: of all blades in the system; 2 for the real and imaginary parts of their motion.
     """
-    blades = system.blades
+    r = system.blades
     *parts, stuck, pressed = _steps_of_nodes(model, solution, S)
-    before, after_motion, before_motion, share = (_of_all_blades(p, blades) for p in parts)
-    moving = np.flatnonzero(np.tile(~stuck, blades))
-    springs = np.tile(model.springs, (blades, 1))
-    contacts = open_contacts(system, np.tile(stuck, blades), np.tile(pressed, blades), springs)
-    nodes = (part[:, moving] for part in (before, after_motion, before_motion, share))
-    return contacts, NodeSteps(*nodes)
+    moving = np.flatnonzero(np.tile(~stuck, r * copies))
+    springs = np.tile(model.springs, (r * copies, 1))
+    closed = (np.tile(stuck, r * copies), np.tile(pressed, r * copies))
+    contacts = open_contacts(system, *closed, springs)
+    rings = (np.concatenate([_of_all_blades(part, r)] * copies, axis=1) for part in parts)
+    return contacts, NodeSteps(*(ring[:, moving] for ring in rings))
 
 
 def _steps_of_nodes(
