@@ -26,8 +26,15 @@ diameters is 9.0 s of processor time (ratio 26.6 against those 240.8 s) where it
 without waiting directions took 11.1 s, run by turns.
 
 All of these are of the block Lanczos iteration without a count of the modes. With SLEPc and the
-count by inertia, 45 549 dofs, fifteen processes on two cores: one diameter 5.7 s (ccx 21.9 s), all
-13 diameters 13.0 s.
+count by inertia, bladefem alone on a busy machine (to be held against ccx in one run):
+
+    dofs     diameters  bladefem [s]  memory [GB]  share of the count in the processor time
+     49 632  5                   4.5         0.56  0.15
+     49 632  0                   4.1         0.50
+     49 632  0 to 12             9.6         0.93  0.08
+    148 482  5                  19.5         1.68  0.21
+
+    python benchmarks/fem_ccx.py 45000 151000      both sides in one run, some 12 minutes
 """
 
 from __future__ import annotations

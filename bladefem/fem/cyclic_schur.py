@@ -136,11 +136,15 @@ def eliminate_interior(
     )
     matrix.destroy()
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
-    S = schur_complement(factor, len(rim))
     negative = factor.negative
     separators = None
-    if shared is not None:
-        S, separators = eliminate_separators(shared.cut, S, definite)
+    if shared is None:
+        S = schur_complement(factor, len(rim))
+    else:
+        # handed over, not kept: it can be as large as two cut faces
+        S, separators = eliminate_separators(
+            shared.cut, schur_complement(factor, len(rim)), definite
+        )
         give_back()
         negative = shared.cut.comm.allreduce(negative) + separators.negative
     return Core(

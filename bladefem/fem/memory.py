@@ -1,14 +1,19 @@
 """Does a solve fit into memory? Said before anything is assembled, from a model fitted to measured
 peaks.
 
-Peak of the modes of one complex nodal diameter [GB], wedge sector, measured and (modelled);
-benchmarks/fem_cost.py remakes the first row and draws it, all in core:
+Peak of the modes of one complex nodal diameter [GB], wedge sector, proven by the count of the
+inertia, measured and (modelled); benchmarks/fem_cost.py remakes the first row, million.py there
+single points of the first two:
 
-    dofs            12 530      45 550      151 000     240 300     395 100
-    one core        0.22 (0.21) 0.56 (0.56) 2.05 (2.06) 3.68 (3.61) 6.66 (6.65)
+    dofs                      49 632         148 482        472 299
+    in memory                 0.557 (0.557)  1.68 (1.68)
+    factors on disk           0.454 (0.464)  1.28 (1.24)    4.05 (4.10)
+    two ranks, both together  0.773 (0.772)  2.13 (2.26)
 
-    dofs            28 482      50 514
-    doubled         0.79 (0.80) 1.39 (1.37)
+Factors on disk take 0.57 GB at 148 482 degrees of freedom, and a twentieth more processor time
+where the system can keep the file in memory that nobody else needs. MUMPS's block low rank takes no
+less memory than exact factors at this size: 748 and 794 MB at thresholds of 1e-6 and 1e-9, 759
+without, and its solves are wrong by 4e-3 and 2e-7; so it is not among the ways.
 
 The factors grow with dofs^(4/3) as nested dissection of a solid does; solid blocks have about twice
 those of blades.
@@ -28,11 +33,11 @@ from .compat import MPI
 # interpreter and libraries of one rank [bytes]
 BYTES_PER_RANK = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
-ONE_CORE = (3.29e3, 180.5)
-DOUBLED = (1.9e4, 160.0)
-ON_DISK = (3.29e3, 90.0)
+ONE_RANK = (5.0e3, 103.5)
+SEVERAL_RANKS = (4.29e3, 175.0)
+ON_DISK = (5.59e3, 36.5)
 # on disk: bytes b dofs^(4/3)
-FACTOR_BYTES = 160.0
+FACTOR_BYTES = 100.0
 
 
 def modal_solve_memory(
@@ -46,7 +51,7 @@ def modal_solve_memory(
         dofs: degrees of freedom of the body, three a node.
         on_disk: factors are not kept in memory.
     """
-    linear, factors = ON_DISK if on_disk else ONE_CORE if ranks == 1 else DOUBLED
+    linear, factors = ON_DISK if on_disk else ONE_RANK if ranks == 1 else SEVERAL_RANKS
     return ranks * BYTES_PER_RANK + linear * dofs + factors * dofs ** (4 / 3)
 
 
@@ -118,7 +123,6 @@ def check_memory(
     if total <= least:
         return MemoryPlan(total)
     smaller = modal_solve_memory(dofs, comm.size, on_disk=True)
-    # for the factors of the count, too, which are made while the others are there
     disk = FACTOR_BYTES * dofs ** (4 / 3)
     folder = factor_folder()
     room = shutil.disk_usage(folder).free / part if folder.is_dir() else 0.0

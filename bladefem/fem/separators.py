@@ -46,15 +46,29 @@ def eliminate_separators(
     between = _summed_block(cut, share, cut.separator, cut.separator)
     across = _summed_block(cut, share, cut.separator, ~cut.separator)
     left = _summed_block(cut, share, ~cut.separator, ~cut.separator)
+    del share
     # columns are shared out, for the products cost more than the factors
     mine = np.array_split(np.arange(len(left)), cut.comm.size)[cut.comm.rank]
     solved, factor, negative = _solve_between(between, across[:, mine], definite)
-    pieces = cut.comm.allgather((solved, across.T @ solved))
-    W = np.concatenate([piece for piece, _ in pieces], axis=1)
-    product = np.concatenate([piece for _, piece in pieces], axis=1)
-    left -= 0.5 * product
-    left -= 0.5 * product.T
+    W = _joined_columns(cut, solved, mine, len(left))
+    product = _joined_columns(cut, across.T @ solved, mine, len(left))
+    product *= 0.5
+    left -= product
+    left -= product.T
     return left, Separators(cut, factor, W, negative)
+
+
+def _joined_columns(
+    cut: Cut,
+    piece: np.ndarray,
+    mine: np.ndarray,
+    columns: int,
+) -> np.ndarray:
+    """The columns of all ranks, of which this one has those numbered ``mine``."""
+    out = np.zeros((len(piece), columns))
+    out[:, mine] = piece
+    cut.comm.Allreduce(MPI.IN_PLACE, out)
+    return out
 
 
 def _summed_block(

@@ -133,15 +133,23 @@ def matrix_share(part: Part, rows: sp.csr_matrix) -> sp.csr_matrix:
     first, last = part.owned
     boundary = part.boundary[part.cut.touched]
     inner = rows[part.inside - first]
-    A = inner[:, part.inside]
-    B = inner[:, boundary]
+    # all columns of these rows are the part's
+    place = np.full(rows.shape[1], -1, np.int32)
+    place[part.members] = np.arange(len(part.members), dtype=np.int32)
+    top = sp.csr_matrix(
+        (inner.data, place[inner.indices], inner.indptr), (len(part.inside), len(part.members))
+    )
+    turned = inner[:, boundary].T.tocsr()
     mine = np.flatnonzero((boundary >= first) & (boundary < last))
     put = sp.csr_matrix(
         (np.ones(len(mine)), (mine, np.arange(len(mine)))), shape=(len(boundary), len(mine))
     )
     half = 0.5 * (put @ rows[boundary[mine] - first][:, boundary])
-    out = sp.bmat([[A, B], [B.T, half + half.T]], format="csr")
-    out.sum_duplicates()
+    # shares the memory of ``inner``, which must be of no more use
+    top.sort_indices()
+    bottom = sp.hstack([turned, half + half.T], format="csr")
+    out = sp.vstack([top, bottom], format="csr")
+    out.sort_indices()
     return out
 
 

@@ -22,19 +22,24 @@ from bladefem.scene.tables import Material
 
 
 @pytest.mark.parametrize(
-    "dofs, ranks, measured",
+    "dofs, ranks, on_disk, measured",
     [
-        (12530, 1, 0.22e9),
-        (45550, 1, 0.56e9),
-        (151000, 1, 2.05e9),
-        (395100, 1, 6.66e9),
-        (28482, 2, 0.91e9),
-        (50514, 2, 1.51e9),
+        (49_632, 1, False, 0.557e9),
+        (148_482, 1, False, 1.676e9),
+        (49_632, 1, True, 0.454e9),
+        (148_482, 1, True, 1.280e9),
+        (472_299, 1, True, 4.046e9),
+        (49_632, 2, False, 0.773e9),
+        (148_482, 2, False, 2.133e9),
     ],
 )
-def test_model_follows_the_measured_peaks(dofs, ranks, measured):
-    """Wedge sector; two ranks: the doubled pencil's peak on one rank, and a second interpreter."""
-    assert modal_solve_memory(dofs, ranks) == pytest.approx(measured, rel=0.07)
+def test_model_follows_the_measured_peaks(dofs, ranks, on_disk, measured):
+    """Wedge sector, one complex nodal diameter, all ranks together."""
+    assert modal_solve_memory(dofs, ranks, on_disk) == pytest.approx(measured, rel=0.07)
+
+
+def test_a_million_is_predicted_to_fit_into_20_gib():
+    assert modal_solve_memory(1_000_000, on_disk=True) < modal_solve_memory(1_000_000) < 20 * 2**30
 
 
 def test_too_large_is_refused_with_advice():
