@@ -48,6 +48,10 @@ CAPTIONS = {
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
     "and amplitude over load for each value.",
+    "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
+    "over the values of both fields; the smallest in bold.",
+    "response/study_band": "Resonance amplitude over the load: median of the samples, the middle "
+    "80 % of them, and all; in grey the blade without damper.",
     "response/accuracy_of_methods_and_models": "Error of the resonance amplitude over computing "
     "time; the star is the automatic choice, the stairs are what no other setting beats.",
     "response/errors_of_each": "Errors of resonance amplitude and frequency of each setting.",

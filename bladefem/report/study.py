@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from ..scene.fields import field_at, value_at
@@ -67,8 +68,8 @@ def _report(
         Headline(
             f"best {name}",
             str(best["value"]),
-            f"of {len(table)} values studied",
-            f"with {best['load']:.4g} N on each seat",
+            place_of_value(str(best["value"]), list(map(str, table["value"]))),
+            load_words(best["load"], loads),
         ),
         Headline(
             "resonance amplitude there",
@@ -95,6 +96,34 @@ def _report(
         {"response/side_by_side": folder / "study.png"},
         page=Page(numbers=numbers, stem="report_study", subject=f"study of {name}"),
     )
+
+
+def place_of_value(best: str, values: Sequence[str]) -> str:
+    """How many values were studied, and whether the best is at an end of them.
+
+    >>> place_of_value("50 deg", ["40 deg", "50 deg", "60 deg"])
+    'best of 3 values'
+    >>> place_of_value("60 deg", ["40 deg", "50 deg", "60 deg"])
+    'best of 3 values, the last: better ones may lie beyond'
+    """
+    words = f"best of {len(values)} values"
+    # words such as "coupled" have no order
+    ordered = all(value.lstrip("+-.")[:1].isdigit() for value in values)
+    if not ordered or len(values) < 2 or best not in (values[0], values[-1]):
+        return words
+    end = "first" if best == values[0] else "last"
+    return f"{words}, the {end}: better ones may lie beyond"
+
+
+def load_words(load: float, loads: pd.DataFrame) -> str:
+    """The load of a best value, and whether it is at an end of those studied."""
+    damped = loads["load"][(loads["load"] > 0) & np.isfinite(loads["load"])]
+    words = f"with {load:.4g} N on each seat"
+    if load == damped.min():
+        return f"{words}, the smallest load studied: a smaller one may do better"
+    if load == damped.max():
+        return f"{words}, the largest load studied: a larger one may do better"
+    return words
 
 
 def study_tables(name: str, variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFrame]:

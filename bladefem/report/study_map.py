@@ -11,7 +11,7 @@ import pandas as pd
 from ..scene.tables import Scene
 from ..view.study_map import draw_band, draw_map
 from .headlines import Headline
-from .study import Variant, study_tables
+from .study import Variant, load_words, place_of_value, study_tables
 from .tables import write_tables
 from .write import Page, write_report
 
@@ -43,7 +43,7 @@ def write_map(
     draw_map(amplitude.reshape(shape), load.reshape(shape), values, names, picture)
     top = best.loc[best["peak_amplitude"].idxmin()]
     numbers = [
-        Headline(f"best {name}", str(top[name]), f"of {len(one)} values", "")
+        Headline(f"best {name}", str(top[name]), place_of_value(str(top[name]), one), "")
         for name, one in zip(names, values, strict=True)
     ]
     numbers.append(
@@ -51,11 +51,13 @@ def write_map(
             "resonance amplitude there",
             f"{1e6 * top['peak_amplitude']:.4g} µm",
             _error_of(top),
-            f"with {top['load']:.4g} N on each seat",
+            load_words(top["load"], loads),
         )
     )
     subject = f"study of {' and '.join(names)}"
-    pages = _page(variants[0].scene, best, loads, picture, numbers, subject, folder)
+    pages = _page(
+        variants[0].scene, best, loads, picture, numbers, subject, folder, "response/study_map"
+    )
     return best, [*files, picture, *pages]
 
 
@@ -91,7 +93,9 @@ def write_scatter(
         ),
     ]
     subject = f"scatter of {', '.join(names)}"
-    pages = _page(variants[0].scene, best, band, picture, numbers, subject, folder)
+    pages = _page(
+        variants[0].scene, best, band, picture, numbers, subject, folder, "response/study_band"
+    )
     return band, [*files, picture, *pages]
 
 
@@ -139,6 +143,7 @@ def _page(
     numbers: list[Headline],
     subject: str,
     folder: Path,
+    figure: str,
 ) -> tuple[Path, Path]:
     tables = {
         "response/best_load_of_each_value": best.drop(columns=UNPRINTED, errors="ignore"),
@@ -148,6 +153,6 @@ def _page(
         folder,
         scene,
         tables,
-        {"response/side_by_side": picture},
+        {figure: picture},
         page=Page(numbers=numbers, stem="report_study", subject=subject),
     )

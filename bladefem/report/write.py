@@ -54,6 +54,8 @@ BROAD_PICTURE = 1.7
 LEAD_FIGURES = (
     "response/forced_response",
     "response/side_by_side",
+    "response/study_map",
+    "response/study_band",
     "response/accuracy",
     "response/loops",
     "contact/pressure_on_both_seats",

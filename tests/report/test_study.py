@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bladefem.report.study import Variant, study_tables, write_study
+from bladefem.report.study_map import write_map
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 
@@ -72,3 +73,22 @@ def test_best_load_of_each_value(field, texts, number, tmp_path):
         "report_study.md",
     ]
     assert all(f.stat().st_size > 100 for f in files)
+    page = files[-1].read_text(encoding="utf-8")
+    beyond = "best of 2 values, the last: better ones may lie beyond" in page
+    assert beyond == (number is not None)
+    assert "with 20 N on each seat, the smallest load studied" in page
+
+
+def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
+    names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3", "0.4"))
+    variants = [
+        Variant(f"{a}; {m}", Scene(), response(5e-5, (3 - (m == "0.3")) * 1e-5, 6e-5))
+        for a in values[0]
+        for m in values[1]
+    ]
+    _, files = write_map(names, values, variants, tmp_path)
+    page = files[-1].read_text(encoding="utf-8")
+    assert "over the values of both fields" in page
+    assert "best damper.angle: **30 deg**, best of 2 values, the first" in page
+    assert "best contact.mu: **0.3**, best of 3 values\n" in page
+    assert "with 40 N on each seat)" in page
