@@ -18,7 +18,8 @@ from bladefem.fem.memory import (
     storage_remark,
 )
 from bladefem.fem.modes import modes
-from bladefem.scene.tables import Material
+from bladefem.scene.tables import Material, Scene
+from bladefem.study.pipeline.stages import Bodies
 
 
 @pytest.mark.parametrize(
@@ -93,3 +94,15 @@ def test_a_full_disk_is_named(monkeypatch, tmp_path):
     monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path / "missing"))
     with pytest.raises(InputError, match=r"GB on disk, 0\.0 GB are free in .*missing"):
         check_memory(100_000, MPI.COMM_SELF, free=between_the_ways(100_000))
+
+
+def test_a_run_says_that_factors_are_on_disk(monkeypatch, tmp_path):
+    """Of bodies that were assembled; without, there is nothing to say."""
+    monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
+    mesh = sector(8, (5, 3, 2), bump=0.2)
+    dofs = 3 * len(np.unique(mesh.bodies["blade"]))
+    bodies = Bodies(Scene(), mesh, MPI.COMM_SELF)
+    monkeypatch.setattr(memory, "available_memory", lambda: between_the_ways(dofs))
+    assert not bodies.storage_remarks
+    assert bodies.still_blade.plan.on_disk
+    assert str(tmp_path) in bodies.storage_remarks[0]

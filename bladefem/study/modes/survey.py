@@ -89,8 +89,6 @@ def survey_modes(
     Raises:
         InputError, NotSolvedError: from the stages.
     """
-    from ...fem.memory import storage_remark
-
     other = None if wanted.other is None else on_root(comm, partial(_read_other, wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     check_blade(scene, start.mesh)
@@ -105,7 +103,7 @@ def survey_modes(
     messages = [*start.messages, *([] if before is None else [found_remark("modes", before)])]
     messages += rigid_mode_remarks(sets)
     run = ModalRun(**{**vars(start), "messages": messages}, modes=sets)
-    run.messages.extend(storage_remark(bodies.still_blade.plan))
+    run.messages.extend(bodies.storage_remarks)
     clock = _stage_seconds(run, "modes", clock)
     result = Survey(
         run, bodies, effective_masses(sets, bodies.still_blade), clamped=clamped_blade(bodies)

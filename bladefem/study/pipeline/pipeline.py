@@ -167,6 +167,7 @@ def _run_modes(
     with keep.clock("modes"):
         modes = keep("modes", key, lambda: find_modes(bodies, reduced=reduced))
         clamped = keep("clamped", key, lambda: on_one_rank(bodies, clamped_blade))
+    keep.clock.messages.extend(bodies.storage_remarks)
     return ModalRun(**vars(before), modes=modes, clamped=clamped)
 
 

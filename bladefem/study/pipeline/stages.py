@@ -138,6 +138,14 @@ class Bodies:
         springs = [AreaSpring(*spring) for spring in area_springs(support)]
         return supported(body, support.clamp, springs, held_letters(support))
 
+    @property
+    def storage_remarks(self) -> list[str]:
+        """What there is to say of where factors are kept; nothing where no blade was assembled."""
+        from ...fem.memory import storage_remark
+
+        body = vars(self).get("still_blade")
+        return [] if body is None else storage_remark(body.plan)
+
     @cached_property
     def blade(self) -> Body:
         """The blade, with the stiffness that it has under rotation and heat."""
