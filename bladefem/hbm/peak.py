@@ -94,13 +94,8 @@ def find_peak(
         if near_enough and not start.converged and best is not None:
             return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
         frequency = start.frequency
-        if not start.converged:
-            raise NotSolvedError(f"peak search stopped at {start.frequency:.6g} Hz: {start.reason}")
+        _require_motion(start, options.probe)
         omega = start.omega
-        if size(start, options.probe) == 0:
-            raise NotSolvedError(
-                f"peak search at {start.frequency:.6g} Hz: probe {options.probe} does not move"
-            )
         now = _Look(start, size(start, options.probe), _slope(model, start, options.probe))
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
@@ -123,6 +118,16 @@ def find_peak(
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _require_motion(point: Solution, probe: int) -> None:
+    """The point was solved, and the probe moves there."""
+    if not point.converged:
+        raise NotSolvedError(f"peak search stopped at {point.frequency:.6g} Hz: {point.reason}")
+    if size(point, probe) == 0:
+        raise NotSolvedError(
+            f"peak search at {point.frequency:.6g} Hz: probe {probe} does not move"
+        )
 
 
 def _solved_near(

@@ -141,6 +141,23 @@ def test_what_is_too_large_with_all_points_is_judged_with_twice_as_many(monkeypa
     assert found == (settings, replace(settings, points=16), 2.0)
 
 
+def test_more_harmonics_start_from_the_peak_that_judged_them():
+    """It is nearer than the peak that was judged; other respects start from that one."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    settings = replace(first_for(family.modes), harmonics=3, samples=128)
+    peak = peak_with(16)
+    judge = peak_with(16, 1.2)
+    errors = resonance_choice.PeakErrors({}, {}, better={"harmonics": judge})
+    ahead = resonance_choice._solution_ahead
+    richer = replace(settings, harmonics=15)
+    base, point = ahead(family, settings, peak, errors, richer)
+    assert base.harmonics == 7 and point is judge.solution
+    more_points = replace(settings, points=8)
+    assert ahead(family, settings, peak, errors, more_points) == (settings, peak.solution)
+    unknown = resonance_choice.PeakErrors({}, {})
+    assert ahead(family, settings, peak, unknown, richer) == (settings, peak.solution)
+
+
 def test_a_damper_that_comes_off_is_tried_with_several_points_and_harmonics():
     first = first_for(10)
     start = resonance_choice.settings_of_lift_off(first)

@@ -268,9 +268,9 @@ def choose_at_peak(
     negligible not judged again, nor one that could not be judged where contacts lift off. There
     refining ends once it does not halve an error that is far beyond the accuracy, unless there are
     few contact points; what is left of it then in the richer model the poorer one has as well.
-    Harmonics that are missing come first there: with few of them more contact points lead away from
-    the truth (36 N on the shipped wedge: 440 um with 7 harmonics and 4 points, 452 with 31; 909
-    with 3 and 16 points).
+    Harmonics that are missing come first there, several at once, and where most contacts lift off:
+    with few of them more contact points lead away from the truth (36 N on the shipped wedge: 440 um
+    with 7 harmonics and 4 points, 452 with 31; 909 with 3 and 16 points).
 
     Args:
         peak: found with `settings`.
@@ -301,17 +301,41 @@ def choose_at_peak(
         }
         if sum(errors.needs.values()) <= sufficient * accuracy:
             break
-        missing = errors.needs["harmonics"] > SUFFICIENT_SHARE * accuracy
-        first = "harmonics" if far and missing else ""
+        hard = far or 2 * peak.solution.states["lift"] >= len(peak.solution.w)
+        first = _harmonics_first(errors, accuracy) if hard else ""
         better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
         if better is None:
             break
+        base, point = _solution_ahead(family, settings, peak, errors, better)
         try:
-            peak = peak_from(family, settings, peak.solution, better, accuracy, fallbacks=not far)
+            peak = peak_from(family, base, point, better, accuracy, fallbacks=not hard)
         except NotSolvedError:
             break
         settings = better
     return settings, peak, errors
+
+
+def _harmonics_first(errors: PeakErrors, accuracy: float) -> str:
+    """The name of the harmonics where they are missing, else none."""
+    return "harmonics" if errors.needs["harmonics"] > SUFFICIENT_SHARE * accuracy else ""
+
+
+def _solution_ahead(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    errors: PeakErrors,
+    better: Settings,
+) -> tuple[Settings, Solution]:
+    """Where the search for the peak of a better model starts: at the peak that judged the harmonics
+    where it has more of them, which is nearer; else at the peak itself.
+    """
+    ahead = errors.better.get("harmonics")
+    judge = judge_settings(family, settings, "harmonics", peak.solution)
+    if ahead is None or judge is None or better.harmonics <= settings.harmonics:
+        return settings, peak.solution
+    pair = compared_settings(family, settings, judge, "harmonics", peak.solution)
+    return (settings, peak.solution) if pair is None else (pair[1], ahead.solution)
 
 
 def _with_harmonics_of_lift_off(
