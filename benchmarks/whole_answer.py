@@ -1,0 +1,556 @@
+"""From drawing the mesh to the design curve: total CPU time against the strictest error, for the
+shipped scenes that have a response.
+
+    python benchmarks/whole_answer.py [scenes ...] [--budget 60] [--coarse 1] [--least 0] [--draw]
+
+Each way of getting the answer of a scene is timed as a whole, in CPU seconds of one process without
+compilation: drawing, seating under every load, reduction, the search for settings where there is
+one, and the response under every load. Three errors of each load are taken against the same loads
+on a finer mesh, with more harmonics, all contact points and modes, and the elastic damper:
+
+- resonance amplitude,
+- resonance frequency,
+- the worst phasor of eleven frequencies within three half widths of the resonance, over the highest
+  one. Each way is asked at the same distances from its own resonance, so that a shift of the
+  frequency counts once, as an error of the frequency.
+
+The largest of the three, of the worst load, is the error of the whole answer. Ways: the automatic
+choice on meshes from coarse to the scene's own (the star); the same mesh with given harmonics,
+contact points, modes and damper model; the paper's loop (Eq. 34 by amplitude, stopped by Eq. 35),
+with one equivalent stiffness for each contact and direction, so that it takes contacts in 3-D as
+well.
+
+The judge in time knows no harmonics: the reduced model with four contact points on a seat is
+marched for 100 periods from its own resonance (`bladefem.hbm.ring_march`: bodies exactly, friction
+step by step), all blades of a travelling wave free, and its last period is compared.
+
+Files: docs/figures/answer_SCENE.csv (ways), answer_SCENE_loads.csv (ways by loads),
+answer_SCENE.txt (what to paste into the scene), answer_SCENE.png. --draw makes the picture and the
+text from the tables again; --coarse makes all elements larger, the scene's own and those of the
+truth, --least leaves out the loads below it; the tables show both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from whole_answer_picture import draw_answer, write_advice, write_table
+
+from bladefem.damper.accelerate import Rules
+from bladefem.errors import InputError, NotSolvedError
+from bladefem.friction.aft import evaluate
+from bladefem.friction.fourier import to_complex, to_real
+from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.ring_march import march_ring
+from bladefem.hbm.solution import Solution, probe_motion
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import Options
+from bladefem.hbm.sweep import size
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.check_points import peak_of
+from bladefem.study.adaptive.choice import covered_band, default_band, solver_options
+from bladefem.study.adaptive.family import Family, family_member
+from bladefem.study.adaptive.indicators import moved_solution
+from bladefem.study.adaptive.settings import Settings, restarted_settings, scene_line
+from bladefem.study.chart.cpu_clock import Clock, running_clock
+from bladefem.study.chart.rows import parabola_resonance
+from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
+from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.seated_loads import seat_every_load
+from bladefem.study.pipeline.stability import model_in_time
+from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
+from bladefem.study.pipeline.stages import Bodies, build_mesh, contact_patches
+
+ROOT = Path(__file__).parents[1]
+FIGURES = ROOT / "docs" / "figures"
+# element sizes over the scene's own; the last is that of the truth
+SCALES = (1.5, 1.0)
+# of the truth, and its harmonics
+FINEST = {"plane": (0.8, 7)}
+FINEST_OTHERS = (0.85, 7)
+# frequencies of the phasors, in half widths of the resonance; accuracy of their balance
+FREQUENCIES_IN_HALF_WIDTHS = (-3, -1.5, -0.7, -0.3, -0.1, 0, 0.1, 0.3, 0.7, 1.5, 3)
+ASKED_ACCURACY = 1e-3
+# periods and contact points of the judge in time
+JUDGED_PERIODS = 100
+JUDGED_POINTS = 4
+# first look of the paper's loop, and its further ones round the highest point
+LOOP_FREQUENCIES = 40
+LOOP_ZOOMS = 3
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene on one mesh, reduced, with its loads."""
+
+    scene: Scene
+    settings: Settings
+    # [N]
+    loads: list[float]
+    cases: list
+    families: list[Family]
+    # of mesh, seating and reduction; of the search for modes and damper model [s]
+    seconds: float
+    search: float
+    dofs: int
+
+    @property
+    def richest(self) -> Settings:
+        """All modes and points, the most elastic damper."""
+        dampers = self.families[0].dampers
+        return replace(
+            self.settings,
+            modes=self.families[0].modes,
+            points=None,
+            damper=dampers[-1] if dampers else "rigid",
+        )
+
+
+def prepare(scene: Scene, scale: float, clock: Clock) -> Prepared:
+    """Mesh, seats and reduction of a scene whose elements are scaled."""
+    scene = replace(
+        scene,
+        mesh=replace(scene.mesh, scale=scene.mesh.scale * scale),
+        study=replace(scene.study, stability=False, influences=False),
+    )
+    begun = clock.now()
+    mesh = build_mesh(scene)
+    bodies = Bodies(scene, mesh)
+    patches = contact_patches(mesh)
+    stages = StageClock({}, [])
+    seating = seat_every_load(scene, bodies, patches, StageRunner(None, None, stages), stages)
+    cases = load_cases(scene, mesh, seating)
+    reducing = []
+
+    def keep(name: str, key: str, make: Callable) -> object:
+        start = clock.now()
+        made = make()
+        reducing.append(clock.now() - start)
+        return made
+
+    start = clock.now()
+    settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], patches, keep)
+    search = clock.now() - start - sum(reducing)
+    families = [family_of_case(scene, mesh, reduced, patches, case) for case in cases]
+    return Prepared(
+        scene,
+        settings,
+        [case.load for case in cases],
+        cases,
+        families,
+        clock.now() - begun - search,
+        search,
+        mesh.dimension * len(mesh.points),
+    )
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The resonance under one load, and how to ask for the response at another frequency."""
+
+    # root of the sum of squares of the harmonics [m]
+    amplitude: float
+    # [Hz]
+    frequency: float
+    # (k,) omega [rad/s] -> (k,) first harmonics at the probe [m] and (k,) heights [m]
+    ask: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
+    # estimated relative error, where there is one
+    estimate: float = np.nan
+    # what was used, where it was chosen
+    settings: Settings | None = None
+    peak: Solution | None = None
+
+
+def asked_options() -> Options:
+    """What is lost is left out: where contacts lift off, motions end."""
+    return replace(solver_options(ASKED_ACCURACY), fallbacks=False)
+
+
+def asking(model: ReducedModel, settings: Settings, top: Solution) -> Callable:
+    """First harmonics, and roots of the sum of squares, by the balance, from the peak outwards on
+    either side; NaN where it was not solved.
+    """
+
+    def ask(omegas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        found = {}
+        for side in (omegas >= top.omega, omegas < top.omega):
+            last = top
+            for omega in sorted(omegas[side], key=lambda w: abs(w - top.omega)):
+                point = solve(
+                    model,
+                    omega,
+                    settings.harmonics,
+                    settings.samples,
+                    start=last,
+                    options=asked_options(),
+                )
+                last = point if point.converged else last
+                lost = np.nan, np.nan
+                found[omega] = (point.probe[1, 0], size(point)) if point.converged else lost
+        phasors, heights = zip(*(found[omega] for omega in omegas), strict=True)
+        return np.array(phasors), np.array(heights)
+
+    return ask
+
+
+def by_choice(known: Prepared, k: int) -> Answer:
+    """The automatic choice, as a run makes it."""
+    start = restarted_settings(known.settings)
+    case, family = known.cases[k], known.families[k]
+    curve = curve_of(known.scene, case, lambda _: family, start)
+    s = curve.settings
+    model = family_member(family, s).model
+    told = np.nan if curve.error is None else curve.error
+    ask = asking(model, s, curve.peak)
+    return Answer(curve.peak_amplitude, curve.peak_frequency, ask, told, s, curve.peak)
+
+
+def by_settings(settings: Settings, known: Prepared, k: int) -> Answer:
+    """A sweep with given settings."""
+    scene = known.scene
+    model = family_member(known.families[k], settings).model
+    points = covered_band(model, settings, scene.study.band, scene.excitation.mode, scene.accuracy)
+    top = peak_of(points)
+    return Answer(size(top), top.frequency, asking(model, settings, top))
+
+
+def by_loop(known: Prepared, k: int) -> Answer:
+    """The paper's loop, its resonance looked for on ever narrower grids."""
+    model = family_member(known.families[k], replace(known.richest, harmonics=1)).model
+    low, high = known.scene.study.band or default_band(model, known.scene.excitation.mode)
+    found: dict[float, complex] = {}
+    grid = np.linspace(low, high, LOOP_FREQUENCIES)
+    for _ in range(1 + LOOP_ZOOMS):
+        for f in grid:
+            value = paper_loop(model, 2 * np.pi * f)
+            if np.isfinite(value):
+                found[f] = value
+        if not found:
+            raise NotSolvedError("the loop did not stop at any frequency")
+        best = max(found, key=lambda f: abs(found[f]))
+        span = (grid[1] - grid[0]) * 0.8
+        grid = np.linspace(best - span, best + span, 8)
+    places = np.array(sorted(found))
+    top = parabola_resonance(2 * np.pi * places, np.array([found[f] for f in places]))
+
+    def ask(omegas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values = np.array([paper_loop(model, omega) for omega in omegas])
+        return values, abs(values)
+
+    return Answer(top.amplitude, top.frequency, ask)
+
+
+def paper_loop(model: ReducedModel, omega: float) -> complex:
+    """First harmonic at the probe by Eq. 34, by amplitude with the phases of the image; NaN where
+    Eq. 35 is not met.
+    """
+    rules = Rules()
+    linear = condense(model, omega, 1)
+    free, G = linear.free[1], linear.G[1]
+    e = model.elements
+    n = len(e.kt)
+    forces = np.zeros(len(free), dtype=complex)
+
+    def image(w: np.ndarray) -> np.ndarray:
+        motion = to_real(np.stack([0 * w, w], axis=1)).reshape(n, -1, 3)
+        forces[:] = to_complex(evaluate(e, motion, 512, jacobian=False).f).reshape(-1, 2)[:, 1]
+        stiffness = np.where(abs(w) > 0, forces / np.where(abs(w) > 0, w, 1.0), 0.0)
+        return np.linalg.solve(np.eye(len(w)) + G * stiffness, free)
+
+    w, before = free, None
+    g = image(w)
+    for _ in range(rules.most):
+        new = g if before is None else _secant(w, before[0], g, before[1])
+        step = np.linalg.norm(new - w) / np.linalg.norm(new)
+        if not np.isfinite(step):
+            return np.nan
+        before = w, g
+        w, g = new, image(new)
+        if step < rules.tolerance:
+            both = np.stack([0 * forces, forces])
+            return complex(probe_motion(model, omega, both, np.zeros(linear.B.shape[1]))[1, 0])
+    return np.nan
+
+
+def _secant(w1: np.ndarray, w0: np.ndarray, g1: np.ndarray, g0: np.ndarray) -> np.ndarray:
+    """Eq. 34 on amplitudes."""
+    a1, a0, b1, b0 = (abs(x) for x in (w1, w0, g1, g0))
+    below = b1 - a1 - b0 + a0
+    safe = np.where(below != 0, below, 1.0)
+    return abs(np.where(below != 0, (b1 * a0 - b0 * a1) / safe, b1)) * np.exp(1j * np.angle(g1))
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The resonance under one load, and the response round it."""
+
+    amplitude: float
+    frequency: float
+    # (k,) frequencies over that of the resonance
+    ratios: np.ndarray
+    # (k,) first harmonics at the probe [m]
+    phasors: np.ndarray
+
+
+def truth_of(known: Prepared, k: int, harmonics: int) -> Truth:
+    """The highest peak of the automatic choice, carried to all that was reduced; the resonance is
+    the vertex of a parabola through the highest points.
+
+    Raises:
+        NotSolvedError: the peak was lost on the way.
+    """
+    family = known.families[k]
+    case = known.cases[k]
+    curve = curve_of(known.scene, case, lambda _: family, restarted_settings(known.settings))
+    samples = max(512, 32 * (harmonics + 1))
+    s = replace(known.richest, harmonics=harmonics, samples=samples)
+    model = family_member(family, s).model
+    top = moved_solution(family, curve.settings, curve.peak, s, asked_options())
+    if not top.converged:
+        raise NotSolvedError(f"{case.load:g} N: the peak was lost in the richer model")
+    high = 2 * np.pi * curve.frequency[curve.amplitude > curve.peak_amplitude / np.sqrt(2)]
+    half = max(np.ptp(high) / 2, 1e-4 * top.omega)
+    places = top.omega + half * np.array(FREQUENCIES_IN_HALF_WIDTHS)
+    phasors, heights = asking(model, s, top)(places)
+    good = np.isfinite(heights)
+    peak = parabola_resonance(places[good], heights[good])
+    return Truth(peak.amplitude, peak.frequency, places / (2 * np.pi * peak.frequency), phasors)
+
+
+def errors_of(answer: Answer, truth: Truth) -> dict[str, float]:
+    """Relative errors of one load."""
+    omega = 2 * np.pi * answer.frequency
+    found, _ = answer.ask(omega * truth.ratios)
+    scale = np.nanmax(abs(truth.phasors))
+    apart = abs(found - truth.phasors) / scale
+    return {
+        "error_amplitude": abs(answer.amplitude / truth.amplitude - 1),
+        "error_frequency": abs(answer.frequency / truth.frequency - 1),
+        "error_phasor": float(np.nanmax(apart)) if np.isfinite(apart).any() else np.nan,
+    }
+
+
+def judged(known: Prepared, k: int, answer: Answer) -> float:
+    """Relative difference of a march from the balance of seven harmonics that it starts from; NaN
+    where there is no such march.
+    """
+    s = replace(known.richest, points=JUDGED_POINTS, harmonics=7, samples=512, damper="rigid")
+    model = model_in_time(known.families[k], s)
+    try:
+        moved = moved_solution(known.families[k], answer.settings, answer.peak, s)
+        top = solve(model, moved.omega, 7, 512, start=moved)
+        if not top.converged:
+            return np.nan
+        march = march_ring(model, top, 1e-3, JUDGED_PERIODS)
+    except (InputError, NotSolvedError):
+        return np.nan
+    lines = 2 / march.motion.shape[-1] * np.fft.rfft(march.motion[-1], axis=-1)
+    heights = np.linalg.norm(lines[..., 1 : top.harmonics + 1], axis=-1)
+    return float(np.max(abs(heights / size(top) - 1))) if march.settled else np.nan
+
+
+def ways(known: Prepared) -> Iterator[tuple[str, str, Callable[[Prepared, int], Answer]]]:
+    """Name, family and function of each way on the scene's own mesh."""
+    rich = replace(known.richest, harmonics=3, samples=256)
+    yield "automatic", "automatic choice", by_choice
+    for H in (1, 3, 7):
+        s = replace(rich, harmonics=H, samples=max(256, 32 * (H + 1)))
+        yield f"H {H}", "harmonics", partial(by_settings, s)
+    for points in (4, 16):
+        s = replace(rich, points=points)
+        yield f"{points} points a seat", "contact points", partial(by_settings, s)
+    for modes in (1, 2):
+        yield (
+            f"{modes} mode" + "s" * (modes > 1),
+            "modes",
+            partial(by_settings, replace(rich, modes=modes)),
+        )
+    if "rigid" in known.families[0].dampers and rich.damper != "rigid":
+        yield "rigid damper", "damper model", partial(by_settings, replace(rich, damper="rigid"))
+    yield "paper's loop", "paper's loop", by_loop
+
+
+class OutOfTime(BaseException):
+    """No library catches it."""
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """Ends the block by OutOfTime after some CPU seconds."""
+
+    def stop(*_: object) -> None:
+        raise OutOfTime
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, 0.0 if np.isinf(seconds) else max(seconds, 1e-3))
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+ERRORS = ("error_amplitude", "error_frequency", "error_phasor")
+
+
+class Table:
+    """Rows of ways and of loads, as they are found."""
+
+    def __init__(
+        self, truths: list[Truth | None], budget: float, clock: Clock, coarse: float
+    ) -> None:
+        self.coarse = coarse
+        self.truths = truths
+        self.budget = budget
+        self.clock = clock
+        self.rows: list[dict] = []
+        self.loads: list[dict] = []
+        # the judge in time, by load
+        self.march: dict[float, float] = {}
+
+    def add(self, name: str, family: str, known: Prepared, scale: float, way: Callable) -> None:
+        """Solve all loads in one way; it is left out where that would take more than the budget."""
+        chosen = family in ("automatic choice", "mesh")
+        spent = known.seconds + (known.search if chosen else 0.0)
+        found, used = [], 0.0
+        reason = ""
+        for k, load in enumerate(known.loads):
+            begun = self.clock.now()
+            try:
+                with limited(np.inf if chosen else self.budget - used):
+                    answer = way(known, k)
+            except NotSolvedError as error:
+                reason = f"{load:g} N: {error}"
+                break
+            except (OutOfTime, SystemError):
+                # numba reports the first as the second
+                reason = (
+                    f"left out: {self.budget:g} s were used up at {load:g} N, load {k + 1} of "
+                    f"{len(known.loads)}"
+                )
+                break
+            used += self.clock.now() - begun
+            if name == "automatic":
+                self.march[load] = judged(known, k, answer)
+            truth = self.truths[k]
+            errors = dict.fromkeys(ERRORS, np.nan) if truth is None else errors_of(answer, truth)
+            own = {"name": name, "load": load, **errors, "estimate": answer.estimate}
+            own |= {"amplitude": answer.amplitude, "frequency": answer.frequency}
+            if answer.settings is not None:
+                s = answer.settings
+                own |= {"harmonics": s.harmonics, "points": s.points or 0, "damper": s.damper}
+            found.append(own)
+        self.loads += found
+        row = {"name": name, "family": family, "scale": scale, "dofs": known.dofs}
+        row |= {"time": spent + used, "response": used, "reason": reason}
+        of_loads = pd.DataFrame(found, columns=["load", *ERRORS])
+        for column in ERRORS:
+            row[column] = np.nan if reason else of_loads[column].max()
+        worst = of_loads[list(ERRORS)].max(axis=1)
+        row["error"] = np.nan if reason else worst.max()
+        row["median"] = np.nan if reason else worst.median()
+        row["chosen"] = name == "automatic"
+        row["converged"] = not reason
+        row["settings"] = _pasted(way) if not reason else ""
+        self.rows.append(row)
+        print(name, {k: v for k, v in row.items() if k not in ("name", "settings")}, flush=True)
+
+    def write(self, name: str, scale: float, harmonics: int) -> None:
+        """Both tables of a scene, as far as they are."""
+        rows = pd.DataFrame(self.rows).assign(
+            truth_scale=scale, truth_harmonics=harmonics, coarse=self.coarse
+        )
+        loads = pd.DataFrame(self.loads)
+        loads["judge"] = loads["load"].map(self.march).where(loads["name"] == "automatic")
+        rows.to_csv(FIGURES / f"answer_{name}.csv", index=False, float_format="%.5g")
+        loads.to_csv(FIGURES / f"answer_{name}_loads.csv", index=False, float_format="%.6g")
+
+
+def _pasted(way: Callable) -> str:
+    """The line of a scene that makes a run do the same; empty for a choice or a loop."""
+    if not isinstance(way, partial):
+        return ""
+    return scene_line(way.args[0])
+
+
+def measure(path: Path, budget: float, coarse: float, least: float) -> None:
+    """Tables of one scene; ``coarse`` times as large are all elements, loads below ``least`` [N]
+    are left out.
+    """
+    scene = load_scene(path)
+    loads = tuple(load for load in scene.study.loads if load >= least)
+    scene = replace(scene, study=replace(scene.study, loads=loads))
+    scene = replace(scene, mesh=replace(scene.mesh, scale=scene.mesh.scale * coarse))
+    name = path.stem
+    scale, harmonics = FINEST.get(name, FINEST_OTHERS)
+    with running_clock() as clock:
+        finest = prepare(_open(scene), scale, clock)
+        print(name, "truth:", finest.dofs, "dofs", f"{finest.seconds:.1f} s", flush=True)
+        truths = []
+        for k, load in enumerate(finest.loads):
+            begun = clock.now()
+            try:
+                truths.append(truth_of(finest, k, harmonics))
+            except NotSolvedError as error:
+                truths.append(None)
+                print(f"  {error}", flush=True)
+                continue
+            print(
+                f"  {load:g} N: {truths[-1].frequency:.3f} Hz, {1e6 * truths[-1].amplitude:.2f} um"
+                f" in {clock.now() - begun:.1f} s",
+                flush=True,
+            )
+        del finest
+        table = Table(truths, budget, clock, coarse)
+        own = prepare(scene, 1.0, clock)
+        for way in ways(own):
+            table.add(*way[:2], own, 1.0, way[2])
+            table.write(name, scale, harmonics)
+        del own
+        for ratio in SCALES[:-1]:
+            larger = prepare(scene, ratio, clock)
+            table.add(f"elements x {ratio:g}", "mesh", larger, ratio, by_choice)
+            table.write(name, scale, harmonics)
+
+
+def _open(scene: Scene) -> Scene:
+    """Without the settings that the scene gives: the truth takes the richest."""
+    return replace(
+        scene,
+        contact=replace(scene.contact, points=None),
+        model=replace(scene.model, modes=None, harmonics=None, samples=None, damper=None),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scenes", nargs="*", default=["plane", "wedge", "own_blade", "mistuned"])
+    parser.add_argument("--budget", type=float, default=60.0)
+    parser.add_argument("--coarse", type=float, default=1.0)
+    parser.add_argument("--least", type=float, default=0.0)
+    parser.add_argument("--draw", action="store_true")
+    options = parser.parse_args()
+    for name in options.scenes:
+        path = ROOT / "scenes" / f"{name}.toml"
+        if not options.draw:
+            measure(path, options.budget, options.coarse, options.least)
+        scene = load_scene(path)
+        rows = pd.read_csv(FIGURES / f"answer_{name}.csv")
+        loads = pd.read_csv(FIGURES / f"answer_{name}_loads.csv")
+        write_advice(rows, loads, scene.accuracy, FIGURES / f"answer_{name}.txt")
+        write_table(name, rows, ROOT / "docs" / "accuracy.md")
+        draw_answer(rows, scene.accuracy, scene.title, FIGURES / f"answer_{name}.png")
+
+
+if __name__ == "__main__":
+    main()
