@@ -369,7 +369,8 @@ def ways(known: Prepared) -> Iterator[tuple[str, str, Callable[[Prepared, int], 
     for points in (4, 16):
         s = replace(rich, points=points)
         yield f"{points} points a seat", "contact points", partial(by_settings, s)
-    for modes in (1, 2):
+    studied = known.scene.excitation.mode
+    for modes in (studied, studied + 1):
         yield (
             f"{modes} mode" + "s" * (modes > 1),
             "modes",
