@@ -94,15 +94,8 @@ def read_step(
         named = _apply_names(_named_entities(gmsh, text), read_names(names))
         if fitted is not None:
             on = axis_rotation(unit, 2 * np.pi / sectors)
-            named = fit_wedge(
-                gmsh,
-                named,
-                fitted.seats,
-                fitted.wedge,
-                fitted.seat_width,
-                on,
-                unit,
-            )
+            seats = fitted.seats, fitted.wedge, fitted.seat_width
+            named = fit_wedge(gmsh, named, *seats, on, unit)
         named |= _find_faces(gmsh, named, sectors, unit)
         _tie_faces(gmsh, named, sectors, unit)
         contact = [

@@ -15,8 +15,10 @@ from .memory import available_memory, modal_solve_memory
 Result = TypeVar("Result")
 # more ranks on one sector have ever less to do between two exchanges
 MAX_RANKS_PER_SECTOR = 4
-# degrees of freedom of a rank from which its share of a sector pays
-MIN_DOFS_PER_RANK = 10_000
+# degrees of freedom of a rank from which its share of a sector pays: on the shipped wedge (78 000)
+# two ranks that share it take as long for the modes as two that share out its nodal diameters, and
+# the stresses take twice as long, as no rank has the whole sector's factors then
+MIN_DOFS_PER_RANK = 40_000
 # tasks of a group up to which none of them helps another
 MAX_UNGROUPED_TASKS = 3
 # share of the free memory that groups may fill

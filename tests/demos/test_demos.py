@@ -18,7 +18,8 @@ PINNED = {
     "blade_modes": 350.59387576,
     "sector_modes": 376.74562852,
     "damper_seating": 1.0,
-    "forced_response": 172.94394299,
+    # 172.94 with the points of a seat in one row, which let the damper roll
+    "forced_response": 180.21375601,
     "change_geometry": 1.2595481622,
     "plain_matrices": 3.84332830,
     "own_blade": 12.99114303,

@@ -42,7 +42,7 @@ CURVE_OPERATIONS = 1.2e10
 # of solving a point again with more harmonics
 RICHER_OPERATIONS = 5e8
 # points that are judged in addition, as long as the highest one that is not unstable is not judged
-POINTS_JUDGED_IN_ADDITION = 2
+POINTS_JUDGED_IN_ADDITION = 8
 # with which points of one harmonic are judged
 JUDGED_HARMONICS = 7
 JUDGED_SAMPLES = 128
