@@ -51,4 +51,4 @@ def test_groups_grow_where_memory_is_short():
 def test_ranks_share_a_sector_that_is_large_enough():
     comm = MPI.COMM_WORLD
     several = {1: 1, 2: 2, 3: 3, 4: 4}[comm.size]
-    assert group_size(comm, 100_000, free=1e12) == several
+    assert group_size(comm, 200_000, free=1e12) == several
