@@ -24,6 +24,10 @@ if TYPE_CHECKING:
 # runs of one study
 MOST_RUNS = 1000
 
+# The study itself shows what its values do; what else each run depends on costs more than its
+# responses. What the user says comes after it.
+WITHOUT_INFLUENCES = "study.influences=false"
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -197,7 +201,7 @@ def _run_options(
     """The options of one run."""
     one = argparse.Namespace(**vars(options))
     changes = [f"{name}={value}" for name, value in zip(names, values, strict=True)]
-    one.overrides = [*options.overrides, *changes]
+    one.overrides = [WITHOUT_INFLUENCES, *options.overrides, *changes]
     one.output = str(base / ",".join(changes).replace(" ", "").replace("/", "_"))
     return one
 

@@ -276,6 +276,14 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert "| 30 deg | 0.5236 | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
 
 
+def test_a_study_leaves_influences_out_unless_they_are_asked_for(pipeline, tmp_path):
+    command = ["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45 deg"]
+    assert main(command) == 0
+    assert main([*command, "--set", "study.influences=true"]) == 0
+    asked = [scene.study.influences for scene, *_ in pipeline.calls]
+    assert asked == [False, False, True, True]
+
+
 def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
     def behaviour(folder):
         if "45" in Path(folder).name:  # not anywhere in the path: pytest numbers its folders
