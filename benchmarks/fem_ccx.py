@@ -26,7 +26,14 @@ diameters is 9.0 s of processor time (ratio 26.6 against those 240.8 s) where it
 without waiting directions took 11.1 s, run by turns.
 
 All of these are of the block Lanczos iteration without a count of the modes. With SLEPc and the
-count by inertia, bladefem alone on a busy machine (to be held against ccx in one run):
+count by inertia, both sides in one run:
+
+     49 632  5          curved       21.3           3.8    5.7  0.56    1.33   3.4e-07      6.4e-05
+     49 632  0          curved       20.6           3.6    5.7  0.50    1.21   2.4e-07      6.3e-05
+     49 632  0 to 12    curved      302.9           9.4   32.1  0.94    1.98   3.4e-07      6.9e-05
+     49 632  5          straight     25.5           4.4    5.8  0.56    1.34   2.4e-07      9.3e-06
+
+Share of the count, bladefem alone on a busy machine:
 
     dofs     diameters  bladefem [s]  memory [GB]  share of the count in the processor time
      49 632  5                   4.5         0.56  0.15
