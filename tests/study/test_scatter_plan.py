@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 
 from bladefem.cli.main import main
-from bladefem.cli.study import _make_plan, _run_options
+from bladefem.cli.study import WITHOUT_INFLUENCES, _make_plan, _run_options
 from bladefem.errors import InputError
 from bladefem.io.run_folder import borrow_stages
 from bladefem.report.study import Variant
@@ -79,7 +79,7 @@ def test_bad_plans_are_refused(given, said):
 def test_folders_are_named_by_their_values(tmp_path):
     one = _run_options(options(), tmp_path, ["damper.angle", "contact.mu"], ["50 deg", "0.3"])
     assert one.output.endswith("damper.angle=50deg,contact.mu=0.3")
-    assert one.overrides == ["damper.angle=50 deg", "contact.mu=0.3"]
+    assert one.overrides == [WITHOUT_INFLUENCES, "damper.angle=50 deg", "contact.mu=0.3"]
 
 
 def response(*amplitudes):
