@@ -117,13 +117,17 @@ def place_of_value(best: str, values: Sequence[str]) -> str:
 
 def load_words(load: float, loads: pd.DataFrame) -> str:
     """The load of a best value, and whether it is at an end of those studied."""
+    return f"with {load:.4g} N on each seat{end_words(load, loads)}"
+
+
+def end_words(load: float, loads: pd.DataFrame) -> str:
+    """That a load is at an end of those studied, or ""."""
     damped = loads["load"][(loads["load"] > 0) & np.isfinite(loads["load"])]
-    words = f"with {load:.4g} N on each seat"
     if load == damped.min():
-        return f"{words}, the smallest load studied: a smaller one may do better"
+        return ", the smallest load studied: a smaller one may do better"
     if load == damped.max():
-        return f"{words}, the largest load studied: a larger one may do better"
-    return words
+        return ", the largest load studied: a larger one may do better"
+    return ""
 
 
 def study_tables(name: str, variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFrame]:

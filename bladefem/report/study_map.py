@@ -11,7 +11,7 @@ import pandas as pd
 from ..scene.tables import Scene
 from ..view.study_map import draw_band, draw_map
 from .headlines import Headline
-from .study import Variant, load_words, place_of_value, study_tables
+from .study import Variant, end_words, load_words, place_of_value, study_tables
 from .tables import write_tables
 from .write import Page, write_report
 
@@ -81,7 +81,7 @@ def write_scatter(
         Headline(
             "most robust load",
             f"{robust['load']:.4g} N",
-            f"of {len(band)} loads, {len(variants)} samples",
+            f"of {len(band)} loads, {len(variants)} samples{end_words(robust['load'], band)}",
             "smallest amplitude that 90 % of the samples stay below",
         ),
         Headline(

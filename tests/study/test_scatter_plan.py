@@ -156,7 +156,9 @@ def test_band_holds_the_samples(tmp_path):
     assert list(band["amplitude_90"]) == pytest.approx([10e-5, 20e-5])
     assert list(band["smallest"]) == pytest.approx([1e-5, 2e-5])
     assert all(file.is_file() for file in files)
-    assert "most robust load" in (tmp_path / "report_study.html").read_text()
+    page = (tmp_path / "report_study.html").read_text()
+    assert "most robust load" in page
+    assert "of 2 loads, 11 samples, the smallest load studied: a smaller one may do better" in page
 
 
 def test_band_leaves_the_limits_out():
