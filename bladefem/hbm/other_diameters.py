@@ -16,9 +16,14 @@ import numpy as np
 from scipy import linalg
 
 from .flow_map import flow_map
-from .linear.bodies import Stack
 from .model import ReducedModel
-from .sector_modes import SectorModes, blades_of_wave, wave_bodies
+from .sector_modes import (
+    SectorModes,
+    blades_of_wave,
+    circulation_of,
+    damping_in_time,
+    wave_bodies,
+)
 from .solution import Solution
 from .stability import INSTANTS_PER_PERIOD, linearised_contacts
 
@@ -74,8 +79,8 @@ def _class_ring(bodies: ReducedModel, r: int, angle: float) -> SectorModes:
             row = min(j, len(stack.omega) - 1)
             own = stack.omega[row]
             omega.append(own)
-            losses.append(_damping(stack, row))
-            moved.append(_circulation(stack, j))
+            losses.append(damping_in_time(stack, j))
+            moved.append(circulation_of(stack, j))
             turns.append(np.full(len(own), np.exp(-1j * phase)))
             waves = np.exp(1j * phase * blade)[:, None, None] * stack.shapes[row, stack.contact]
             shapes.append(sign * waves.reshape(-1, len(own)) / np.sqrt(r))
@@ -95,25 +100,6 @@ def _class_ring(bodies: ReducedModel, r: int, angle: float) -> SectorModes:
         np.zeros((0, len(contact))),
         _real_form(circulatory) if np.any(circulatory) else None,
     )
-
-
-def _damping(stack: Stack, row: int) -> np.ndarray:
-    """(M, M) viscous damping of one body; structural damping as the viscous one of the same loss at
-    the mode's frequency.
-    """
-    own = stack.omega[row]
-    losses = np.divide(stack.hysteretic[row], own, out=np.zeros_like(own), where=own > 0)
-    matrix = np.diag(stack.viscous[row] + losses)
-    if stack.coupled is not None:
-        return matrix + stack.coupled[min(row, len(stack.coupled) - 1)]
-    return matrix
-
-
-def _circulation(stack: Stack, j: int) -> np.ndarray:
-    """(M, M) forces of the displacements that have no energy."""
-    if stack.circulatory is None:
-        return np.zeros((stack.omega.shape[1],) * 2)
-    return stack.circulatory[min(j, len(stack.circulatory) - 1)]
 
 
 def _handed_on(ring: SectorModes, part: np.ndarray, angle: float) -> np.ndarray:

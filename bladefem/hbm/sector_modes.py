@@ -169,14 +169,8 @@ def _ring(
         if 2 * j > r:
             continue
         own = stack.omega[row]
-        viscous = np.diag(stack.viscous[row]) + np.diag(
-            np.divide(stack.hysteretic[row], own, out=np.zeros_like(own), where=own > 0)
-        )
-        moved = np.zeros((len(own), len(own)))
-        if stack.circulatory is not None:
-            moved = stack.circulatory[min(j, len(stack.circulatory) - 1)]
-        if stack.coupled is not None:
-            viscous = viscous + stack.coupled[min(j, len(stack.coupled) - 1)]
+        viscous = damping_in_time(stack, j)
+        moved = circulation_of(stack, j)
         double = 0 < 2 * j < r
         size = sign * np.sqrt((2 if double else 1) / r)
         phase = np.exp(2j * np.pi * j * blade / r)[:, None, None]
@@ -199,6 +193,26 @@ def _ring(
         _ring_residual(stack, r, stack.probe),
         None if stack.circulatory is None else linalg.block_diag(*turning),
     )
+
+
+def damping_in_time(stack: Stack, harmonic: int) -> np.ndarray:
+    """(M, M) viscous damping of the body of a harmonic; structural damping as the viscous one of
+    the same loss at the mode's frequency.
+    """
+    row = min(harmonic, len(stack.omega) - 1)
+    own = stack.omega[row]
+    losses = np.divide(stack.hysteretic[row], own, out=np.zeros_like(own), where=own > 0)
+    matrix = np.diag(stack.viscous[row] + losses)
+    if stack.coupled is None:
+        return matrix
+    return matrix + stack.coupled[min(harmonic, len(stack.coupled) - 1)]
+
+
+def circulation_of(stack: Stack, harmonic: int) -> np.ndarray:
+    """(M, M) forces of the displacements that have no energy, of the body of a harmonic."""
+    if stack.circulatory is None:
+        return np.zeros((stack.omega.shape[1],) * 2)
+    return stack.circulatory[min(harmonic, len(stack.circulatory) - 1)]
 
 
 def _ring_residual(stack: Stack, r: int, rows: slice) -> np.ndarray:

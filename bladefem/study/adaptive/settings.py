@@ -83,8 +83,9 @@ class Settings:
                 if some
                 else f"all {nodes} contact points of each seat"
             )
+        harmonics = "1 harmonic" if self.harmonics == 1 else f"{self.harmonics} harmonics"
         return (
-            f"model: {self.modes} modes, {self.harmonics} harmonics, {self.samples} samples, "
+            f"model: {self.modes} modes, {harmonics}, {self.samples} samples, "
             f"{points}, {self.damper} damper ({error}; {kind})"
         )
 

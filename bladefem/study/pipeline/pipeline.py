@@ -11,7 +11,7 @@ from typing import Literal, overload
 from ...contact.peak_pressure import peak_remarks
 from ...data import Patch
 from ...errors import InputError, suggestion
-from ...scene.aerodynamics import refuse_flow
+from ...scene.aerodynamics import has_flow, refuse_flow
 from ...scene.tables import Scene
 from ...scene.validate import refuse_response
 from ...scene.warnings import implausible_values
@@ -133,11 +133,13 @@ def run(
     reduced = _run_reduction(seated, bodies, patches, keep)
     if until == "reduction":
         return reduced
-    with keep.clock("flutter"):
-        flutter = find_flutter(reduced, bodies, patches, keep)
-    if flutter is not None:
-        keep.clock.messages.extend(flutter_sentences(flutter))
-    return run_response(replace(reduced, flutter=flutter), bodies, patches, keep)
+    if has_flow(scene):
+        with keep.clock("flutter"):
+            flutter = find_flutter(reduced, bodies, patches, keep)
+        if flutter is not None:
+            keep.clock.messages.extend(flutter_sentences(flutter))
+        reduced = replace(reduced, flutter=flutter)
+    return run_response(reduced, bodies, patches, keep)
 
 
 def _run_mesh(scene: Scene, keep: StageRunner) -> Run:
