@@ -116,7 +116,8 @@ def _parse_bool(value: object, field: Field) -> bool:
     if isinstance(value, str) and value.lower() in words:
         return words[value.lower()]
     if not isinstance(value, bool):
-        raise InputError(f"{field.name} = {shortened(value)}: expected true or false")
+        expected = "true, false or auto" if field.default is None else "true or false"
+        raise InputError(f"{field.name} = {shortened(value)}: expected {expected}")
     return value
 
 

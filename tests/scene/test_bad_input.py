@@ -34,6 +34,7 @@ REFUSED = [
     ("excitation.engine_order=six", "expected a number"),
     ("disc.sectors=36 mm", "expected a plain number"),
     ("operation.stiffening=maybe", "expected true or false"),
+    ("operation.coriolis=maybe", "operation.coriolis = maybe: expected true, false or auto"),
     ("contact.normal=couple", "did you mean 'coupled'?"),
     ("damper.axial=hold", "damper.axial = 'hold': expected one of free, held"),
     ("model.damper=stiff", "expected one of mass, rigid, elastic"),
