@@ -29,7 +29,7 @@ Measured (CPU seconds, one thread of a busy machine, 57 GFlop/s in matrix produc
       100   0.089     0.006     0.0073   0.0014                             21                    9
       196   0.14      0.35      0.023    0.0028                             96                    6
       400   0.54      1.5       0.025    0.0072                            339                    8
-     1024   5.7                 0.038    0.037                                                    8
+     1024   5.8    10.3         0.038    0.037                           2071                     8
 Forces grow linearly. With all modes the condensation grows with the cube, about twice its limit;
 the rest are products with a matrix for each harmonic. With few modes a frequency costs a system as
 large as the modes; most of a point are products of the residual flexibility, which all harmonics
