@@ -194,26 +194,3 @@ def quality_rows(mesh: Mesh) -> list[tuple[str, str]]:
             text = f"{number:.4g}" if isinstance(number, float) else str(number)
             rows.append((f"{words} {part}".strip(), text))
     return rows
-
-
-def quality_table(mesh: Mesh) -> list[dict[str, object]]:
-    """One row a body: cells, nodes, volume [m^3] of the straight cells, worst and mean shape, worst
-    Jacobian.
-    """
-    rows = []
-    for name, cells in mesh.bodies.items():
-        shape = shape_quality(mesh.points, cells, mesh.cell_type)
-        rows.append(
-            {
-                "body": name,
-                "cells": len(cells),
-                "nodes": len(np.unique(cells)),
-                "worst quality": float(shape.min()),
-                "mean quality": float(shape.mean()),
-                "cells below 0.1": int(np.count_nonzero(shape < 0.1)),
-                "min scaled jacobian": float(
-                    scaled_jacobian(mesh.points, cells, mesh.cell_type).min()
-                ),
-            }
-        )
-    return rows

@@ -52,14 +52,6 @@ class Waves:
     # (modes, m)
     backward_shapes: np.ndarray
 
-    @property
-    def stationary(self) -> tuple[np.ndarray, np.ndarray]:
-        """Frequencies (forward, backward) seen by an observer who does not turn [Hz]; negative:
-        carried forward.
-        """
-        shift = (self.nodal_diameter or 0) * self.speed / (2 * np.pi)
-        return self.forward + shift, self.backward - shift
-
 
 def coupling(
     body: Body,

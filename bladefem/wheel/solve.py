@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -165,23 +164,6 @@ def _tuned(
         return tuned_displacements(wheel, omega, H, samples)
     except NotSolvedError:
         return None
-
-
-def sweep_wheel(
-    wheel: Wheel,
-    omegas: Iterable[float],
-    H: int = 3,
-    samples: int = 128,
-    *,
-    pattern: Pattern = TUNED_PATTERN,
-    options: Options = DEFAULT_OPTIONS,
-) -> Iterator[WheelSolution]:
-    """Points at circular frequencies [rad/s], each from the one before."""
-    last = None
-    for omega in omegas:
-        point = solve_wheel(wheel, omega, H, samples, pattern=pattern, start=last, options=options)
-        yield point
-        last = point if point.converged else None
 
 
 def stuck_wheel(

@@ -23,7 +23,7 @@ from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, without_progress
 from .model import Pattern, Wheel
 from .one_body import one_body_model
-from .resonance import Respond, WheelPeak, find_wheel_peak
+from .resonance import Respond, find_wheel_peak
 from .solve import TUNED_PATTERN, WheelSolution, solve_wheel
 
 CONFIDENCE_LEVEL = 0.95
@@ -229,18 +229,6 @@ def robust_optimum(
         Quantile(height, float(low[1]), float(high[1])),
         float(np.mean((lowest == 0) | (lowest == loads - 1))),
     )
-
-
-def peak_of_pattern(
-    wheel: Wheel,
-    pattern: Pattern,
-    grid: np.ndarray,
-    H: int,
-    samples: int,
-    tolerance: float = 5e-3,
-) -> WheelPeak:
-    """The highest blade of one pattern, by the whole wheel's own balance."""
-    return find_wheel_peak(wheel_respond(wheel, pattern, H, samples), grid, tolerance)
 
 
 def wheel_respond(
