@@ -1,0 +1,63 @@
+"""A curve belongs to the settings that it names, and its error to its highest point.
+
+The models are those of benchmarks/choice_random.py that found these mistakes.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from bladefem.hbm.peak import find_peak
+from bladefem.hbm.sweep import size
+from bladefem.study.adaptive import resonance_curve as curve_module
+from bladefem.study.adaptive.check_points import peak_of
+from bladefem.study.adaptive.family import Family, Member
+from bladefem.study.adaptive.resonance_curve import resonance_curve
+from bladefem.study.adaptive.settings import first_for
+
+sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
+
+from branch_models import random_case  # noqa: E402
+
+
+def curve_of_seed(seed):
+    case = random_case(seed)
+    nodes = np.arange(len(case.model.elements.kt))
+    family = Family(lambda _: Member(case.model, nodes), len(case.model.sides[0].omega))
+    start = replace(first_for(10), points=None, chosen=("harmonics", "samples"))
+    band = case.band[0] / (2 * np.pi), case.band[1] / (2 * np.pi)
+    return case.model, resonance_curve(family, start, band, 1, 0.02)
+
+
+@pytest.mark.parametrize("seed", [41, 59])
+def test_harmonics_that_a_flank_needs_are_swept_once_and_kept(seed, monkeypatch):
+    """They were given up again at the peak, which asked for the same sweep three times, and the
+    curve named harmonics that its points did not have.
+    """
+    swept = []
+
+    def counted(*args, **given):
+        swept.append(args[1])
+        return covered(*args, **given)
+
+    covered = curve_module.covered_band
+    monkeypatch.setattr(curve_module, "covered_band", counted)
+    _, curve = curve_of_seed(seed)
+    assert {p.harmonics for p in curve.points} == {curve.settings.harmonics}
+    # without the rough ones
+    fine = [replace(s, error=None) for s in swept if s.error is not None]
+    assert len(fine) == len(set(fine)) <= 2
+
+
+@pytest.mark.parametrize("seed", [10, 53, 63])
+def test_the_estimate_is_that_of_the_highest_point(seed):
+    """The peak that the settings were chosen at lies on a shoulder up to 0.6 % below it."""
+    model, curve = curve_of_seed(seed)
+    top = peak_of(curve.points)
+    truth = find_peak(model, top.omega, 31, 2048, near=top, tolerance=1e-6).height
+    assert curve.settings.error >= abs(size(top) / truth - 1) / 2
