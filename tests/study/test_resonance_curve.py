@@ -22,7 +22,7 @@ from bladefem.study.adaptive.settings import first_for
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
-from branch_models import random_case  # noqa: E402
+from branch_models import random_case
 
 
 def curve_of_seed(seed):
