@@ -73,6 +73,10 @@ class ReducedModel:
     # (nodes, tangents) friction force at zero displacement from which the friction law starts [N]:
     # what the loading history left in nodes that never slip; elements.t0 when None
     start: np.ndarray | None = None
+    # (nodes,) closing of the contacts beyond their displacement, added before the friction law is
+    # evaluated [m]: faces that a vibration pushes apart press as before
+    # (study.adaptive.layer_change); none when None
+    closing: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         parts: dict[str, Any] = {
@@ -151,6 +155,8 @@ class ReducedModel:
         moved = np.zeros((len(kt), self.directions))
         first = self.directions - self.elements.tangents
         moved[:, first:] = np.divide(start, kt, out=np.zeros_like(start), where=kt > 0)
+        if first and self.closing is not None:
+            moved[:, 0] = self.closing
         return moved.ravel()
 
     @cached_property

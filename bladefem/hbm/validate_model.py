@@ -24,6 +24,12 @@ def check_model(model: ReducedModel) -> None:
     dofs = port_size(model.sides[0], "contact")
     _check_elements(model.elements, dofs)
     _check_traction("start", model.start, model.elements)
+    if model.closing is not None:
+        closing = np.asarray(model.closing)
+        if closing.shape != np.shape(model.elements.kt) or not np.isfinite(closing).all():
+            raise InputError(
+                f"closing of shape {closing.shape}: expected one finite number [m] for each node"
+            )
     _check_amplitudes("excitation", model.excitation, port_size(model.sides[0], "load"), 0)
     if not model.coupled and 0 in model.excitation:
         raise InputError(

@@ -20,6 +20,9 @@ from .headlines import Headline
 from .tables import write_tables
 from .write import Page, write_report
 
+# columns that only the tables in files have
+UNPRINTED = ["halved", "body_mesh", "layer_law", "harmonics"]
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -88,10 +91,8 @@ def _report(
         folder,
         variants[0].scene,
         {
-            "response/best_load_of_each_value": table.drop(
-                columns=["halved", "body_mesh", "harmonics"]
-            ),
-            "response/all_loads": loads.drop(columns=["halved", "body_mesh", "harmonics"]),
+            "response/best_load_of_each_value": table.drop(columns=UNPRINTED),
+            "response/all_loads": loads.drop(columns=UNPRINTED),
         },
         {"response/side_by_side": folder / "study.png"},
         page=Page(numbers=numbers, stem="report_study", subject=f"study of {name}"),

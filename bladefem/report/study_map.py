@@ -11,11 +11,9 @@ import pandas as pd
 from ..scene.tables import Scene
 from ..view.study_map import draw_band, draw_map
 from .headlines import Headline
-from .study import Variant, end_words, load_words, place_of_value, study_tables
+from .study import UNPRINTED, Variant, end_words, load_words, place_of_value, study_tables
 from .tables import write_tables
 from .write import Page, write_report
-
-UNPRINTED = ["halved", "body_mesh", "harmonics"]
 
 
 def write_map(

@@ -202,6 +202,7 @@ COLUMNS = {
     "free_amplitude": Column("amplitude without damper", "m", "µm", 1e6),
     "halved": Column("change with half the contact points", "1", "%", 100.0, 2),
     "body_mesh": Column("change by the error of the body's mesh", "1", "%", 100.0, 2),
+    "layer_law": Column("change by the law of the layer", "1", "%", 100.0, 2),
     "estimated_error": Column("estimated error", "1", "%", 100.0, 2),
     "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3),
     "error_checked": Column("error checked here"),

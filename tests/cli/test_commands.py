@@ -37,6 +37,7 @@ def fake_curve(load, amplitude):
         settings=SimpleNamespace(error=0.013, harmonics=3),
         halved=np.nan,
         body_mesh=np.nan,
+        layer_law=np.nan,
         error=0.013,
         interval=None,
         peak_frequency=830.0,

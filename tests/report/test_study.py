@@ -26,6 +26,7 @@ def curve(load, amplitude):
         settings=SimpleNamespace(error=0.01, harmonics=3),
         halved=np.nan,
         body_mesh=np.nan,
+        layer_law=np.nan,
         error=0.01,
         interval=None,
         frequency=np.arange(4.0),

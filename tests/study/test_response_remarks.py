@@ -9,13 +9,22 @@ import numpy as np
 from bladefem.study.pipeline.response_remarks import beyond_tolerance, resonance_warnings
 
 
-def curve(load, error, mass=None, halved=np.nan, estimated=(0.0, 0.0, 0.0), converged=True):
+def curve(
+    load,
+    error,
+    mass=None,
+    halved=np.nan,
+    estimated=(0.0, 0.0, 0.0),
+    converged=True,
+    layer_law=np.nan,
+):
     """Three points, the resonance in the middle."""
     return SimpleNamespace(
         load=load,
         mass=mass,
         error=error,
         halved=halved,
+        layer_law=layer_law,
         frequency=np.array([99.0, 100.0, 101.0]),
         peak_frequency=100.0,
         converged=np.array([converged, True, True]),
@@ -38,6 +47,12 @@ def test_the_part_of_the_contact_mesh_is_told_where_it_is_the_larger():
     curves = [curve(18.0, 0.08, halved=0.07), curve(36.0, 0.09, halved=0.01)]
     (above,) = resonance_warnings(curves, 0.05)
     assert "; 7 % under 18 N are what half as many contact points change" in above
+
+
+def test_the_part_of_the_layer_is_told_where_it_is_the_larger():
+    curves = [curve(18.0, 0.08, layer_law=0.07), curve(36.0, 0.09, layer_law=0.01)]
+    (above,) = resonance_warnings(curves, 0.05)
+    assert "; 7 % under 18 N are what the tangent of a layer that stiffens leaves out" in above
 
 
 def test_a_resonance_next_to_an_unsolved_point_is_told():

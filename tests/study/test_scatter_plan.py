@@ -102,6 +102,7 @@ def response(*amplitudes):
             settings=SimpleNamespace(error=0.01, harmonics=3),
             halved=0.0,
             body_mesh=0.0,
+            layer_law=0.0,
             error=0.01,
             frequency=np.arange(5.0),
             converged=np.ones(5, bool),

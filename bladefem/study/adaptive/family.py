@@ -129,6 +129,7 @@ def coarsened_elements(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
         normal=normal,
         series=None if model.series is None else pick**2 @ model.series,
         start=None if model.start is None else _totals(model.start, groups),
+        closing=None if model.closing is None else pick @ model.closing,
     )
 
 

@@ -43,6 +43,9 @@ class LoadCase:
     # (n, 1 + tangents) compliance of stiff layers that the elements leave to the bodies [m/N], see
     # contact.numerical_stiffness; None where they leave none
     series: np.ndarray | None = None
+    # (n,) length over which the layer's stiffness grows by e [m], see contact.equivalent_layer;
+    # None where it is linear
+    decay: np.ndarray | None = None
 
 
 def joint_model(

@@ -8,6 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from ...contact.equivalent_layer import decay_lengths
 from ...contact.frictional_seating import FrictionalProblem
 from ...contact.interface_elements import (
     friction_elements,
@@ -42,12 +43,14 @@ def seated_case(
     """
     ratio = pair_ratio(*operating_materials(scene))
     elements, selection = friction_elements(problem, maps, scene.contact, ratio, tangents)
+    decay = decay_lengths(elements, maps, scene.contact)
     # a layer that is given is that of the seating as well, however stiff
     stiffest = stiffest_layer(problem) if scene.contact.stiffness == "rigid" else np.inf
     elements, series = split_stiffness(
         elements, maps, scene.contact, numerical_stiffness(problem), stiffest
     )
-    return LoadCase(load, elements, selection, mass, series)
+    stiffens = decay if np.isfinite(decay).any() else None
+    return LoadCase(load, elements, selection, mass, series, stiffens)
 
 
 def cases_of(

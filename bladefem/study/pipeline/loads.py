@@ -24,6 +24,7 @@ from ..adaptive.check_points import peak_of
 from ..adaptive.choice import Checked, checked_points, estimated_errors
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
+from ..adaptive.layer_change import layer_change
 from ..adaptive.resonance_curve import resonance_curve, too_large_to_follow
 from ..adaptive.settings import Settings, restarted_settings
 from .assemble_model import LoadCase
@@ -109,18 +110,22 @@ class Curve:
     # relative change of the peak's height by the estimated error of the body's mesh; NaN: not
     # estimated
     body_mesh: float = np.nan
+    # relative change of the peak's height with the layer's law in place of its tangent; NaN: not
+    # estimated
+    layer_law: float = np.nan
 
     @property
     def error(self) -> float | None:
         """Estimated relative error of the resonance amplitude: that of the balance, what half as
-        many contact points change (the contact mesh), and the body's mesh; None where it was not
-        asked for.
+        many contact points change (the contact mesh), the body's mesh, and the tangent of a layer
+        that stiffens; None where it was not asked for.
         """
         if self.settings.error is None:
             return None
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
-        return self.settings.error + contact_mesh + body_mesh
+        layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
+        return self.settings.error + contact_mesh + body_mesh + layer_law
 
     @property
     def keeps_unstable(self) -> bool:
@@ -213,6 +218,7 @@ def curve_of(
     body_mesh = np.nan
     if known and softer is not None:
         body_mesh = softened_change(softer, case, curve.settings, top)
+    layer_law = layer_change(models, curve.settings, top, case.decay) if known else np.nan
     interval = None
     if scene.study.interval:
         model = family_member(models, curve.settings).model
@@ -236,6 +242,7 @@ def curve_of(
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,
         body_mesh=body_mesh,
+        layer_law=layer_law,
     )
 
 
@@ -309,6 +316,7 @@ def _row(c: Curve) -> dict[str, Any]:
         "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
         "body_mesh": c.body_mesh,
+        "layer_law": c.layer_law,
         "harmonics": c.settings.harmonics,
         "points": len(c.frequency),
         "unconverged": int((~c.converged).sum()),
@@ -343,6 +351,7 @@ def _linear_row(limit: Limit) -> dict[str, Any]:
         "error": 0.0,
         "halved": 0.0,
         "body_mesh": 0.0,
+        "layer_law": 0.0,
         "harmonics": 1,
         "points": len(limit.frequency),
         "unconverged": 0,

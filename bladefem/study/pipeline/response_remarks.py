@@ -133,8 +133,23 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
         each = ", ".join(f"{load_of(c)} {100 * (c.error or 0):.2g} %" for c in above)
         yield (
             "estimated error of the resonance amplitude above the wanted "
-            f"{100 * accuracy:.2g} %: {each}{_of_the_contact_mesh(above)}"
+            f"{100 * accuracy:.2g} %: {each}{_of_the_contact_mesh(above)}{_of_the_layer(above)}"
         )
+
+
+def _of_the_layer(curves: list[Curve]) -> str:
+    """The part of estimated errors that no finer model lowers, where it is the larger."""
+    parts = [
+        f"{100 * c.layer_law:.2g} % under {load_of(c)}"
+        for c in curves
+        if np.isfinite(c.layer_law) and c.layer_law >= (c.error or 0) / 2
+    ]
+    if not parts:
+        return ""
+    return (
+        f"; {', '.join(parts)} are what the tangent of a layer that stiffens leaves out, expected "
+        "a linear one (contact.kn_area) to compare with"
+    )
 
 
 def _beside_unsolved(c: Curve) -> bool:
