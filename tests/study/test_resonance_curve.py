@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from bladefem.hbm.peak import find_peak
+from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
 from bladefem.hbm.sweep import size
+from bladefem.study.adaptive import check_points
 from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.family import Family, Member
@@ -61,3 +63,18 @@ def test_the_estimate_is_that_of_the_highest_point(seed):
     top = peak_of(curve.points)
     truth = find_peak(model, top.omega, 31, 2048, near=top, tolerance=1e-6).height
     assert curve.settings.error >= abs(size(top) / truth - 1) / 2
+
+
+def test_an_unstable_motion_is_not_what_settings_are_chosen_for(monkeypatch):
+    """Of a curve that was followed round folds the highest motion that is not unstable is judged."""
+    _, before = curve_of_seed(53)
+    highest = size(peak_of(before.points))
+
+    def verdict(model, point, operations):
+        return Verdict(UNSTABLE if size(point) > 0.98 * highest else STABLE)
+
+    monkeypatch.setattr(check_points, "stability_verdict", verdict)
+    _, after = curve_of_seed(53)
+    heights = {p.omega: size(p) for p in after.points}
+    judged = max(heights[omega] for omega in after.errors)
+    assert judged <= 0.98 * highest < max(heights.values())
