@@ -1,7 +1,7 @@
 """Does it pay to use more ranks? Modes of all nodal diameters and the reduction on 1, 2 and 4.
 
     ./run python benchmarks/ranks.py                          (some 5 minutes on an idle machine)
-    ./run python benchmarks/ranks.py --write                  and put the table into docs/
+    ./run python benchmarks/ranks.py --write                  and put it into README and docs
     ./run python benchmarks/ranks.py --set mesh.size="6 mm"   a smaller sector
 
 One row a number of ranks: wall-clock times, CPU time of the rank that worked longest (waiting ranks
@@ -28,8 +28,9 @@ import numpy as np
 import bladefem
 
 HERE = Path(__file__).resolve()
-SCENE = HERE.parent.parent / "scenes" / "wedge.toml"
-DOCS = HERE.parent.parent / "docs" / "verification.md"
+ROOT = HERE.parent.parent
+PAGES = ROOT / "README.md", ROOT / "docs" / "verification.md"
+SCENE = ROOT / "scenes" / "wedge.toml"
 START, END = "<!-- ranks: begin -->", "<!-- ranks: end -->"
 # 139 000 degrees of freedom with the wedge scene
 SIZE = "2.3 mm"
@@ -113,12 +114,12 @@ def line(ranks: int, row: dict[str, Any], one: dict[str, Any]) -> str:
 
 
 def write_table(text: str, dofs: int) -> None:
-    """The table between its marks in docs/verification.md."""
-    page = DOCS.read_text()
-    head, rest = page.split(START)
-    tail = rest.split(END)[1]
-    lead = f"{dofs} degrees of freedom:\n\n"
-    DOCS.write_text(f"{head}{START}\n{lead}{text}{END}{tail}")
+    """The table between its marks in each of the pages."""
+    for page in PAGES:
+        head, rest = page.read_text().split(START)
+        tail = rest.split(END)[1]
+        lead = f"{dofs} degrees of freedom:\n\n"
+        page.write_text(f"{head}{START}\n{lead}{text}{END}{tail}")
 
 
 def main() -> None:
