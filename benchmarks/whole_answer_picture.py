@@ -68,7 +68,9 @@ def write_advice(rows: pd.DataFrame, loads: pd.DataFrame, accuracy: float, file:
     star = good[good["chosen"].astype(bool)].iloc[0]
     lines = []
     for column, of in {"error": "all three errors", "error_amplitude": "amplitude alone"}.items():
-        enough = good[good[column] <= max(accuracy, 1.1 * star[column])]
+        enough = good[good[column] <= accuracy]
+        if enough.empty:
+            enough = good[good[column] <= 1.1 * star[column]]
         best = enough.loc[enough["time"].idxmin()]
         met = "the cheapest that has it is" if best[column] <= accuracy else "no way has it under"
         met += "" if best[column] <= accuracy else " every load; as good as the automatic choice is"

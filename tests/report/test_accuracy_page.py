@@ -14,9 +14,9 @@ FIGURES = ROOT / "docs" / "figures"
 PAGE = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
 sys.path.insert(0, str(ROOT / "benchmarks"))
 
-from whole_answer_picture import answer_table  # noqa: E402
+from whole_answer_picture import answer_table, what_was_solved, write_advice  # noqa: E402
 
-SCENES = re.findall(r"<!-- ways of (\w+) -->", PAGE)
+SCENES = re.findall(r"<!-- answer of (\w+) -->", PAGE)
 # rows of the page to rows of the table
 REFERENCE = {
     "balance, H 1": "H 1",
@@ -34,10 +34,33 @@ def test_whole_answers_are_copied_from_their_tables():
     assert set(SCENES) == made
     for scene in SCENES:
         rows = pd.read_csv(FIGURES / f"answer_{scene}.csv")
-        begin, end = f"<!-- ways of {scene} -->", f"<!-- end of {scene} -->"
-        assert PAGE.split(begin)[1].split(end)[0].strip() == answer_table(rows)
-        advice = (FIGURES / f"answer_{scene}.txt").read_text(encoding="utf-8")
-        assert all(line in PAGE for line in advice.splitlines())
+        loads = pd.read_csv(FIGURES / f"answer_{scene}_loads.csv")
+        begin, end = f"<!-- answer of {scene} -->", f"<!-- end of {scene} -->"
+        told = PAGE.split(begin)[1].split(end)[0]
+        assert answer_table(rows) in told
+        assert what_was_solved(rows, loads)[1:] in told
+        assert (FIGURES / f"answer_{scene}.txt").read_text(encoding="utf-8") in told
+        assert f"figures/answer_{scene}.png" in told
+
+
+def test_the_line_to_paste_is_that_of_the_cheapest_way_that_is_a_setting(tmp_path):
+    """The paper's loop is cheapest, and none; an automatic choice brings its own accuracy."""
+    ways = {
+        "automatic": ("automatic choice", 9.0, 0.03, 0.02, ""),
+        "automatic, 0.5 %": ("automatic choice", 20.0, 0.01, 0.005, ""),
+        "H 3": ("harmonics", 5.0, 0.2, 0.02, "model = {harmonics = 3}"),
+        "paper's loop": ("paper's loop", 1.0, 0.001, 0.02, ""),
+    }
+    columns = ("family", "time", "error", "accuracy", "settings")
+    rows = pd.DataFrame.from_dict(ways, orient="index", columns=columns)
+    rows = rows.rename_axis("name").reset_index()
+    rows = rows.assign(scale=1.0, converged=True, reason="", error_amplitude=0.01)
+    rows["chosen"] = rows["name"] == "automatic"
+    loads = pd.DataFrame({"load": [4.0, 8.0], "judge": [0.01, float("nan")]})
+    file = tmp_path / "advice.txt"
+    write_advice(rows, loads, 0.02, file)
+    pasted = [x for x in file.read_text().splitlines() if x.startswith("take this")]
+    assert pasted == ['take this: accuracy = "0.5 %"', "take this: model = {harmonics = 3}"]
 
 
 def test_the_table_of_ways_says_what_was_not_solved_and_what_was_left_out():
