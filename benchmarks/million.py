@@ -27,7 +27,7 @@ from bladefem.scene.tables import Scene
 from geometry.isolated_process import build_isolated
 
 # element size [m] and degrees of freedom of a sector, and how these grow
-KNOWN_SIZE, KNOWN_DOFS, GROWTH = 1.41e-3, 472e3, 2.47
+KNOWN_SIZE, KNOWN_DOFS, GROWTH = 1.04e-3, 1.6e6, 2.8
 RUN = """
 import json, pickle, sys, time
 from bladefem.fem import body, memory

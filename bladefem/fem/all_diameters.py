@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import eigh
 
 from ..data import ModeSet
@@ -188,6 +189,7 @@ def eigenpairs(
             give_back()
             space = _extend_space(t, blocks, space)
             blocks = []
+            give_back()
         # always so: the first of the levels comes first
         assert space is not None
         helps = i < SOLVED_DIAMETERS_BY_LEVEL[-1]
@@ -324,15 +326,15 @@ def _project_columns(
     W = W if shared is None else whole_part(shared, W)
     T1 = columns_of_part(t.opened, high_part(t)[t.opened.places])
     faces = np.flatnonzero(np.diff(T1.indptr))
-    low = columns_of_part(t.opened, t.low[t.opened.places]) @ W
+    low = columns_of_part(t.opened, t.low[t.opened.places])
     high = T1[faces] @ W
     out = []
     both = t.opened.K, t.opened.M
-    inner = _project_interior(both, low, high, faces, new)
+    inner = _project_interior(both, (low, W), high, faces, new)
     for A, (LL, HL) in zip(both, inner, strict=True):
         coupling = A[faces].T.tocsr()
         near = np.flatnonzero(np.diff(coupling.indptr))
-        LH = low[near].T @ (coupling[near] @ high[:, new])
+        LH = (low[near] @ W).T @ (coupling[near] @ high[:, new])
         own = [LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL]
         out.append([comm.allreduce(part) for part in own] if comm.size > 1 else own)
     K, M = out
@@ -341,18 +343,25 @@ def _project_columns(
 
 def _project_interior(
     both: tuple[Any, Any],
-    low: np.ndarray,
+    low: tuple[sp.csr_matrix, np.ndarray],
     high: np.ndarray,
     faces: np.ndarray,
     new: slice,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
-    """low^T A low and high^T A low of some columns, a few at a time, for K and for M."""
+    """low^T A low and high^T A low of some columns, for K and for M.
+
+    Args:
+        low: its two factors. Their product, as large as the whole space, is made a few columns at
+            a time.
+    """
+    T0, W = low
+    turned = T0.T.tocsr()
     pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[], []]
-    for first in range(new.start, low.shape[1], COLUMNS_AT_A_TIME):
-        moved = np.ascontiguousarray(low[:, first : first + COLUMNS_AT_A_TIME])
+    for first in range(new.start, W.shape[1], COLUMNS_AT_A_TIME):
+        moved = np.ascontiguousarray(T0 @ W[:, first : first + COLUMNS_AT_A_TIME])
         for piece, A in zip(pieces, both, strict=True):
             image = A @ moved
-            piece.append((low.T @ image, high.T @ image[faces]))
+            piece.append((W.T @ (turned @ image), high.T @ image[faces]))
     return [
         (
             np.concatenate([own for own, _ in piece], axis=1),

@@ -25,6 +25,7 @@ from .compat import PETSc, SLEPc
 from .constraint import Constrained
 from .lanczos import lowest_eigenpairs, orthonormal
 from .linalg import apply_block, inner_products, linear_combinations, subtract_product
+from .memory import give_back
 
 # iterations (restarts) until SLEPc gives up
 MAX_RESTARTS = 100
@@ -99,9 +100,8 @@ class _Pencil:
     kept: bool = False
     # and its product by M
     image: np.ndarray | None = None
-    # directions solved for, and their products by M (those of complex pencils only)
+    # directions solved for
     known: _Columns = field(default_factory=lambda: _Columns())
-    images: _Columns = field(default_factory=lambda: _Columns())
     # the first vector has been multiplied
     started: bool = False
     # what a product or a solve raised, see ``_shielded``
@@ -226,10 +226,15 @@ def _times_inverse(pencil: _Pencil, load: np.ndarray) -> np.ndarray:
     if pencil.doubled:
         _remember_direction(pencil, load)
         if len(pencil.known):
+            image = apply_block(pencil.con.M, found)
             # of the products with earlier directions only the imaginary part is rounding
             # always: however small, SLEPc takes off the rest and lets them grow
-            product = inner_products(pencil.con.body.comm, pencil.images.block, found)
+            product = inner_products(pencil.con.body.comm, pencil.known.block, image)
             found = found - linear_combinations(pencil.known.block, 1j * product.imag)
+            # SLEPc multiplies it by M next. What was taken off is orthogonal to the directions
+            # in the real products that SLEPc sees, so its image would change none of them
+            pencil.last = found
+            pencil.image = image
     return found
 
 
@@ -247,24 +252,21 @@ def _remember_direction(pencil: _Pencil, load: np.ndarray) -> None:
     size = float(inner_products(comm, load, last).real[0, 0])
     product = np.zeros((0, 1), complex)
     if len(pencil.known):
-        product = inner_products(comm, pencil.images.block, last)
+        # the load is M times the last direction
+        product = inner_products(comm, pencil.known.block, load)
     if not pencil.started or abs(product.imag).max(
         initial=0.0
     ) > IMAGINARY_PART_TOLERANCE * np.sqrt(size):
         pencil.started = True
         pencil.known.clear()
-        pencil.images.clear()
         return
     direction = last
-    image = load
     share = product.real
     if abs(share).max(initial=0.0) > ROUNDING_SHARE * np.sqrt(size):
         direction = direction - linear_combinations(pencil.known.block, share.astype(complex))
-        image = image - linear_combinations(pencil.images.block, share.astype(complex))
     rest = size - (share**2).sum()
     if rest > NEW_DIRECTION_SHARE * size:
         pencil.known.append(direction / np.sqrt(rest))
-        pencil.images.append(image / np.sqrt(rest))
 
 
 def krylov_schur(
@@ -293,14 +295,18 @@ def krylov_schur(
             raise pencil.failure
         reason = int(eps.getConvergedReason())
         # memory of no more use, before the vectors come
-        pencil.images = _Columns()
         if not pencil.kept:
             pencil.known = _Columns()
         found = _converged_vectors(pencil, eps)
     finally:
         # now: at the end of the program its callbacks would be gone
         eps.destroy()
-    lam, X = _purify_vectors(con, inverse, found, min(count + guard, found.shape[1]))
+    wanted = min(count + guard, found.shape[1])
+    directions = orthonormal(con, [], [], found, NEW_DIRECTION_SHARE)[1]
+    # the solves that follow are the peak of memory
+    del found
+    give_back()
+    lam, X = _purify_vectors(con, inverse, directions, wanted)
     if len(lam) < count and reason > 0:
         # some came twice after many restarts of a small basis: blocks find the others
         return lowest_eigenpairs(con, inverse, np.asfortranarray(X), count, tolerance, guard)
@@ -398,15 +404,17 @@ def _converged_vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:
 def _purify_vectors(
     con: Constrained,
     inverse: Callable[[np.ndarray], np.ndarray],
-    X: np.ndarray,
+    MQ: np.ndarray,
     wanted: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues and M-orthonormal vectors K^-1 M x, which inverse iteration frees from rounding
-    in stiff directions; repeated directions are dropped.
+    in stiff directions.
+
+    Args:
+        MQ: (n_own, k) products by M of M-orthonormal vectors.
     """
-    if not X.shape[1]:
-        return np.zeros(0), X
-    MQ = orthonormal(con, [], [], X, NEW_DIRECTION_SHARE)[1]
+    if not MQ.shape[1]:
+        return np.zeros(0), MQ
     Y = inverse(MQ)
     theta, S = np.linalg.eigh(_hermitian_part(inner_products(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
 import pandas as pd
@@ -16,6 +17,7 @@ import pandas as pd
 from geometry.mesh import sector_of
 
 from ..data import ModeSet
+from ..hbm.parallel import share_work
 from ..io.stage_cache import on_root, write_results
 from ..scene.tables import Scene
 from ..study.modes.comparison import family_table
@@ -44,6 +46,10 @@ SECTION_OF = {
     "forced_response": "response",
     "resonances": "response",
 }
+# pictures and files that take longest, by their names
+SLOWEST_TO_WRITE = ("wave.gif", "modes.png", "modes.vtu", "mode_1_wheel.png")
+# fields [Pa] or [m] by name, at nodes or in cells
+Fields: TypeAlias = dict[str, np.ndarray]
 # long tables: in CSV files only
 UNPRINTED = ("forced_response", "campbell", "convergence_points")
 MESH_STEP = (
@@ -71,7 +77,7 @@ def report_survey(
     result = survey_modes(scene, folder, wanted, comm, progress)
     start = time.perf_counter()
     stresses = _stresses(result)
-    on_root(comm, lambda: _write(result, pictures, *stresses, progress))
+    _write(result, pictures, stresses, comm, progress)
     timings = {**result.run.timings, "tables and pictures": time.perf_counter() - start}
     return replace(result, run=replace(result.run, timings=timings))
 
@@ -131,30 +137,63 @@ def mac_table(
 def _write(
     result: Survey,
     pictures: int,
-    stresses: pd.DataFrame,
-    fields: dict[str, np.ndarray],
-    inside: dict[str, np.ndarray],
+    stresses: tuple[pd.DataFrame, Fields, Fields],
+    comm: Communicator | None,
     progress: Progress,
 ) -> None:
-    run = result.run
+    """All files, dealt over the ranks; rank 0 writes the report, which holds the pictures."""
+    table, fields, inside = stresses
+    tables = tables_of(result) | {"stresses": table}
     folder = folder_of(result.run)
-    tables = tables_of(result) | {"stresses": stresses}
-    for name, table in tables.items():
-        write_tables(table, folder / name, name.replace("_", " "))
-    write_results(folder / "modes.nc", {"modes": mode_shapes(run)})
-    if not pictures:
-        return
-    excited = excited_set(run)
-    modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
-    shapes = {
-        f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i]
-        for i, f in enumerate(excited.frequencies[:pictures])
+    drawings = _drawings(result, tables, pictures) if pictures else {}
+    jobs: dict[str, Callable[[], object]] = {
+        **{name: partial(draw, folder / name) for name, draw in drawings.items()},
+        **_file_writers(result, tables, (fields, inside), pictures),
     }
-    mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields}, inside)
-    drawings = _drawings(result, tables, pictures)
-    for name, draw in progress(list(drawings.items()), "pictures"):
-        draw(folder / name)
-    _report(result, tables, list(drawings))
+    # the longest first: what follows goes to the rank that is free
+    order = sorted(jobs, key=lambda name: name not in SLOWEST_TO_WRITE)
+
+    def write(name: str) -> None:
+        jobs[name]()
+
+    share_work(
+        write, order, comm, lambda items: progress(items, "pictures and files"), on_demand=True
+    )
+    if pictures:
+        on_root(comm, lambda: _report(result, tables, list(drawings)))
+
+
+def _file_writers(
+    result: Survey,
+    tables: dict[str, pd.DataFrame],
+    stresses: tuple[Fields, Fields],
+    pictures: int,
+) -> dict[str, Callable[[], object]]:
+    """Name of a file, or of a set of files -> what writes it."""
+    run = result.run
+    folder = folder_of(run)
+    excited = excited_set(run)
+
+    def write_all_tables() -> None:
+        for name, table in tables.items():
+            write_tables(table, folder / name, name.replace("_", " "))
+
+    def write_stresses() -> None:
+        fields, inside = stresses
+        shapes = {
+            f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i]
+            for i, f in enumerate(excited.frequencies[:pictures])
+        }
+        mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields}, inside)
+
+    out: dict[str, Callable[[], object]] = {
+        "tables": write_all_tables,
+        "modes.nc": lambda: write_results(folder / "modes.nc", {"modes": mode_shapes(run)}),
+    }
+    if pictures:
+        out["modes.vtu"] = lambda: modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
+        out["stress.vtu"] = write_stresses
+    return out
 
 
 def _report(
@@ -225,7 +264,7 @@ def _numbers(
     ]
 
 
-def _stresses(result: Survey) -> tuple[pd.DataFrame, dict[str, np.ndarray], dict[str, np.ndarray]]:
+def _stresses(result: Survey) -> tuple[pd.DataFrame, Fields, Fields]:
     """Table of extremes and fields at nodes or in cells: displacement and stress under the
     rotation, of the first modes and of the resonances; collective.
     """

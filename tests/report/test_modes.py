@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import base64
+import time
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from bladefem import load_scene
 from bladefem.cli.main import main
 from bladefem.data import ModeSet
+from bladefem.fem.compat import MPI
 from bladefem.io.stage_cache import read_results
-from bladefem.report.modes import mac_table
+from bladefem.report.modes import mac_table, report_survey
+from bladefem.study.modes.survey import Wanted
 
+ONE_PIXEL = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
+)
+# until another rank must have drawn something
+WAIT_SECONDS = 200.0
 PLANE = ["modes", "scenes/plane.toml", "--set", "mesh.size=5 mm"]
 
 
@@ -105,3 +116,39 @@ def test_partners_are_the_best_matches():
         11.0,
         19.0,
     ]
+
+
+@pytest.mark.mpi
+def test_ranks_share_out_pictures_and_files(tmp_path, monkeypatch):
+    """Every picture is drawn once, by whichever rank is free; the page holds all of them.
+
+    The first one is finished when there is a second one, which takes another rank.
+    """
+    comm = MPI.COMM_WORLD
+    folder = comm.bcast(tmp_path)
+    drawn = []
+
+    def drawings(result, tables, pictures):
+        def draw(file):
+            drawn.append(file.name)
+            file.write_bytes(ONE_PIXEL)
+            end = time.monotonic() + WAIT_SECONDS
+            while not (folder / "mode_2.png").exists() and comm.size > 1:
+                assert time.monotonic() < end, "no other rank draws"
+                time.sleep(0.01)
+
+        return {f"mode_{i + 1}.png": draw for i in range(8)}
+
+    monkeypatch.setattr("bladefem.report.modes._drawings", drawings)
+    scene = load_scene("scenes/plane.toml", ["mesh.size=7 mm"])
+    report_survey(scene, folder, Wanted(), comm=comm)
+    parts = comm.allgather(drawn)
+    assert sorted(name for part in parts for name in part) == [
+        f"mode_{i + 1}.png" for i in range(8)
+    ]
+    assert comm.size == 1 or sum(map(bool, parts)) > 1
+    assert "mode_8" in (folder / "report_modes.md").read_text()
+    assert {"modes.nc", "modes.vtu", "stress.vtu", "frequencies.csv"} <= {
+        file.name for file in folder.iterdir()
+    }
+    comm.Barrier()

@@ -5,11 +5,13 @@ damping.
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from wheels import bodies
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
+from bladefem.fem.compat import MPI
 from bladefem.fem.stress import nodal_stress, von_mises
 from bladefem.hbm.model import Damping
 from bladefem.scene.tables import Material
@@ -243,3 +245,27 @@ def test_table_of_stresses_has_the_extremes_of_every_state():
     assert (turning["smallest principal"] <= turning["largest principal"]).all()
     assert "smallest principal" not in fields["half"]
     assert (table["von_mises_gauss"] > 0.3 * table["von_mises"]).all()
+
+
+@pytest.mark.mpi
+def test_ranks_share_out_the_stresses(monkeypatch):
+    """Each state is one rank's work, and the table is the same as that of one rank."""
+    done = []
+    recorded = nodal_stress
+
+    def counted(body, u, large=False, heated=False):
+        done.append(1)
+        return recorded(body, u, large, heated)
+
+    together, alone = (bodies(comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
+    states = stress_states(alone, wheel_modes(alone, 3, [2])[0], 3)
+    reference, fields, cells = stress_table(alone, states)
+    monkeypatch.setattr("bladefem.fem.stress.nodal_stress", counted)
+    table, shared_fields, shared_cells = stress_table(together, states)
+    assert MPI.COMM_WORLD.allreduce(len(done)) == len(states)
+    pd.testing.assert_frame_equal(table, reference)
+    for kept, expected in ((shared_fields, fields), (shared_cells, cells)):
+        assert list(kept) == list(expected)
+        for name, each in expected.items():
+            for kind, values in each.items():
+                np.testing.assert_allclose(kept[name][kind], values, rtol=1e-12)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ import pandas as pd
 from ...data import ModeSet
 from ...errors import InputError, suggestion
 from ...hbm.model import Damping
+from ...hbm.parallel import share_work
 from ...scene.fields import split_values
 from ...scene.units import parse
 from ..pipeline.ports import blade_ports
@@ -28,6 +30,9 @@ from .linear_response import (
     probe_response,
     static_offset,
 )
+
+if TYPE_CHECKING:
+    from ...fem.body import Body
 
 # resonances
 MAX_RESONANCES = 5
@@ -177,42 +182,59 @@ def stress_table(
     bodies: Bodies, states: dict[str, np.ndarray]
 ) -> tuple[pd.DataFrame, Fields, Fields]:
     """Extremes of each state; its stresses [Pa] at the nodes (n_points,), and the largest at the
-    Gauss points of each cell of all bodies (nc,), 0 outside the blade.
+    Gauss points of each cell of all bodies (nc,), 0 outside the blade. Ranks share out the states;
+    collective.
 
     Returns:
         columns state, largest [m], von_mises [Pa] at the nodes and where x, y, z [m],
         von_mises_gauss [Pa] at the Gauss points, principal [Pa] the largest, pressing [Pa] the
         smallest principal stress; of harmonic motion the extremes in a period.
     """
+    # all ranks assemble it, those without a state too
+    body = bodies.still_blade
+    found = share_work(
+        lambda name: _state_stress(body, name, states[name]), list(states), bodies.comm
+    )
+    rows = [row for row, _, _ in found]
+    fields = {row["state"]: at_nodes for row, at_nodes, _ in found}
+    cells = {
+        row["state"]: {"von Mises at Gauss points": _of_all_bodies(bodies, inside)}
+        for row, _, inside in found
+    }
+    return pd.DataFrame(rows), fields, cells
+
+
+def _state_stress(
+    body: Body,
+    name: str,
+    u: np.ndarray,
+) -> tuple[dict[str, Any], dict[str, np.ndarray], np.ndarray]:
+    """A row of the table, fields at the nodes, and von Mises stresses [Pa] in the cells (nc,)."""
     from ...fem.stress import gauss_stress, nodal_stress, principal_stresses, von_mises
 
-    rows = []
-    fields = {}
-    cells = {}
-    for name, u in states.items():
-        heated = name == STATIC_STATES[True]
-        stress = nodal_stress(bodies.still_blade, u, heated=heated)
-        size = von_mises(stress)
-        sides = principal_stresses(stress)
-        inside = von_mises(gauss_stress(bodies.still_blade, u, heated=heated).stress).max(1)
-        worst, fields[name] = size.argmax(), {"von Mises": size, "largest principal": sides[:, 0]}
-        cells[name] = {"von Mises at Gauss points": _of_all_bodies(bodies, inside)}
-        # motion swings to both sides: its smallest is minus the largest
-        if not np.iscomplexobj(stress):
-            fields[name]["smallest principal"] = sides[:, 2]
-        low = -sides[:, 0].max() if np.iscomplexobj(stress) else sides[:, 2].min()
-        rows.append(
-            {
-                "state": name,
-                "largest": np.linalg.norm(u, axis=1).max(),
-                "von_mises": size[worst],
-                **dict(zip("xyz", bodies.mesh.points[worst], strict=True)),
-                "von_mises_gauss": inside.max(),
-                "principal": sides[:, 0].max(),
-                "pressing": low,
-            }
-        )
-    return pd.DataFrame(rows), fields, cells
+    heated = name == STATIC_STATES[True]
+    stress = nodal_stress(body, u, heated=heated)
+    size = von_mises(stress)
+    sides = principal_stresses(stress)
+    inside = von_mises(gauss_stress(body, u, heated=heated).stress).max(1)
+    worst = size.argmax()
+    fields = {"von Mises": size, "largest principal": sides[:, 0]}
+    # motion swings to both sides: its smallest is minus the largest
+    if np.iscomplexobj(stress):
+        low = -sides[:, 0].max()
+    else:
+        fields["smallest principal"] = sides[:, 2]
+        low = sides[:, 2].min()
+    row = {
+        "state": name,
+        "largest": np.linalg.norm(u, axis=1).max(),
+        "von_mises": size[worst],
+        **dict(zip("xyz", body.mesh.points[worst], strict=True)),
+        "von_mises_gauss": inside.max(),
+        "principal": sides[:, 0].max(),
+        "pressing": low,
+    }
+    return row, fields, inside
 
 
 def _of_all_bodies(bodies: Bodies, values: np.ndarray) -> np.ndarray:
