@@ -56,13 +56,15 @@ def refuse_picture(file: str) -> None:
 
 
 def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:
-    """Mesh, quality table, picture."""
+    """Mesh, its files, quality table, picture."""
     if options.view:
         refuse_picture(options.view)
     scene, folder, bars = prepared(options, comm)
+    from ..io.stage_cache import on_root
     from ..study.pipeline import pipeline
 
     run = pipeline.run(scene, folder, until="mesh", comm=comm, progress=bars)
+    on_root(comm, partial(save_mesh, run.mesh, folder))
     if options.view and (comm is None or comm.rank == 0):
         draw(run.mesh, options.view)
     tell(options, comm, lambda: tables.mesh_quality(run.mesh), run)
@@ -330,6 +332,22 @@ def run_folder(options: argparse.Namespace) -> Path:
         return Path(options.output)
     path = scene_path(options.scene)
     return path.parent if path != Path(options.scene) else Path("runs") / path.stem
+
+
+def save_mesh(mesh_made: Any, folder: Path) -> None:
+    """``mesh.vtu`` for ParaView, and ``named_mesh.msh`` with the names of bodies, faces and node
+    sets for gmsh and for scenes of kind ``imported``.
+    """
+    from geometry.export import write_msh
+
+    from ..io.run_folder import NAMED_MESH
+    from ..io.stage_cache import write_atomically
+    from ..view.mesh import save_vtu
+
+    with write_atomically(folder / "mesh.vtu") as file:
+        save_vtu(mesh_made, file)
+    with write_atomically(folder / NAMED_MESH) as file:
+        write_msh(mesh_made, file, binary=True)
 
 
 def draw(mesh_made: Any, file: str) -> None:

@@ -34,7 +34,7 @@ _COMMANDS = {
         commands.check,
     ),
     "mesh": (
-        "draw and mesh the geometry, print the quality table",
+        "draw and mesh the geometry into mesh.vtu and named_mesh.msh, print the quality table",
         "bladefem mesh scenes/wedge.toml --view mesh.png",
         commands.mesh,
     ),

@@ -20,6 +20,8 @@ from .stage_cache import open_folder, write_text
 EARLIER_FOLDER = "earlier"
 # names of the fields that the user gave, in addition to the scene with all its values
 GIVEN_FIELDS_FILE = "given.json"
+# not all .msh are results: a mesh of the user's own may lie in the folder
+NAMED_MESH = "named_mesh.msh"
 RESULT_SUFFIXES = (
     ".csv",
     ".gif",
@@ -132,7 +134,9 @@ def _put_away(folder: Path) -> str:
     results = [
         p
         for p in folder.iterdir()
-        if p.suffix in RESULT_SUFFIXES and not p.name.startswith(".") and p.is_file()
+        if (p.suffix in RESULT_SUFFIXES or p.name == NAMED_MESH)
+        and not p.name.startswith(".")
+        and p.is_file()
     ]
     if not results:
         return ""
