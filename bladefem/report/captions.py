@@ -117,8 +117,9 @@ CAPTIONS = {
     "in one period at each resonance; the enclosed area is the friction work.",
     "response/flow": "Waves of the wheel in the flow, without dampers; negative nodal diameters "
     "run backwards.",
-    "response/flutter": "Limit cycle of the least damped wave for each load: smaller motions grow "
-    "to it, larger ones decay to it, up to the amplitude from which flutter grows.",
+    "response/flutter": "Limit cycle of each fed wave under each load; the start decides which "
+    "stays. Smaller motions grow to it, larger ones decay to it, up to the amplitude from which "
+    "flutter grows.",
     "response/flow_damping": "Damping of each wave by blade and flow, without dampers. Waves below "
     "zero flutter unless friction holds them.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ..study.pipeline.flutter import wave_words
 from ..study.pipeline.run_records import SolvedRun
 from ..view.wheel import draw_waves
 from .headlines import Headline
 
 
 def flow_tables(run: SolvedRun) -> dict[str, pd.DataFrame]:
-    """Damping of each wave, and the limit cycles of the least damped one; empty without a flow."""
+    """Damping of each wave, and the limit cycles of the fed ones; empty without a flow."""
     found = run.flutter
     if found is None:
         return {}
@@ -35,7 +36,7 @@ def flow_tables(run: SolvedRun) -> dict[str, pd.DataFrame]:
                 {
                     "load": one.load,
                     **({} if one.mass is None else {"mass": one.mass}),
-                    "nodal_diameter": found.worst,
+                    "nodal_diameter": one.wave,
                     "frequency": one.frequency,
                     "limit_cycle": one.amplitude,
                     "flutter_amplitude": one.largest,
@@ -68,17 +69,17 @@ def flow_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
 
 
 def flow_headlines(run: SolvedRun) -> list[Headline]:
-    """The limit cycle under the load where it is smallest."""
+    """The largest limit cycle under the load where it is smallest."""
     found = run.flutter
     if found is None or not found.held:
         return []
-    one = min(found.held, key=lambda held: held.amplitude)
+    one = min(found.largest, key=lambda held: held.amplitude)
     grows = "" if np.isnan(one.largest) else f"; grows from {1e6 * one.largest:.4g} µm on"
     return [
         Headline(
             "flutter held by friction",
             f"{1e6 * one.amplitude:.4g} µm",
             "in one harmonic, by the nonlinear mode",
-            f"{abs(found.worst)} nodal diameters under {one.load:.4g} N{grows}",
+            f"largest of fed waves: {wave_words(one.wave)}, under {one.load:.4g} N{grows}",
         )
     ]

@@ -77,28 +77,35 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced):
     found = subject.find_flutter(reduced, Bodies(reduced.scene, reduced.mesh), patches, keep)
     waves = wave_influence(reduced.scene, COUNT)
     np.testing.assert_allclose(found.net, 1e-3 + waves.imag)
-    (held,) = found.held
+    assert [one.wave for one in found.held] == found.fed
+    assert sorted(found.fed) == sorted(found.diameters[found.net < 0]) and len(found.fed) > 5
+    (largest,) = found.largest
+    assert largest.amplitude == max(one.amplitude for one in found.held)
+    held = found.held[0]
+    assert held.wave == found.worst
     assert found.net.min() < 0 < found.net[9]
     assert 0 < held.amplitude < held.largest
     flow = scene_flow(reduced.scene, COUNT)
-    n = abs(found.worst)
+    wanted = sorted({0, 9, abs(held.wave), abs(largest.wave)})
     sector = subject.reduce_sector(
-        Bodies(reduced.scene, reduced.mesh), patches, sorted({0, n, 9}), reduced.settings.modes
+        Bodies(reduced.scene, reduced.mesh), patches, wanted, reduced.settings.modes
     )
     (case,) = load_cases(reduced.scene, reduced.mesh, reduced.contact)
-    model = subject._wave_model(reduced, sector, patches, case, flow, found.worst, 0)
-    last = None
-    for force in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
-        driven = replace(model, excitation={1: np.array([force])})
-        last = solve(driven, 2 * np.pi * held.frequency, 1, 128, start=last)
-        assert last.converged
-    assert abs(last.probe[1, 0]) == pytest.approx(held.amplitude, rel=0.02)
+    for one in (held, largest):
+        model = subject._wave_model(reduced, sector, patches, case, flow, one.wave, 0)
+        last = None
+        for force in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
+            driven = replace(model, excitation={1: np.array([force])})
+            last = solve(driven, 2 * np.pi * one.frequency, 1, 128, start=last)
+            assert last.converged
+        assert abs(last.probe[1, 0]) == pytest.approx(one.amplitude, rel=0.02)
     said = subject.flutter_sentences(found)
     assert "waves flutter without dampers" in said[0] and "limit cycle" in said[1]
     shown = replace(reduced, flutter=found)
     tables = flow_tables(shown)
     assert len(tables["response/flow"]) == COUNT
     assert tables["response/flutter"]["limit_cycle"][0] == held.amplitude
+    assert list(tables["response/flutter"]["nodal_diameter"]) == found.fed
     assert len(flow_headlines(shown)) == len(flow_drawing(shown)) == 1
 
 

@@ -121,6 +121,71 @@ def test_limit_cycle_marched_in_time():
     assert middle == pytest.approx(stable.amplitude, rel=0.02)
 
 
+def march_fed_ring(net, limit, kt, starts, cycles=900, steps=100):
+    """Wheels of eight blades of unit mass and stiffness with Jenkins elements between neighbours.
+
+    Args:
+        net: (8,) damping of forward waves of 0..7 nodal diameters, as forces in phase with the
+            velocity [1].
+        starts: (8, k) complex motion of the blades at rest of their elements.
+
+    Returns:
+        (k, 8) amplitude of each wave at the end.
+    """
+    blades = np.arange(len(net))
+    waves = np.exp(2j * np.pi * np.outer(blades, blades) / len(net)) / np.sqrt(len(net))
+    back = net[-blades]
+    # what forward and backward waves have in common is viscous, the rest circulates
+    C = ((waves * (net + back)) @ waves.conj().T).real
+    A = np.eye(len(net)) + ((waves * 1j * (net - back)) @ waves.conj().T).real
+    dt = 2 * pi / steps
+    q, v = starts.real.copy(), -starts.imag
+    slider = q - np.roll(q, -1, 0)
+    motions = []
+    for k in range(cycles * steps):
+        relative = q - np.roll(q, -1, 0)
+        slider = np.clip(slider, relative - limit / kt, relative + limit / kt)
+        force = kt * (relative - slider)
+        v += dt * (np.roll(force, 1, 0) - force - A @ q - C @ v)
+        q += dt * v
+        if k >= (cycles - 60) * steps:
+            motions.append(waves.conj().T @ q / np.sqrt(len(net)))
+    # a wave turns in its own sense
+    spectrum = abs(np.fft.fft(np.array(motions) * np.hanning(len(motions))[:, None, None], axis=0))
+    forward = spectrum[: len(motions) // 2].max(axis=0) * 4 / len(motions)
+    return forward.T
+
+
+def test_every_fed_wave_keeps_its_limit_cycle():
+    """Two waves are fed: the cycle of either is left by no small motion, that of the wave fed less
+    is the larger, and the start decides; against marching from both, and from noise.
+    """
+    kt, limit = 0.05, 1.0
+    net = np.full(8, 0.004)
+    fed = {7: -0.002, 5: -0.005}
+    net[list(fed)] = list(fed.values())
+    expected = {}
+    for wave, damping in fed.items():
+        # the dampers move by this times the blades
+        apart = abs(1 - np.exp(2j * pi * wave / 8))
+        mass = single_mass(kt * apart**2, limit * apart)
+        amplitudes = limit / (kt * apart) * np.geomspace(1.005, 30, 200)
+        points = list(nonlinear_mode(mass, amplitudes, H=1, samples=0))
+        expected[wave] = next(c for c in limit_cycles(points, damping) if c.stable).amplitude
+    assert expected[7] > 2 * expected[5]
+    generator = np.random.default_rng(0)
+    noise = generator.normal(size=(8, 3)) + 1j * generator.normal(size=(8, 3))
+    turns = np.exp(2j * pi * np.arange(8)[:, None] * np.array([[7, 5, 0]]) / 8)
+    starts = turns * [expected[7], expected[5], 0.0] + noise * [1.0, 1.0, 10.0]
+    ends = march_fed_ring(net, limit, kt, starts)
+    for end, wave in zip(ends[:2], fed, strict=True):
+        assert end[wave] == pytest.approx(expected[wave], rel=0.03)
+        assert np.delete(end, wave).max() < 0.03 * end[wave]
+    # from noise it is one of the two
+    survivor = int(np.argmax(ends[2]))
+    assert ends[2, survivor] == pytest.approx(expected[survivor], rel=0.03)
+
+
 def test_flutter_is_refused_in_words():
     points = list(nonlinear_mode(single_mass(0.4, 0.3), [1.0, 1.5, 2.0], H=1, samples=0))
     with pytest.raises(InputError, match="flutter, friction holds .* at most"):

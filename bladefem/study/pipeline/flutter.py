@@ -1,5 +1,10 @@
 """Flutter of a scene's wheel: which waves the flow feeds, and the limit cycles at which friction
-holds the least damped one.
+holds each of them.
+
+One limit cycle does not push out another one: where dampers slip in one wave at x times the motion
+at which they begin to, a small motion in another wave is damped by 1 / (2x) (incremental describing
+function of a Jenkins element, over 4 kt / pi), which is more than the 1/4 that friction holds in
+any limit cycle as long as x < 2. So each fed wave may survive, and the start decides which does.
 """
 
 from __future__ import annotations
@@ -40,11 +45,13 @@ STICKING_AMPLITUDE = 1e-10
 
 @dataclass(frozen=True)
 class HeldFlutter:
-    """The least damped wave under one load."""
+    """One fed wave under one load."""
 
     # [N], and of the damper [kg]
     load: float
     mass: float | None
+    # nodal diameter, backward ones negative
+    wave: int
     # limit cycle at the probe [m] and where [Hz]
     amplitude: float
     frequency: float
@@ -62,7 +69,7 @@ class FlutterResult:
     shift: RealArray
     flow: RealArray
     net: RealArray
-    # empty where no wave is fed
+    # load by load, each with all fed waves, the least damped one first; empty where none is fed
     held: tuple[HeldFlutter, ...]
 
     @property
@@ -75,6 +82,22 @@ class FlutterResult:
     def worst(self) -> int:
         """Nodal diameter of the least damped wave."""
         return int(self.diameters[np.argmin(self.net)])
+
+    @property
+    def fed(self) -> list[int]:
+        """Nodal diameters of the waves that flutter without dampers, the least damped one first."""
+        order = np.argsort(self.net, kind="stable")
+        return [int(self.diameters[i]) for i in order if self.net[i] < 0]
+
+    @property
+    def largest(self) -> tuple[HeldFlutter, ...]:
+        """The largest limit cycle of each load and mass, in their order."""
+        found: dict[tuple[float, float | None], HeldFlutter] = {}
+        for one in self.held:
+            case = (one.load, one.mass)
+            if case not in found or one.amplitude > found[case].amplitude:
+                found[case] = one
+        return tuple(found.values())
 
     @property
     def onset(self) -> float:
@@ -95,7 +118,7 @@ def find_flutter(
     """Damping of all waves, and limit cycles under each load of the study; None without a flow.
 
     Raises:
-        InputError: friction holds the flutter under some load at no amplitude.
+        InputError: friction holds a fed wave under some load at no amplitude.
     """
     scene = run.scene
     flow = scene_flow(scene, run.reduced.sectors)
@@ -103,10 +126,10 @@ def find_flutter(
         return None
     fed = flow.influence.imag
     found = FlutterResult(flow.influence.real, fed, fed + scene.operation.damping, ())
-    if found.net.min() > 0:
+    if not found.fed:
         return found
-    n, _ = folded_diameter(1, found.worst % len(fed), len(fed))
-    wanted = sorted({0, n, flow.own})
+    # of the sector: backward waves are those of the forward ones, mirrored
+    wanted = sorted({0, flow.own, *(abs(wave) for wave in found.fed)})
     modes = run.settings.modes
     sector = keep(
         "flutter_sector",
@@ -116,9 +139,11 @@ def find_flutter(
     cases = load_cases(scene, run.mesh, run.contact)
 
     def compute() -> tuple[HeldFlutter, ...]:
-        return tuple(_held(run, sector, patches, case, flow, found.worst) for case in cases)
+        return tuple(
+            _held(run, sector, patches, case, flow, wave) for case in cases for wave in found.fed
+        )
 
-    key = stage_key("response", scene, "flutter", found.worst, [(c.load, c.mass) for c in cases])
+    key = stage_key("response", scene, "flutter", found.fed, [(c.load, c.mass) for c in cases])
     return replace(found, held=keep("flutter", key, compute))
 
 
@@ -163,6 +188,7 @@ def _held(
     return HeldFlutter(
         case.load,
         case.mass,
+        wave,
         at_probe(stable.amplitude),
         stable.omega / (2 * pi),
         at_probe(min(beyond)) if beyond else float("nan"),
@@ -232,24 +258,38 @@ def _wave_model(
 def flutter_sentences(found: FlutterResult) -> list[str]:
     """What the flow does, in words."""
     d = int(np.argmin(found.net))
-    way = "backward" if found.worst < 0 else "forward"
     share = (
-        f"least damped wave: {abs(found.worst)} nodal diameters, {way}, "
+        f"least damped wave: {wave_words(found.worst)}, "
         f"{100 * found.net[d]:.3g} % of critical ({100 * found.flow[d]:+.3g} % by the flow)"
     )
     if not found.held:
         onset = "" if np.isinf(found.onset) else f"; {found.onset:.3g} times this flow flutters"
         return [f"flow: no wave flutters; {share}{onset}"]
-    fed = int((found.net < 0).sum())
     sentences = [
-        f"flow: {fed} waves flutter without dampers, from {found.onset:.3g} times this flow on; "
-        f"{share}"
+        f"flow: {len(found.fed)} waves flutter without dampers, from {found.onset:.3g} times this "
+        f"flow on; {share}"
     ]
-    for one in found.held:
+    first = [one for one in found.held if one.wave == found.worst]
+    for one, most in zip(first, found.largest, strict=True):
         beyond = "" if np.isnan(one.largest) else f", and grows from {1e6 * one.largest:.4g} um on"
+        others = "" if most.wave == one.wave else f"; {_cycle(most)} in {wave_words(most.wave)}"
         sentences.append(
             f"flutter under {one.load:g} N: friction holds it in a limit cycle of "
-            f"{1e6 * one.amplitude:.4g} um at {one.frequency:.5g} Hz{beyond} (one harmonic; forced "
-            "responses leave it out)"
+            f"{_cycle(one)}{beyond}{others} (one harmonic; forced responses leave it out)"
+        )
+    if len(found.fed) > 1:
+        sentences.append(
+            "flutter: each fed wave has a limit cycle of its own, and the start decides which of "
+            "them stays; the largest is that to judge by"
         )
     return sentences
+
+
+def wave_words(wave: int) -> str:
+    """A wave's nodal diameters and its direction, in words."""
+    way = "backward" if wave < 0 else "forward"
+    return f"{abs(wave)} nodal diameters, {way}"
+
+
+def _cycle(one: HeldFlutter) -> str:
+    return f"{1e6 * one.amplitude:.4g} um at {one.frequency:.5g} Hz"
