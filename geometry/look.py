@@ -53,6 +53,8 @@ NEEDED_NAMES = {
     "seat_right": "platform face that this blade's damper presses on",
     "damper": "body of the damper, with faces damper_left and damper_right",
 }
+# the other names that a set of the file may be meant for
+FURTHER_NAMES = ("cyclic_high", "damper_left", "damper_right")
 
 
 @dataclass(frozen=True)
@@ -104,6 +106,8 @@ class Look:
     cut: CutFaces | None
     # name of the face nearest to the axis, when there are cut faces
     bore: str | None
+    # name that a task needs -> the one set of the file whose name contains it
+    alike: dict[str, str]
     # one sentence each
     missing: tuple[str, ...]
 
@@ -132,6 +136,7 @@ def look_at(file: str | Path) -> Look:
     faces = tuple(_face_part(outside, number, name) for number, name in enumerate(names))
     cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()), drawing)
     bore = None if cut is None else _bore_face(raw, outside, faces, cut)
+    alike = {} if drawing else _alike_names(raw)
     return Look(
         Path(file),
         raw,
@@ -145,7 +150,8 @@ def look_at(file: str | Path) -> Look:
         faces,
         cut,
         bore,
-        _missing_in_drawing(cut) if drawing else _missing_names(raw, cut, bore),
+        alike,
+        _missing_in_drawing(cut) if drawing else _missing_names(raw, alike, cut, bore),
     )
 
 
@@ -161,13 +167,13 @@ def is_drawing(file: Path) -> bool:
 
 def starting_scene(look: Look) -> str:
     """Text of a scene that holds what was guessed, with the rest as comments."""
-    names = []
-    taken = _names_of(look.raw)
+    names = [f"{new} = {old}" for new, old in look.alike.items()]
+    taken = _names_of(look.raw) | set(look.alike)
     if look.cut is not None:
         wanted = {"cyclic_low": look.cut.low, "cyclic_high": look.cut.high}
         if look.bore:
             wanted["clamp"] = (look.bore,)
-        names = [f"{new} = {' + '.join(old)}" for new, old in wanted.items() if new not in taken]
+        names += [f"{new} = {' + '.join(old)}" for new, old in wanted.items() if new not in taken]
     axis = AXES[look.cut.axis] if look.cut else AXES["z"]
     # which states its unit
     drawing = is_drawing(look.file)
@@ -188,8 +194,8 @@ def starting_scene(look: Look) -> str:
         NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3
     ):
         lines.append('linear = "promote"'.ljust(32) + "# first-order cells get mid-side nodes")
-    lines += ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing), ""]
-    return "\n".join(lines)
+    missing = ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing)]
+    return "\n".join([*lines, *(missing if look.missing else []), ""])
 
 
 def _cell_counts(raw: RawMesh) -> dict[str, int]:
@@ -419,6 +425,29 @@ def _names_of(raw: RawMesh) -> set[str]:
     return {"_".join(name.lower().split()) for name in every}
 
 
+def _alike_names(raw: RawMesh) -> dict[str, str]:
+    """Names that a task needs and no set has as they are, with the one set whose name contains
+    them: "seat_left" with "PART-1.Seat-Left".
+    """
+    there = _names_of(raw)
+    solids = {
+        name
+        for name, parts in raw.groups.items()
+        if any(DIMENSION[_cell_family(raw, block)] == 3 for block, _ in parts)
+    }
+    found = {}
+    for wanted in (*NEEDED_NAMES, *FURTHER_NAMES):
+        among = solids if wanted == "damper" else {*raw.groups, *raw.node_sets, *raw.surfaces}
+        fitting = [name for name in among if _letters(wanted) in _letters(name)]
+        if wanted not in there and len(fitting) == 1:
+            found[wanted] = fitting[0]
+    return found
+
+
+def _letters(name: str) -> str:
+    return "".join(c for c in name.lower() if c.isalnum())
+
+
 def _missing_in_drawing(cut: CutFaces | None) -> tuple[str, ...]:
     """What a run of a STEP file needs and its faces do not tell."""
     return STEP_FILE_NEEDS if cut is not None else (UNCUT_SECTOR_NEEDS, *STEP_FILE_NEEDS)
@@ -426,11 +455,12 @@ def _missing_in_drawing(cut: CutFaces | None) -> tuple[str, ...]:
 
 def _missing_names(
     raw: RawMesh,
+    alike: dict[str, str],
     cut: CutFaces | None,
     bore: str | None,
 ) -> tuple[str, ...]:
     """What a run needs and neither a set of the file nor a guess provides."""
-    there = _names_of(raw)
+    there = _names_of(raw) | set(alike)
     if cut is not None:
         there |= {"cyclic_low", "clamp"} if bore else {"cyclic_low"}
     needed = [name for name in NEEDED_NAMES if name not in there]

@@ -55,6 +55,22 @@ def test_the_scene_runs_as_it_is_written(deck):
     assert np.array_equal(np.unique(mesh.faces["clamp"]), np.unique(mesh.faces["root"]))
 
 
+def test_sets_with_alike_names_are_taken(tmp_path):
+    """Named as the writing program does it; two candidates are none."""
+    m = decks.model("c3d15_c3d20")
+    clamp = m.node_sets["clamp"]
+    sets = {"PART-1.CLAMP": clamp, "N_SEAT_LEFT": clamp, "TIP-MID": clamp, "TIP-MID-2": clamp}
+    deck = tmp_path / "a.inp"
+    deck.write_text("\n".join(decks.flat_deck(decks.Model(m.points, m.blocks, sets, {}), {})))
+    look = look_at(deck)
+    assert look.alike == {"clamp": "PART-1.CLAMP", "seat_left": "N_SEAT_LEFT"}
+    told = tomllib.loads(starting_scene(look))["imported"]["names"]
+    assert told[:2] == ["clamp = PART-1.CLAMP", "seat_left = N_SEAT_LEFT"]
+    assert [name.split(" ")[0] for name in told[2:]] == ["cyclic_low", "cyclic_high"]
+    missing = [sentence.split(":")[0] for sentence in look.missing]
+    assert missing == ["tip_mid", "seat_right", "damper"]
+
+
 def test_facets_keep_their_face_when_cells_change(deck):
     raw = read_raw(deck)
     faces = numbered_faces(raw)
