@@ -102,6 +102,25 @@ class PortModel:
 
 
 @dataclass(frozen=True)
+class SectorSpan:
+    """What the modes of some nodal diameters of a cyclic sector span: m real vectors that serve all
+    others.
+
+    In diameter n of N sectors, a = 2 pi n / N, their matrices are A0 + cos(a) A1 + i sin(a) A2, and
+    the ports move by (own + e^{ia} next) times their coordinates.
+    """
+
+    # (3, m, m) stiffness parts [N/m]
+    stiffness: RealArray
+    # (3, m, m) mass parts [kg]
+    mass: RealArray
+    # (p, m) of the ports
+    own: RealArray
+    # (p, m) what the next sector's motion adds
+    next: RealArray
+
+
+@dataclass(frozen=True)
 class Patch:
     """Matched contact nodes of one face pair: the carrier of pressure maps and friction
     elements.

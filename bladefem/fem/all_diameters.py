@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import eigh
 
-from ..data import ModeSet
+from ..data import ModeSet, SectorSpan
 from ..errors import InputError, NotSolvedError
 from ..util.progress import Progress, without_progress
 from . import cyclic_schur as core
@@ -207,6 +207,25 @@ def eigenpairs(
         if helps:
             blocks.append(found.X)
         yield _first_pairs(found, count, helps)
+
+
+def sector_span(t: Transformation, blocks: list[np.ndarray], P: sp.spmatrix) -> SectorSpan:
+    """What vectors of some nodal diameters span, for the ports of all others (collective).
+
+    Args:
+        blocks: (n_own, k) vectors of each of them, as this rank's unknowns.
+        P: (n_points*dim, p) port vectors in mesh numbering.
+    """
+    space = _extend_space(t, blocks, None)
+    rank = t.body.comm.rank
+    own = slice(int(t.start[rank]), int(t.start[rank + 1]))
+    ports = sp.csc_matrix(P).T
+
+    def moved(T: sp.csr_matrix) -> np.ndarray:
+        local = (ports @ T).tocsc()[:, own] @ space.W
+        return np.asarray(t.body.comm.allreduce(local) if t.body.comm.size > 1 else local)
+
+    return SectorSpan(np.array(space.K), np.array(space.M), moved(t.low), moved(high_part(t)))
 
 
 def _first_pairs(

@@ -101,6 +101,7 @@ def port_models(
     solver: Eigensolver = SLEPC,
     kept: KeptPairs | None = None,
     spin: Spin | None = None,
+    seen: Callable[[Eigenpairs], None] | None = None,
 ) -> Iterator[tuple[int, PortModel]]:
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
@@ -112,13 +113,14 @@ def port_models(
         static_load: (n_points*dim,) [N], of nodal diameter 0.
         kept: modes of the same body that are known; they are used up.
         spin: as for :func:`port_model`.
+        seen: is shown the modes of each nodal diameter.
     """
     shared = (
         _interior_flexibility(t.opened, P, static_load)
         if t.opened is not None and kind == "rubin"
         else None
     )
-    model = _Ports(P, names, count, static_load, kind, solver, shared, spin)
+    model = _Ports(P, names, count, static_load, kind, solver, shared, spin, seen)
     if kept is not None and kept.serves(diameters, count):
         for n in diameters:
             yield n, _port_model(model, kept.pairs.pop(n))
@@ -152,10 +154,13 @@ class _Ports:
     # see ``_interior_flexibility``
     shared: tuple[np.ndarray, np.ndarray] | None
     spin: Spin | None
+    seen: Callable[[Eigenpairs], None] | None
 
 
 def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     """The port model of one nodal diameter from its modes."""
+    if model.seen is not None:
+        model.seen(p)
     n = p.con.nodal_diameter
     load = model.static_load if n == 0 else None
     P = model.P

@@ -25,7 +25,18 @@ from .sector_modes import (
     wave_bodies,
 )
 from .solution import Solution
-from .stability import INSTANTS_PER_PERIOD, linearised_contacts
+from .stability import (
+    INSTANTS_PER_PERIOD,
+    MAX_OPERATIONS,
+    linearised_contacts,
+    map_operations,
+)
+
+
+def class_diameters(d: int, engine_order: int, sectors: int) -> tuple[int, ...]:
+    """Nodal diameters 0..N/2 in which the disturbances of a class move, sorted."""
+    waves = {(h * engine_order + d) % sectors for h in range(sectors)}
+    return tuple(sorted({min(n, sectors - n) for n in waves}))
 
 
 def class_angle(d: int, engine_order: int, sectors: int) -> float:
@@ -43,14 +54,17 @@ def class_multiplier(
     bodies: ReducedModel,
     angle: float,
     instants: int = INSTANTS_PER_PERIOD,
+    most: float = MAX_OPERATIONS,
 ) -> float:
-    """Largest modulus of the Floquet multipliers of a class of disturbances.
+    """Largest modulus of the Floquet multipliers of a class of disturbances; NaN where it would
+    take too many operations.
 
     Args:
         solution: a motion of the model, in the wave.
         bodies: the model with the bodies of the class: that of harmonic h = 0 .. r-1 moves with the
             phase 2 pi h / r plus the angle between two blades that are T / r apart.
         angle: `class_angle` of the class.
+        most: operations above which it is not made.
 
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
@@ -59,6 +73,8 @@ def class_multiplier(
     S = r * -(-max(instants, 16 * (solution.harmonics + 1)) // r)
     ring = _class_ring(bodies, r, angle)
     contacts, nodes = linearised_contacts(model, solution, ring, S, copies=2)
+    if map_operations(contacts, r, S) > most:
+        return float("nan")
     part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // r)
     values = linalg.eigvals(_handed_on(ring, part, angle), check_finite=False)
     return float(abs(values).max() ** r)

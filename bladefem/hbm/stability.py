@@ -154,7 +154,7 @@ def _leading(
     if _operations_from_states(model, solution, system, S) > most:
         return None
     contacts, nodes = linearised_contacts(model, solution, system, S)
-    if _operations(contacts, system.blades, S) > most:
+    if map_operations(contacts, system.blades, S) > most:
         return None
     part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // system.blades)
     values = linalg.eigvals(_handed_on(system, part), check_finite=False) ** system.blades
@@ -176,7 +176,7 @@ def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:
     )
 
 
-def _operations(contacts: OpenContacts, blades: int, S: int) -> float:
+def map_operations(contacts: OpenContacts, blades: int, S: int) -> float:
     """Of carrying all disturbances through 1/r of S steps, and of the multipliers."""
     rows, M = contacts.reading.shape
     coupled = sum((2.0 * len(group)) ** 2 for group in contacts.groups)

@@ -73,24 +73,27 @@ def wheel_models(
     engine_order: int,
     sectors: int,
     harmonics: int,
+    shift: int = 0,
 ) -> tuple[PortModel, ...]:
     """One model a harmonic 0..`harmonics` for a tuned wheel.
 
     Args:
         sector: nodal diameter 0..N/2 to the sector's model in it.
+        shift: harmonic h moves in diameter h EO + shift: a class of disturbances of the wave
+            (`bladefem.hbm.other_diameters`).
 
     Raises:
         InputError: a harmonic falls into a nodal diameter that is not given.
     """
     models = []
     for h in range(harmonics + 1):
-        n, mirrored = folded_diameter(h, engine_order, sectors)
+        n, mirrored = folded_diameter(1, h * engine_order + shift, sectors)
         if n not in sector:
             raise InputError(
                 f"harmonic {h} of engine order {engine_order} needs the modes of nodal diameter {n}"
             )
         body = _mirror(sector[n]) if mirrored else sector[n]
-        models.append(pair_model(body, following, 2 * pi * h * engine_order / sectors))
+        models.append(pair_model(body, following, 2 * pi * (h * engine_order + shift) / sectors))
     return tuple(models)
 
 

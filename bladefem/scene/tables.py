@@ -288,7 +288,8 @@ class Study:
     stability: bool = quantity(
         True,
         help="Floquet multipliers of the points of each curve, where normal loads follow the "
-        "motion: unstable ones are marked and are no resonance",
+        "motion: unstable ones are marked and are no resonance; of a wheel the lowest resonance is "
+        "judged in every nodal diameter",
     )
 
 

@@ -44,6 +44,9 @@ class Family:
     harmonics: int = 99
     # damper models that can be had
     dampers: tuple[str, ...] = ()
+    # of some settings, the model with the bodies of a class of disturbances of its travelling wave
+    # (hbm.other_diameters); None where they are not known
+    disturbed: Callable[[Settings, int], ReducedModel] | None = None
 
 
 def family_member(family: Family, settings: Settings) -> Member:

@@ -12,8 +12,12 @@ import numpy as np
 
 from geometry.mesh import Mesh
 
-from ...data import Patch
+from ...data import Patch, PortModel
+from ...hbm.model import ReducedModel
+from ...reduction.assemble import wheel_models
+from ...reduction.other_diameters import has_rigid_motion, spanned_models
 from ...reduction.truncate import truncate_modes
+from ...scene.aerodynamics import has_flow
 from ...scene.tables import Scene
 from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
@@ -29,7 +33,14 @@ from .coriolis import with_coriolis
 from .liftoff import naming_the_load
 from .run_records import Seating
 from .stage_inputs import stage_key
-from .stages import Bodies, Reduced, harmonic_diameters, reduce_sector, with_damper_mass
+from .stages import (
+    Bodies,
+    Reduced,
+    harmonic_diameters,
+    is_wheel,
+    reduce_sector,
+    with_damper_mass,
+)
 
 # higher ones borrow the nodal diameter next to their own
 EXACT_HARMONICS = 3
@@ -88,12 +99,50 @@ def family_of_case(
         )
         return Member(coarsened_elements(model, groups), groups)
 
-    return Family(
+    others = other_diameters(scene, reduced)
+
+    def disturbed(settings: Settings, shift: int) -> ReducedModel:
+        assert others is not None
+        sides = wheel_models(
+            others(settings.modes),
+            reduced.following,
+            scene.excitation.engine_order,
+            reduced.sectors,
+            settings.harmonics,
+            shift,
+        )
+        H, damper = settings.harmonics, settings.damper
+        model = joint_model(scene, mesh, reduced, patches, case, H, damper, sides)
+        return coarsened_elements(model, family_member(family, settings).groups)
+
+    family = Family(
         shared,
         max(len(body.omega) for body in reduced.sector.values()),
         2 * most + 1,
         DAMPER_MODELS,
+        disturbed if others is not None else None,
     )
+    return family
+
+
+def other_diameters(
+    scene: Scene,
+    reduced: Reduced,
+) -> Callable[[int], dict[int, PortModel]] | None:
+    """The sector with so many modes in all nodal diameters; None where those that were not reduced
+    are not known: no span, rigid motions, a flow, Coriolis forces that count.
+    """
+    span = reduced.span
+    coupled = any(body.damping is not None for body in reduced.sector.values())
+    if span is None or coupled or has_flow(scene) or has_rigid_motion(reduced.sector):
+        return None
+
+    @lru_cache(maxsize=2)
+    def found(modes: int) -> dict[int, PortModel]:
+        few = {n: truncate_modes(body, modes) for n, body in reduced.sector.items()}
+        return spanned_models(span, few, reduced.sectors, modes)
+
+    return found
 
 
 def softer_body(
@@ -139,13 +188,12 @@ def reduced_sector(
     """
     settings = replace(first_settings(scene), most=affordable_harmonics(case))
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
+    spanned = bool(scene.study.stability) and is_wheel(bodies.mesh)
     while True:
         count = judged_modes(scene, settings)
-        key = stage_key("reduction", scene, np.array(diameters), count)
-        reduced = with_coriolis(
-            scene,
-            keep("reduction", key, partial(reduce_sector, bodies, patches, diameters, count)),
-        )
+        key = stage_key("reduction", scene, np.array(diameters), count, spanned)
+        reduce = partial(reduce_sector, bodies, patches, diameters, count, spanned=spanned)
+        reduced = with_coriolis(scene, keep("reduction", key, reduce))
         if not settings.chosen:
             return settings, reduced
         family = family_of_case(scene, bodies.mesh, reduced, patches, case)

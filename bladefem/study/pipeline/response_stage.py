@@ -13,6 +13,7 @@ from ...errors import NotSolvedError
 from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
+from ...util.message import method, warning
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
@@ -25,7 +26,8 @@ from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
 from .linear_limits import linear_limits
 from .loads import Curve, study_loads
-from .response_remarks import best_load_remarks, response_remarks, stress_message
+from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
+from .response_remarks import best_load_remarks, load_of, response_remarks, stress_message
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
 from .stability import Disturbances, judged_disturbances
@@ -162,11 +164,51 @@ def _load_responses(
         limits = linear_limits(rich, scene.excitation.mode, band)
     nodes = -(-len(cases[0].elements.kt) // 2)
     judged = Disturbances()
+    others: dict[int, tuple[ClassVerdict, ...]] = {}
     if scene.study.stability:
         order = scene.excitation.engine_order
         judged = judged_disturbances(models, settings, order, sectors)
+        with clock("response"):
+            # of the lowest resonance, which the report begins with
+            k = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+            others[k] = _class_verdicts(scene, family(cases[k]), curves[k], sectors, keep)
     clock.messages.extend(response_remarks(scene, settings, curves, nodes, judged))
-    return Response(settings, curves, limits)
+    clock.messages.extend(_class_remarks(curves, others, judged))
+    return Response(settings, curves, limits, others=others)
+
+
+def _class_verdicts(
+    scene: Scene,
+    models: Family,
+    curve: Curve,
+    sectors: int,
+    keep: StageRunner,
+) -> tuple[ClassVerdict, ...]:
+    """Of the resonance of a curve, kept with the run."""
+    if models.disturbed is None:
+        return ()
+    order = scene.excitation.engine_order
+
+    def compute() -> tuple[ClassVerdict, ...]:
+        return class_verdicts(models, curve.settings, curve.peak, order, sectors)
+
+    known = curve.load, curve.mass, curve.peak.f, replace(curve.settings, error=None)
+    key = stage_key("response", scene, "other diameters", *known)
+    return keep("other_diameters", key, lambda: on_root(keep.comm, compute))
+
+
+def _class_remarks(
+    curves: Sequence[Curve],
+    others: dict[int, tuple[ClassVerdict, ...]],
+    judged: Disturbances,
+) -> list[str]:
+    """What was found in the other nodal diameters; a warning where a resonance is left."""
+    said: list[str] = []
+    for k, verdicts in others.items():
+        text = sentence_of_classes(load_of(curves[k]), verdicts, judged)
+        if text:
+            said.append((warning if any(v.unstable for v in verdicts) else method)(text))
+    return said
 
 
 def _case_label(case: LoadCase) -> str:

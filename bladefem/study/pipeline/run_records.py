@@ -27,6 +27,7 @@ from .damped_motion import DampedStress
 from .history import DamperMass
 from .linear_limits import Limit
 from .loads import Curve
+from .other_diameters import ClassVerdict
 from .stages import Reduced
 
 if TYPE_CHECKING:
@@ -78,6 +79,9 @@ class Response:
     best: tuple[BestLoad, ...] = ()
     # what the lowest of them depends on, the largest influence first
     influences: tuple[Influence, ...] = ()
+    # number of a curve to the verdicts on its resonance against disturbances in nodal diameters
+    # that its wave does not reach
+    others: dict[int, tuple[ClassVerdict, ...]] = field(default_factory=dict)
 
     @property
     def free_peak(self) -> tuple[float, float]:

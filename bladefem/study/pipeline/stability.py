@@ -83,7 +83,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         highest = i in maxima[:1]
         if i in judged or (costs[i] > budget and not highest):
             continue
-        motion = _judged_motion(model, points[i])
+        motion = judged_motion(model, points[i])
         found[i] = stability_verdict(model, motion, MAX_OPERATIONS if highest else costs[i])
         judged.add(i)
         budget -= costs[i]
@@ -92,7 +92,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
         if top is None or top in judged:
             break
-        found[top] = stability_verdict(model, _judged_motion(model, points[top]))
+        found[top] = stability_verdict(model, judged_motion(model, points[top]))
         judged.add(top)
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
     return Stability(
@@ -104,12 +104,12 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
 
 
 def _judging_operations(model: ReducedModel, point: Solution) -> float:
-    """Operations of the verdict on a point, with those of `_judged_motion`."""
+    """Operations of the verdict on a point, with those of `judged_motion`."""
     own = verdict_operations(model, point)
     return own + RICHER_OPERATIONS * (own > 0 and point.harmonics == 1)
 
 
-def _judged_motion(model: ReducedModel, point: Solution) -> Solution:
+def judged_motion(model: ReducedModel, point: Solution) -> Solution:
     """The point itself, or its motion with more harmonics where it has the first one alone: stick
     and slip of that one may be called unstable where the motion is not.
     """

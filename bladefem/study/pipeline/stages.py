@@ -14,7 +14,7 @@ from geometry.mesh import Mesh, sector_of
 from ...contact.interface_elements import pair_ratio, with_interface_law
 from ...contact.patch import make_patch, normal_ports, port_matrix
 from ...contact.seating import ContactProblem, counting_sense, spin_axis
-from ...data import ModeSet, Patch, PortModel
+from ...data import ModeSet, Patch, PortModel, SectorSpan
 from ...errors import InputError, suggestion
 from ...io.stage_cache import on_root
 from ...reduction.assemble import folded_diameter
@@ -251,6 +251,9 @@ class Reduced:
     # nodal diameter to (m, m) Coriolis forces as damping of the modes [1/s], where there are some:
     # `coriolis.with_coriolis` puts them in
     coriolis: dict[int, RealOrComplex] = field(default_factory=dict)
+    # what their modes span, for the other nodal diameters; None where nobody asked, or where ranks
+    # share the diameters out
+    span: SectorSpan | None = None
 
 
 def rotation_of(bodies: Bodies) -> Spin:
@@ -495,6 +498,7 @@ def reduce_sector(
     diameters: Sequence[int],
     modes: int,
     readings: np.ndarray | None = None,
+    spanned: bool = False,
 ) -> Reduced:
     """Blade side in each nodal diameter and damper side, at the contact, load and probe ports.
 
@@ -502,6 +506,7 @@ def reduce_sector(
         patches: "this" and "next".
         modes: modes kept in each nodal diameter.
         readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
+        spanned: also what the modes of a wheel span, see `Reduced.span`.
     """
     from ...fem.loads import body_mass
     from ...fem.ports import port_model
@@ -511,8 +516,9 @@ def reduce_sector(
     ports = blade_ports(mesh, patches, scene.excitation, readings)
     other = damper_ports(mesh, patches)
     solver = eigensolver(scene)
+    span = None
     if is_wheel(mesh):
-        sector = _reduced_diameters(bodies, ports, modes, diameters)
+        sector, span = _reduced_diameters(bodies, ports, modes, diameters, spanned)
     else:
         kind = scene.model.reduction
 
@@ -547,6 +553,7 @@ def reduce_sector(
         sector_of(mesh).count if is_wheel(mesh) else 0,
         damper_mass,
         {n: body.damping for n, body in sector.items() if body.damping is not None},
+        span,
     )
 
 
@@ -555,8 +562,12 @@ def _reduced_diameters(
     ports: Ports,
     modes: int,
     diameters: Sequence[int],
-) -> dict[int, PortModel]:
-    """The blade side in each nodal diameter; groups of ranks share them out."""
+    spanned: bool,
+) -> tuple[dict[int, PortModel], SectorSpan | None]:
+    """The blade side in each nodal diameter, which groups of ranks share out; and what the modes
+    span, where one group has them all and it is asked for.
+    """
+    from ...fem.all_diameters import Eigenpairs, sector_span
     from ...fem.compat import MPI
     from ...fem.groups import shared_out
     from ...fem.ports import port_models
@@ -565,7 +576,14 @@ def _reduced_diameters(
     solver = eigensolver(scene)
     comm = bodies.comm or MPI.COMM_WORLD
 
-    def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
+    blocks: dict[int | None, np.ndarray] = {}
+
+    def seen(pairs: Eigenpairs) -> None:
+        blocks[pairs.con.nodal_diameter] = pairs.X[:, :modes].copy(order="F")
+
+    def solved(
+        some_bodies: Bodies, some: Sequence[int], seen: Callable[[Eigenpairs], None] | None
+    ) -> dict[int, PortModel]:
         steps = port_models(
             some_bodies.frame,
             ports.matrix,
@@ -576,20 +594,25 @@ def _reduced_diameters(
             solver=solver,
             kept=some_bodies.kept.pop(KEPT_MODES, None),
             spin=rotation_of(some_bodies),
+            seen=seen,
         )
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
 
     wanted = sorted(set(diameters))
     size = bodies.ranks_of_sector
     if size == comm.size:
-        return solved(bodies, wanted)
+        spanned = spanned and scene.model.reduction == "rubin"
+        whole = solved(bodies, wanted, seen if spanned else None)
+        span = sector_span(bodies.frame, [*blocks.values()], ports.matrix) if spanned else None
+        return whole, span
 
     def of_some(part: Communicator, some: list[int]) -> list[PortModel]:
-        models = solved(bodies.of_group(part), some)
+        models = solved(bodies.of_group(part), some, None)
         return [models[n] for n in some]
 
     cost = _real_or_complex(sector_of(bodies.mesh).count)
-    return dict(zip(wanted, shared_out(comm, wanted, size, of_some, cost), strict=True))
+    models = shared_out(comm, wanted, size, of_some, cost)
+    return dict(zip(wanted, models, strict=True)), None
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
