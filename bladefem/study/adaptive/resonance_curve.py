@@ -155,7 +155,7 @@ def _resonance(family: Family, settings: Settings, points: Sequence[Solution]) -
     unstable.
 
     A damper that bounces has motions that no blade keeps: under 4 N on the plane blades they reach
-    6.3 um, and fall to the 2.2 um of the others in a march.
+    6.3 um, and fall below 2 um in a march.
     """
     if any(p.branch for p in points):
         return lasting_peak(family_member(family, settings).model, points)
