@@ -204,3 +204,13 @@ def test_a_poor_model_has_the_errors_that_a_richer_one_still_shows(monkeypatch):
     )
     assert settings.harmonics > 1 and peak.height == pytest.approx(1.15)
     assert settings.error == errors.total == pytest.approx(0.55 / 1.55)
+
+
+@pytest.mark.parametrize(("harmonics", "more"), [(3, 7), (7, 15), (15, 23)])
+def test_many_harmonics_are_judged_by_half_as_many_again_where_contacts_lift(harmonics, more):
+    """Twice as many cost a minute a peak there."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=63))
+    settings = replace(first_for(family.modes), harmonics=harmonics, samples=128)
+    point = SimpleNamespace(states={"lift": 1})
+    judge = resonance_choice.judge_settings(family, settings, "harmonics", point)
+    assert judge.harmonics == more and judge.samples >= 8 * more
