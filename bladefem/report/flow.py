@@ -55,7 +55,9 @@ def flow_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
         return {}
     order = np.argsort(found.diameters)
     own = run.scene.excitation.engine_order % len(found.net)
-    friction = max((one.friction for one in found.held), default=None)
+    # each wave has its own; that of the least damped one is the one to compare
+    worst = [one.friction for one in found.held if one.wave == found.worst]
+    friction = max(worst, default=None)
     return {
         "response/flow_damping": lambda file: draw_waves(
             found.diameters[order],
