@@ -9,6 +9,7 @@ from models import rebounding
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size
 from bladefem.hbm.time_model import time_system
+from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline.kept_band import kept_band
 from bladefem.study.pipeline.stability import in_one_body
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
@@ -71,3 +72,11 @@ def test_what_cannot_be_marched_says_why(monkeypatch):
     model = rebounding(10.0, 0.1, 0.04)
     found = kept_band(model, solve(model, 3.0, 3, 128))
     assert "is not known: a march takes" in found.sentence
+
+
+def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(monkeypatch):
+    """8.8e10 operations on the shipped wedge; fewer points there end on another motion."""
+    monkeypatch.setattr(module, "march_operations", lambda model, periods: 8.8e10)
+    assert module._affordable(None)
+    monkeypatch.setattr(module, "march_operations", lambda model, periods: 3.5e11)
+    assert not module._affordable(None)

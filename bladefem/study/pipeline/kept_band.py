@@ -34,8 +34,9 @@ KEPT_PERIODS = 100
 SAMPLES_PER_PERIOD = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
-# the same for marches by steps, in operations
-MAX_MARCH = 1.5e10
+# the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
+# 200 periods, take 11 s
+MAX_MARCH = 1e11
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
