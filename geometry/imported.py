@@ -30,7 +30,6 @@ from .joined_files import joined_files
 from .matching import match_faces, snap_slaves
 from .mesh import Mesh, Pair, Sector, padded_numbers
 from .named_facets import named_facets
-from .numbered_faces import face_corners, numbered_faces
 from .parameters import MeshSize, Wedge
 from .profile import turn_about_axis
 from .quality import quality_report, straighten_cells
@@ -128,10 +127,11 @@ def read_mesh(
     Raises:
         InputError: as `read_geometry`.
     """
-    raw = joined_files(read_raw(Path(file)), more)
     wanted = read_names(names)
+    olds = [old for parts in wanted.values() for old in parts]
+    raw = joined_files(read_raw(Path(file)), more, olds)
     if wanted:
-        raw = renamed_raw(_with_numbered_faces(raw, wanted), wanted)
+        raw = renamed_raw(raw, wanted)
     return mesh_of_raw(
         raw,
         scale,
@@ -143,20 +143,6 @@ def read_mesh(
         frozenset(wanted),
         cut_gap,
     )
-
-
-def _with_numbered_faces(raw: RawMesh, wanted: dict[str, list[str]]) -> RawMesh:
-    """Faces that are named by their numbers, see numbered_faces.py, as surfaces of the file."""
-    there = {name.lower() for name in (*raw.groups, *raw.node_sets, *raw.surfaces)}
-    asked = {old.lower() for olds in wanted.values() for old in olds} - there
-    numbers = {int(old[5:]) for old in asked if old.startswith("face_") and old[5:].isdigit()}
-    if not numbers:
-        return raw
-    faces = numbered_faces(raw)
-    found = {
-        f"face_{n}": face_corners(faces, n - 1) for n in sorted(numbers) if 0 < n <= faces.count
-    }
-    return replace(raw, surfaces={**raw.surfaces, **found})
 
 
 def check_extent(across: float, scale: float) -> None:

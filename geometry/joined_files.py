@@ -11,6 +11,7 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .mesh import padded_numbers
+from .numbered_faces import with_numbered_faces
 from .raw_mesh import RawMesh, read_raw
 from .topology import DIMENSION, FAMILY
 
@@ -25,17 +26,25 @@ def split_entry(entry: str) -> tuple[str, str]:
     return body.strip(), path.strip()
 
 
-def joined_files(first: RawMesh, more: Iterable[str]) -> RawMesh:
+def joined_files(first: RawMesh, more: Iterable[str], names: Iterable[str] = ()) -> RawMesh:
     """One model of a file and the entries of imported.more.
+
+    Args:
+        names: wanted ones, of which numbered faces become surfaces: "face_3" of the first file,
+            "damper.face_3" of the one whose body, or stem where it has none, is damper. Each file
+            is numbered alone, as `bladefem look` shows it.
 
     Raises:
         InputError: an entry or a file that cannot be read.
     """
+    names = list(names)
+    model = with_numbered_faces(first, names)
     for entry in more:
         body, path = split_entry(entry)
         raw = read_raw(Path(path))
-        first = _join_meshes(first, _as_body(raw, body) if body else raw)
-    return first
+        raw = with_numbered_faces(raw, names, f"{body or Path(path).stem}.")
+        model = _join_meshes(model, _as_body(raw, body) if body else raw)
+    return model
 
 
 def _as_body(raw: RawMesh, body: str) -> RawMesh:

@@ -7,7 +7,8 @@ on what becomes of its cells, so that a scene may name faces by them.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -50,6 +51,27 @@ def numbered_faces(raw: RawMesh) -> NumberedFaces:
     part = _smooth_parts(corners, normals)
     order = _by_size(part, centres, normals, raw.points)
     return NumberedFaces(corners, order[part], normals, centres)
+
+
+def with_numbered_faces(raw: RawMesh, names: Iterable[str], before: str = "") -> RawMesh:
+    """Faces that are named by their numbers, as surfaces of the file.
+
+    Args:
+        names: those of other groups and files are left alone.
+        before: what stands before "face_3", such as "damper.".
+    """
+    there = {name.lower() for name in (*raw.groups, *raw.node_sets, *raw.surfaces)}
+    start = f"{before}face_".lower()
+    asked = {name.lower() for name in names} - there
+    ends = {name[len(start) :] for name in asked if name.startswith(start)}
+    numbers = sorted(int(end) for end in ends if end.isdigit())
+    if not numbers:
+        return raw
+    faces = numbered_faces(raw)
+    found = {
+        f"{before}face_{n}": face_corners(faces, n - 1) for n in numbers if 0 < n <= faces.count
+    }
+    return replace(raw, surfaces={**raw.surfaces, **found})
 
 
 def face_corners(faces: NumberedFaces, number: int) -> list[np.ndarray]:

@@ -71,6 +71,23 @@ def test_sets_with_alike_names_are_taken(tmp_path):
     assert missing == ["tip_mid", "seat_right", "damper"]
 
 
+def test_files_of_one_model_are_numbered_alone(tmp_path):
+    """The second file's faces are larger, and would come first in a numbering of all."""
+    for name, factor in (("a", 1.0), ("b", 2.0)):
+        m = decks.model("c3d10")
+        m = decks.Model(factor * m.points + [factor, 0, 0], m.blocks, {}, {})
+        (tmp_path / f"{name}.inp").write_text("\n".join(decks.flat_deck(m, {})))
+    names = ["tip = face_2", "seat = damper.face_2"]
+    files = [read_mesh(tmp_path / "a.inp", names=names[:1])]
+    more = [f"damper = {tmp_path / 'b.inp'}"]
+    files.append(read_mesh(tmp_path / "a.inp", names=names, more=more))
+    assert np.array_equal(files[0].faces["tip"], files[1].faces["tip"])
+    centres = [files[1].points[files[1].faces[name]].mean(axis=(0, 1)) for name in ("tip", "seat")]
+    assert np.allclose(centres[1], 2 * centres[0])
+    with pytest.raises(InputError, match=r"no group 'other\.face_2'"):
+        read_mesh(tmp_path / "a.inp", names=["tip = other.face_2"], more=more)
+
+
 def test_facets_keep_their_face_when_cells_change(deck):
     raw = read_raw(deck)
     faces = numbered_faces(raw)
