@@ -13,7 +13,7 @@ from ...errors import NotSolvedError
 from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
-from ...util.message import method, warning
+from ...util.message import method
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
@@ -202,13 +202,9 @@ def _class_remarks(
     others: dict[int, tuple[ClassVerdict, ...]],
     judged: Disturbances,
 ) -> list[str]:
-    """What was found in the other nodal diameters; a warning where a resonance is left."""
-    said: list[str] = []
-    for k, verdicts in others.items():
-        text = sentence_of_classes(load_of(curves[k]), verdicts, judged)
-        if text:
-            said.append((warning if any(v.unstable for v in verdicts) else method)(text))
-    return said
+    """What was found in the other nodal diameters."""
+    said = (sentence_of_classes(load_of(curves[k]), v, judged) for k, v in others.items())
+    return [method(text) for text in said if text]
 
 
 def _case_label(case: LoadCase) -> str:
