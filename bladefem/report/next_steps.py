@@ -73,14 +73,14 @@ def _mass_step(
 
 
 def _mesh_step(best: pd.Series) -> list[str]:
-    """The mesh's own error is in no estimate."""
-    halved = best.get("halved", np.nan)
-    tail = (
-        f" Half as many contact points change the amplitude by {100 * halved:.2g} %."
-        if np.isfinite(halved) and halved > 0
-        else ""
-    )
-    return [
-        "The mesh's part is in no estimate: compare meshes with 'bladefem chart SCENE --mesh' "
-        f"before numbers are frozen.{tail}"
+    """How far the meshes move the resonance amplitude, and how to look closer."""
+    parts = [
+        f"{words} by {100 * share:.2g} %"
+        for name, words in (
+            ("body_mesh", "the estimated error of the body's mesh changes the amplitude"),
+            ("halved", "half as many contact points change it"),
+        )
+        if np.isfinite(share := best.get(name, np.nan)) and share > 0
     ]
+    known = f"{'; '.join(parts)}. ".capitalize() if parts else "The mesh's part was not estimated. "
+    return [f"{known}Compare meshes with 'bladefem chart SCENE --mesh' before numbers are frozen."]
