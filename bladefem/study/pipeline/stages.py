@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -508,7 +508,6 @@ def reduce_sector(
         readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
         spanned: also what the modes of a wheel span, see `Reduced.span`.
     """
-    from ...fem.loads import body_mass
     from ...fem.ports import port_model
 
     scene = bodies.scene
@@ -537,14 +536,7 @@ def reduce_sector(
 
         sector = {0: on_one_rank(bodies, blade_model)}
 
-    def damper_model(some: Bodies) -> tuple[PortModel, float]:
-        flex = some.damper
-        model = port_model(
-            flex.con, other.matrix, other.names, DAMPER_MODES, flex=flex, solver=solver
-        )
-        return model, body_mass(flex.con.body)
-
-    floating, damper_mass = on_one_rank(bodies, damper_model)
+    floating, damper_mass = on_one_rank(bodies, partial(_reduced_damper, ports=other))
     first = len(patches[0].area) * mesh.dimension
     return Reduced(
         {n: replace(body, damping=None) for n, body in sector.items()},
@@ -555,6 +547,17 @@ def reduce_sector(
         {n: body.damping for n, body in sector.items() if body.damping is not None},
         span,
     )
+
+
+def _reduced_damper(bodies: Bodies, ports: Ports) -> tuple[PortModel, float]:
+    """The floating damper at its ports, and its mass [kg]."""
+    from ...fem.loads import body_mass
+    from ...fem.ports import port_model
+
+    flex = bodies.damper
+    solver = eigensolver(bodies.scene)
+    model = port_model(flex.con, ports.matrix, ports.names, DAMPER_MODES, flex=flex, solver=solver)
+    return model, body_mass(flex.con.body)
 
 
 def _reduced_diameters(
