@@ -39,7 +39,7 @@ MPI_VARIABLES = ("OMPI_", "PMIX_", "PMI_", "PRTE_", "ORTE_", "HYDRA_", "MPI_")
 
 def build_isolated(scene: Scene) -> Mesh:
     """The mesh of a scene, made in a child process; after a crash with the other algorithm and
-    smaller elements.
+    smaller elements, which is noted in its report.
 
     Raises:
         InputError: a parameter has to change; also when every try crashed or took longer than
@@ -47,14 +47,16 @@ def build_isolated(scene: Scene) -> Mesh:
         RuntimeError: the child failed in another way; the message holds its last words.
     """
     kind_named(scene.kind)
+    failure = ""
     for size in _mesh_attempts(scene.mesh):
         answer = _ask_child(SimpleNamespace(**vars(scene) | {"mesh": size}))
         if isinstance(answer, Mesh):
-            return answer
+            return _with_note(answer, scene.mesh, size, failure) if failure else answer
         if isinstance(answer, Exception):
             raise answer
+        failure = answer
     raise InputError(
-        f"mesh.size: gmsh {answer} on this {scene.kind} with both algorithms, expected a geometry "
+        f"mesh.size: gmsh {failure} on this {scene.kind} with both algorithms, expected a geometry "
         "that it can mesh; change mesh.size, or the parameter that was changed last"
     )
 
@@ -64,6 +66,16 @@ def _mesh_attempts(size: Any) -> list[Any]:
     other = "delaunay" if size.algorithm == "hxt" else "hxt"
     smaller = {"size": SECOND_TRY_SIZE * size.size} if size.size else {}
     return [size, replace(size, algorithm=other, **smaller)]
+
+
+def _with_note(mesh: Mesh, asked: Any, used: Any, failure: str) -> Mesh:
+    """The mesh with a note on the settings that it was made with in place of those asked for."""
+    smaller = f" and elements {used.size / asked.size:.2g} times as large" if asked.size else ""
+    note = (
+        f"gmsh {failure} with mesh.algorithm = {asked.algorithm!r}: meshed with "
+        f"{used.algorithm!r}{smaller}"
+    )
+    return replace(mesh, report={**mesh.report, "notes": (*mesh.report.get("notes", ()), note)})
 
 
 def _ask_child(scene: SimpleNamespace) -> Mesh | Exception | str:

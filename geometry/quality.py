@@ -177,7 +177,7 @@ COLUMN_WORDS = {
     "mean quality": "mean shape",
     "straightened": "elements straightened",
     "pairs": "matched nodes of pair",
-    "notes": "the file's elements",
+    "notes": "note",
 }
 
 
