@@ -19,6 +19,9 @@ class Communicator(Protocol):
     def bcast(self, obj: Any, root: int = 0) -> Any:
         """What one rank has, on all of them."""
 
+    def gather(self, sendobj: Any, root: int = 0) -> list[Any] | None:
+        """What each rank has, on one of them; None on the others."""
+
     def allgather(self, sendobj: Any) -> list[Any]:
         """What each rank has, on all of them."""
 

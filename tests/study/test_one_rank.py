@@ -5,6 +5,7 @@ import pytest
 
 from bladefem import load_scene
 from bladefem.fem.compat import MPI
+from bladefem.reduction.other_diameters import spanned_models
 from bladefem.study.pipeline.stages import (
     KEPT_MODES,
     Bodies,
@@ -30,7 +31,7 @@ def test_a_sector_is_reduced_with_the_modes_that_each_rank_has():
         kept = bodies.alone.kept.get(KEPT_MODES)
         if comm.size == 1:
             assert sorted(kept.pairs) == [0, 9, 18]
-        reduced = reduce_sector(bodies, patches, [0, 9, 18], 6)
+        reduced = reduce_sector(bodies, patches, [0, 9, 18], 6, spanned=True)
         models.append((modes, reduced))
     (ranks, joined), (alone, single) = models
     for a, b in zip(ranks, alone, strict=True):
@@ -38,6 +39,12 @@ def test_a_sector_is_reduced_with_the_modes_that_each_rank_has():
     for n in (0, 9, 18):
         np.testing.assert_allclose(joined.sector[n].omega, single.sector[n].omega, rtol=1e-10)
     assert joined.mass == single.mass
+    # also what they tell of the diameters left out
+    left_out = [
+        spanned_models(some.span, {9: some.sector[9]}, some.sectors, 6)[4]
+        for some in (joined, single)
+    ]
+    np.testing.assert_allclose(left_out[0].omega, left_out[1].omega, rtol=1e-8)
 
 
 def test_one_rank_computes_and_all_have_it():

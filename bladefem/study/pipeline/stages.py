@@ -568,7 +568,7 @@ def _reduced_diameters(
     spanned: bool,
 ) -> tuple[dict[int, PortModel], SectorSpan | None]:
     """The blade side in each nodal diameter, which groups of ranks share out; and what the modes
-    span, where one group has them all and it is asked for.
+    span, where it is asked for and one rank can have them all, or all ranks share each.
     """
     from ...fem.all_diameters import Eigenpairs, sector_span
     from ...fem.compat import MPI
@@ -579,14 +579,15 @@ def _reduced_diameters(
     solver = eigensolver(scene)
     comm = bodies.comm or MPI.COMM_WORLD
 
-    blocks: dict[int | None, np.ndarray] = {}
+    spanned = spanned and scene.model.reduction == "rubin"
+    blocks: dict[int, np.ndarray] = {}
 
-    def seen(pairs: Eigenpairs) -> None:
-        blocks[pairs.con.nodal_diameter] = pairs.X[:, :modes].copy(order="F")
+    def keep_vectors(pairs: Eigenpairs) -> None:
+        blocks[pairs.con.nodal_diameter or 0] = pairs.X[:, :modes].copy(order="F")
 
-    def solved(
-        some_bodies: Bodies, some: Sequence[int], seen: Callable[[Eigenpairs], None] | None
-    ) -> dict[int, PortModel]:
+    seen = keep_vectors if spanned else None
+
+    def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
         steps = port_models(
             some_bodies.frame,
             ports.matrix,
@@ -604,18 +605,41 @@ def _reduced_diameters(
     wanted = sorted(set(diameters))
     size = bodies.ranks_of_sector
     if size == comm.size:
-        spanned = spanned and scene.model.reduction == "rubin"
-        whole = solved(bodies, wanted, seen if spanned else None)
-        span = sector_span(bodies.frame, [*blocks.values()], ports.matrix) if spanned else None
-        return whole, span
+        whole = solved(bodies, wanted)
+        every = [block for _, block in sorted(blocks.items())]
+        return whole, sector_span(bodies.frame, every, ports.matrix) if spanned else None
 
     def of_some(part: Communicator, some: list[int]) -> list[PortModel]:
-        models = solved(bodies.of_group(part), some, None)
+        models = solved(bodies.of_group(part), some)
         return [models[n] for n in some]
 
     cost = _real_or_complex(sector_of(bodies.mesh).count)
     models = shared_out(comm, wanted, size, of_some, cost)
-    return dict(zip(wanted, models, strict=True)), None
+    span = _span_of_ranks(bodies, blocks, wanted, ports) if spanned and size == 1 else None
+    return dict(zip(wanted, models, strict=True)), span
+
+
+def _span_of_ranks(
+    bodies: Bodies,
+    blocks: dict[int, np.ndarray],
+    wanted: Sequence[int],
+    ports: Ports,
+) -> SectorSpan:
+    """What the modes span of which each rank has those of its own nodal diameters (collective).
+
+    Args:
+        blocks: nodal diameter to vectors; emptied.
+    """
+    from ...fem.all_diameters import sector_span
+    from ...fem.compat import MPI
+
+    comm = bodies.comm or MPI.COMM_WORLD
+    every: list[np.ndarray] = []
+    # one by one: a message has a largest size
+    for n in wanted:
+        found = comm.gather(blocks.pop(n, None), 0) or []
+        every += [block for block in found if block is not None]
+    return on_root(comm, lambda: sector_span(bodies.alone.frame, every, ports.matrix))
 
 
 def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
