@@ -31,8 +31,12 @@ from .validate_model import check_point
 
 # Newton steps of one amplitude
 MAX_NEWTON_STEPS = 40
-# amplitudes put in between where Newton fails
-INSERTED_AMPLITUDES = (4, 16)
+# step of the amplitude after one that fails, over that one
+STEP_REDUCTION = 0.25
+# step in the logarithm of the amplitude below which the branch is given up
+SHORTEST_STEP = 1e-3
+# extrapolation from two motions, over the step between them
+FARTHEST_PREDICTION = 2.0
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-10
 # relative step of frequency and damping in differences of the flexibility
@@ -73,7 +77,11 @@ def nonlinear_mode(
     H: int = 3,
     samples: int = 128,
 ) -> Iterator[NonlinearMode]:
-    """Frequency and damping of one mode at growing amplitudes, each started from the one before.
+    """Frequency and damping of one mode at growing amplitudes, each started from those before and
+    the first from the linear mode with all contacts sticking that holds most of the blade mode.
+
+    Steps of the amplitude shorten where Newton fails; a motion that is not found says how far the
+    branch was followed.
 
     Args:
         model: its excitation and its damping are left out of account.
@@ -93,12 +101,12 @@ def nonlinear_mode(
             f"{unknowns} unknowns: expected at most {MAX_DENSE_UNKNOWNS}, fewer harmonics or nodes"
         )
     frame = _frame(model, mode, H, samples)
-    last = None
+    track = _Track()
     for amplitude in amplitudes:
         if not 0 < amplitude < np.inf:
             raise InputError(f"amplitude {amplitude}: expected a positive number")
-        last = _approached(frame, float(amplitude), last)
-        yield last
+        found, track = _followed(frame, float(amplitude), track)
+        yield found
 
 
 def force_at_resonance(model: ReducedModel, point: NonlinearMode) -> float:
@@ -147,33 +155,75 @@ class _Frame:
     stuck0: np.ndarray
 
 
-def _approached(
+@dataclass(frozen=True)
+class _Track:
+    """The end of the branch followed so far."""
+
+    # converged motions, the last two at most, in the order they were found
+    known: tuple[NonlinearMode, ...] = ()
+    # no step from the last of them was short enough
+    ended: bool = False
+
+
+def _followed(
     frame: _Frame,
     amplitude: float,
-    last: NonlinearMode | None,
-) -> NonlinearMode:
-    """The motion from the last one, from full stick, or by amplitudes in between."""
-    found = _solve(frame, amplitude, last)
-    if not found.converged and last is not None:
-        found = _solve(frame, amplitude, None)
-    for parts in INSERTED_AMPLITUDES:
-        if found.converged or last is None or not last.converged:
-            break
-        near = last
-        for part in np.linspace(0, 1, parts + 1)[1:]:
-            near = _solve(frame, last.amplitude * (amplitude / last.amplitude) ** part, near)
-        found = near
-    return found
+    track: _Track,
+) -> tuple[NonlinearMode, _Track]:
+    """The motion at an amplitude, by steps from the last one known that shorten where Newton fails
+    and lengthen where it converges; else from full stick.
+    """
+    first = _solve(frame, amplitude, _predicted(frame, amplitude, track.known))
+    if first.converged or not track.known:
+        return first, _continued(track, first)
+    if not track.ended:
+        track = _stepped(frame, amplitude, track)
+        if not track.ended:
+            return track.known[-1], track
+    stuck = _solve(frame, amplitude, _predicted(frame, amplitude, ()))
+    if stuck.converged:
+        return stuck, _Track((stuck,))
+    reached = track.known[-1].amplitude
+    reason = f"not followed beyond an amplitude of {reached:.4g}: {first.reason}"
+    return replace(first, reason=reason), track
+
+
+def _stepped(
+    frame: _Frame,
+    amplitude: float,
+    track: _Track,
+) -> _Track:
+    """The branch up to an amplitude, or to where the shortest step fails."""
+    whole = np.log(amplitude / track.known[-1].amplitude)
+    # shares of the way, in the logarithm of the amplitude
+    done, step = 0.0, STEP_REDUCTION
+    start = track.known[-1].amplitude
+    while done < 1 and step * abs(whole) > SHORTEST_STEP:
+        share = min(done + step, 1.0)
+        near = amplitude if share == 1 else float(start * np.exp(share * whole))
+        point = _solve(frame, near, _predicted(frame, near, track.known))
+        if point.converged:
+            track = _continued(track, point)
+            done, step = share, 2 * step
+        else:
+            step *= STEP_REDUCTION
+    return replace(track, ended=done < 1)
+
+
+def _continued(track: _Track, point: NonlinearMode) -> _Track:
+    if not point.converged:
+        return track
+    return _Track((*track.known[-1:], point))
 
 
 def _solve(
     frame: _Frame,
     amplitude: float,
-    last: NonlinearMode | None,
+    start: np.ndarray,
 ) -> NonlinearMode:
-    """Newton from the last motion, scaled, or from full stick."""
+    """Newton from displacements (n d (2H+1),)."""
     run = iterate_newton(
-        _residual(frame, _start(frame, amplitude, last), amplitude),
+        _residual(frame, start, amplitude),
         lambda state: float(np.linalg.norm(state.r) / np.linalg.norm(state.w)),
         lambda state: _line_search(frame, state, amplitude),
         RESIDUAL_TOLERANCE,
@@ -324,7 +374,8 @@ def _jacobian(
         J[:, 2 * h] = -moved.imag
     J = J.reshape(m * K, m * K)
     J[np.diag_indices_from(J)] += 1.0
-    return J + _through_frequency(frame, state, amplitude)
+    J += _through_frequency(frame, state, amplitude)
+    return J
 
 
 def _through_frequency(
@@ -347,7 +398,7 @@ def _through_frequency(
         to_real((faster - here) / step).ravel(),
         to_real((damped - here) / DIFFERENCE_STEP).ravel(),
     ]
-    return np.outer(columns[0], by_omega) + np.outer(columns[1], by_zeta)
+    return np.column_stack(columns) @ np.vstack([by_omega, by_zeta])
 
 
 def _flexed(
@@ -369,7 +420,7 @@ def _line_search(
     amplitude: float,
 ) -> _State | None:
     """The first halving of the Newton step that lowers the residual, or None."""
-    step = linalg.solve(_jacobian(frame, state, amplitude), state.r)
+    step = linalg.solve(_jacobian(frame, state, amplitude), state.r, overwrite_a=True)
     x = state.w.ravel()
     before = np.linalg.norm(state.r)
     return halve_step(
@@ -379,28 +430,48 @@ def _line_search(
     )
 
 
-def _start(
+def _predicted(
     frame: _Frame,
     amplitude: float,
-    last: NonlinearMode | None,
+    known: tuple[NonlinearMode, ...],
 ) -> np.ndarray:
-    """The motion at the last amplitude, scaled; the free mode's without one."""
-    n, d = frame.model.springs.shape
-    if last is not None and last.converged:
-        return (amplitude / last.amplitude * last.w).ravel()
-    motion = np.zeros((n * d, frame.H + 1), dtype=complex)
-    motion[:, 1] = _stuck_mode(frame) * amplitude
-    return to_real(motion).ravel()
+    """Displacements on the line through the motions known, each over its amplitude, against the
+    logarithm of the amplitude; the stuck mode's without any.
+    """
+    if not known:
+        n, d = frame.model.springs.shape
+        motion = np.zeros((n * d, frame.H + 1), dtype=complex)
+        motion[:, 1] = _stuck_mode(frame) * amplitude
+        return to_real(motion).ravel()
+    last = known[-1].w / known[-1].amplitude
+    if len(known) > 1:
+        before = known[-2].w / known[-2].amplitude
+        span = np.log(known[-1].amplitude / known[-2].amplitude)
+        share = np.log(amplitude / known[-1].amplitude) / span
+        if 0 < share <= FARTHEST_PREDICTION:
+            last = last + share * (last - before)
+    return (amplitude * last).ravel()
 
 
 def _stuck_mode(frame: _Frame) -> np.ndarray:
-    """(m,) relative displacement of unit amplitude with all contacts sticking, at the free
-    frequency.
+    """(m,) relative displacement in the linear mode with all contacts sticking that holds most of
+    the blade mode, whose amplitude is 1.
     """
-    body = frame.bodies[0]
-    G = _flexibility(frame, 1, float(body.omega[_of(body, 1)][frame.mode]), 0.0)
+    shapes, squared = [], []
+    residual: np.ndarray = np.zeros(())
+    for body in frame.bodies:
+        s = _of(body, 1)
+        shapes.append(body.shapes[s][body.contact])
+        squared.append(body.omega[s] ** 2)
+        residual = residual + body.residual[_of_residual(body, 1)][body.contact, body.contact]
+    Phi = np.hstack(shapes)
     springs = frame.model.springs.ravel()
-    return np.linalg.solve(np.eye(len(G)) + G * springs, frame.shape)
+    # displacements of the springs by those of the modes: the residual flexibility is in series
+    held = np.linalg.solve(np.eye(len(Phi)) + residual * springs, Phi)
+    stiffness = np.diag(np.concatenate(squared)) + Phi.conj().T @ (springs[:, None] * held)
+    _, vectors = linalg.eigh(stiffness)
+    found = vectors[:, np.argmax(abs(vectors[frame.mode]))]
+    return held @ (found / found[frame.mode])
 
 
 def _probe(

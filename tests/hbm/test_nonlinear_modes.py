@@ -4,7 +4,8 @@ the resonances of the full balance.
 
 import numpy as np
 import pytest
-from models import single_mass
+from models import block, single_mass
+from scipy import linalg
 
 from bladefem.errors import InputError
 from bladefem.friction.closed_form import jenkins
@@ -79,6 +80,25 @@ def test_resonance_of_the_balance_is_predicted(load):
     assert omega == pytest.approx(peak.omega, rel=0.005)
     drawn = mode_response(model, points, np.array([peak.omega]))
     assert drawn[0, i - 1] < 1.1 and drawn[0, i + 1] > 0.9
+
+
+def test_close_modes_are_followed_from_the_stuck_mode():
+    """A body whose modes lie close together, with stiff contacts: from a linear mode of the stuck
+    body, through slip and lift-off, to where the contacts hardly matter.
+    """
+    nodes = 20
+    model = block(nodes, dofs=80)
+    body = model.side(1)
+    # all modes are kept: the body's own stiffness plus the springs of the stuck contacts
+    shapes = body.shapes[body.ports["contact"]]
+    held = np.diag(body.omega**2) + shapes.T @ (model.springs.reshape(-1, 1) * shapes)
+    squared, vectors = linalg.eigh(held)
+    stuck = np.sqrt(squared[np.argmax(abs(vectors[0]))])
+    largest = abs(shapes[:, 0]).max()
+    found = list(nonlinear_mode(model, np.geomspace(0.05, 50, 20) / largest, H=1, samples=64))
+    assert all(p.converged for p in found), [p.reason for p in found if not p.converged]
+    assert found[0].omega == pytest.approx(stuck, rel=1e-9)
+    assert found[-1].omega == pytest.approx(body.omega[0], rel=0.03)
 
 
 def test_bad_input_is_refused():
