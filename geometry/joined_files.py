@@ -11,7 +11,6 @@ import numpy as np
 from bladefem.errors import InputError
 
 from .mesh import padded_numbers
-from .numbered_faces import with_numbered_faces
 from .raw_mesh import RawMesh, read_raw
 from .topology import DIMENSION, FAMILY
 
@@ -37,6 +36,9 @@ def joined_files(first: RawMesh, more: Iterable[str], names: Iterable[str] = ())
     Raises:
         InputError: an entry or a file that cannot be read.
     """
+    # scenes are read without SciPy, and split their entries here
+    from .numbered_faces import with_numbered_faces
+
     names = list(names)
     model = with_numbered_faces(first, names)
     for entry in more:

@@ -10,7 +10,8 @@ from models import bouncing, bouncing_wave
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
-from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, stability_verdict
+from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, Verdict, stability_verdict
+from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
@@ -19,6 +20,7 @@ from bladefem.study.pipeline.kept_band import KeptBand, kept_band
 from bladefem.study.pipeline.response_remarks import search_sentence
 from bladefem.study.pipeline.stability import (
     Disturbances,
+    RicherModel,
     judged_disturbances,
     model_in_time,
     stability_of,
@@ -85,6 +87,33 @@ def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(mo
     assert 1 <= judged.sum() <= 1 + stability.POINTS_JUDGED_IN_ADDITION
     said = stability_sentence([(alone.verdict, alone.multiplier)])
     assert f"{(~judged).sum()} not judged (of curves whose verdicts" in said
+
+
+def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
+    """The highest first; motions that stay unstable end it, and lift-off is left alone."""
+    model = bouncing()
+    points = [
+        replace(p, states={**p.states, "lift": lift})
+        for p, lift in zip(response(model, [1.1, 1.2, 1.3, 1.0], 7, 128), (0, 0, 0, 1), strict=True)
+    ]
+    order = np.argsort([-abs(p.probe[1, 0]) for p in points[:3]])
+    lasts = {points[order[0]].omega}
+    asked = []
+
+    def verdict(of, motion, *limits):
+        if motion.harmonics == 7:
+            return Verdict(UNSTABLE, 1.2)
+        asked.append(motion.omega)
+        return Verdict(STABLE, 1.0) if motion.omega in lasts else Verdict(UNSTABLE, 1.1)
+
+    monkeypatch.setattr(stability, "stability_verdict", verdict)
+    monkeypatch.setattr(stability, "CONFIRMED_MOTIONS", 1)
+    monkeypatch.setattr(stability, "POINTS_JUDGED_IN_ADDITION", 0)
+    told = stability_of(model, points, [RicherModel(model, 15, 256)])
+    assert asked == [points[i].omega for i in order[:2]]
+    assert told.verdict[order[0]] == STABLE
+    assert [told.verdict[i] for i in (order[1], order[2], 3)] == [UNSTABLE] * 3
+    assert list(stability_of(model, points).verdict) == [UNSTABLE] * 4
 
 
 def test_a_model_with_two_tangents_is_marched_by_steps():

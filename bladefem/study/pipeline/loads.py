@@ -33,7 +33,7 @@ from .kept_band import KeptBand, kept_of_family
 from .liftoff import naming_the_load
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
-from .stability import UNSTABLE, Stability, model_in_time, stability_of
+from .stability import UNSTABLE, Stability, model_in_time, richer_models, stability_of
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
@@ -204,7 +204,8 @@ def curve_of(
     heights = np.array([size(p) for p in curve.points])
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
-        marks = stability_of(model_in_time(models, curve.settings), curve.points)
+        richer = richer_models(models, curve.settings)
+        marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
     top, kept = _resonance(models, curve, marks, scene.accuracy)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]

@@ -17,7 +17,7 @@ from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import Solution, size
-from ...hbm.solve import solve
+from ...hbm.solve import solve, solve_near
 from ...hbm.solver.newton import DEFAULT_OPTIONS
 from ...hbm.stability import (
     MAX_OPERATIONS,
@@ -49,6 +49,15 @@ JUDGED_SAMPLES = 128
 # a motion that Newton's method does not reach from the point is not looked for: one such search
 # cost twice the verdicts of a curve
 JUDGED_OPTIONS = replace(DEFAULT_OPTIONS, fallbacks=False)
+# harmonics and samples with which an unstable motion is judged again: with seven, waves of the
+# shipped wedge under 290 N grow by 28 % a period that neither 15 or 31 nor a march let grow
+CONFIRMING = ((15, 256), (31, 512))
+# of the amplitude: by which the motion with so many may differ to be the same one
+SAME_MOTION = 0.03
+# motions that stay unstable, after which no other one of a curve is judged again
+CONFIRMED_MOTIONS = 2
+# operations of all these verdicts on a curve, some 2.5 s
+CONFIRMING_OPERATIONS = 6e10
 # harmonics with whose bodies a travelling wave is asked whether it repeats
 RING_HARMONICS = (7, 15, 31)
 
@@ -67,12 +76,27 @@ class Stability:
     bifurcation: np.ndarray = field(default_factory=lambda: np.zeros(0, dtype="<U15"))
 
 
-def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
+@dataclass(frozen=True)
+class RicherModel:
+    """The model of a curve with bodies of more harmonics, to judge unstable motions again."""
+
+    model: ReducedModel
+    harmonics: int
+    samples: int
+
+
+def stability_of(
+    model: ReducedModel,
+    points: Sequence[Solution],
+    richer: Sequence[RicherModel] = (),
+) -> Stability:
     """Verdicts on solutions of the balance of one model, in the order of a curve.
 
     Every point is judged where CURVE_OPERATIONS allow it. Else the highest point is, and as far as
     they allow the other local maxima, its neighbours, and points spread evenly over the curve; at
-    last whichever point is then the highest of those that are not unstable.
+    last whichever point is then the highest of those that are not unstable. Unstable ones are
+    judged again with more harmonics, from the highest down, as far as CONFIRMING_OPERATIONS allow
+    it and until CONFIRMED_MOTIONS of them stay unstable.
     """
     found = [Verdict(UNKNOWN, reason="it was left out for its cost") for _ in points]
     costs = [_judging_operations(model, point) for point in points]
@@ -87,6 +111,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         found[i] = stability_verdict(model, motion, MAX_OPERATIONS if highest else costs[i])
         judged.add(i)
         budget -= costs[i]
+    stayed = _judge_again(found, points, richer, range(len(points)), CONFIRMED_MOTIONS)
     for _ in range(POINTS_JUDGED_IN_ADDITION):
         lasting = [i for i in range(len(points)) if found[i].verdict != UNSTABLE]
         top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
@@ -94,6 +119,7 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
             break
         found[top] = stability_verdict(model, judged_motion(model, points[top]))
         judged.add(top)
+        stayed += _judge_again(found, points, richer, [top], CONFIRMED_MOTIONS - stayed)
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
     return Stability(
         np.array([v.verdict for v in found]),
@@ -101,6 +127,77 @@ def stability_of(model: ReducedModel, points: Sequence[Solution]) -> Stability:
         reasons[0] if len(reasons) == len(points) else "",
         np.array([v.bifurcation for v in found], dtype="<U15"),
     )
+
+
+def richer_models(models: Family, settings: Settings) -> list[RicherModel]:
+    """The models of a curve's settings with the harmonics of CONFIRMING, as far as they are more
+    than it has and its bodies are known for them.
+    """
+    known = max(settings.harmonics, JUDGED_HARMONICS)
+    return [
+        RicherModel(
+            family_member(models, replace(settings, harmonics=harmonics, samples=samples)).model,
+            harmonics,
+            samples,
+        )
+        for harmonics, samples in CONFIRMING
+        if known < harmonics <= models.harmonics
+    ]
+
+
+def _judge_again(
+    found: list[Verdict],
+    points: Sequence[Solution],
+    richer: Sequence[RicherModel],
+    rows: Sequence[int],
+    wanted: int,
+) -> int:
+    """Judge unstable points again, from the highest down, and put the verdicts in their places;
+    where contacts lift off, more harmonics mostly are not solved, and it is not tried.
+
+    Args:
+        rows: numbers of the points in question.
+        wanted: motions that stay unstable, after which no other one is judged again.
+
+    Returns:
+        how many stayed so.
+    """
+    budget = CONFIRMING_OPERATIONS
+    stayed = 0
+    unstable = [i for i in rows if found[i].verdict == UNSTABLE and not points[i].states["lift"]]
+    for i in sorted(unstable, key=lambda i: -size(points[i])) if richer else ():
+        if budget <= 0 or stayed >= wanted:
+            break
+        found[i], spent = _judged_again(found[i], points[i], richer)
+        stayed += found[i].verdict == UNSTABLE
+        budget -= spent
+    return stayed
+
+
+def _judged_again(
+    verdict: Verdict,
+    point: Solution,
+    richer: Sequence[RicherModel],
+) -> tuple[Verdict, float]:
+    """The verdict on the motion with more harmonics where that one is stable, else the one there
+    was; and the operations that it took.
+    """
+    spent = 0.0
+    for some in richer:
+        spent += RICHER_OPERATIONS
+        try:
+            motion = solve_near(
+                some.model, point.omega, some.harmonics, some.samples, point, JUDGED_OPTIONS
+            )
+        except (InputError, NotSolvedError):
+            break
+        if not motion.converged or abs(size(motion) / size(point) - 1) > SAME_MOTION:
+            continue
+        spent += verdict_operations(some.model, motion)
+        again = stability_verdict(some.model, motion)
+        if again.verdict == STABLE:
+            return again, spent
+    return verdict, spent
 
 
 def _judging_operations(model: ReducedModel, point: Solution) -> float:
