@@ -54,7 +54,7 @@ def test_a_crash_is_tried_again_and_then_becomes_a_sentence():
     assert "\n" not in str(caught.value)
 
 
-def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypatch):
+def test_the_second_try_takes_the_other_algorithm_and_smaller_elements_and_is_noted(monkeypatch):
     asked = []
 
     def ask(scene):
@@ -62,7 +62,11 @@ def test_the_second_try_takes_the_other_algorithm_and_smaller_elements(monkeypat
         return "crashed (signal 11)" if len(asked) == 1 else build_here(scene)
 
     monkeypatch.setattr(apart, "_ask_child", ask)
-    assert isinstance(build_isolated(SCENE), Mesh)
+    mesh = build_isolated(SCENE)
+    assert isinstance(mesh, Mesh)
+    (note,) = mesh.report["notes"]
+    assert note.startswith("gmsh crashed (signal 11) with mesh.algorithm = 'hxt'")
+    assert "meshed with 'delaunay'" in note
     assert [(m.algorithm, m.size) for m in asked] == [
         ("hxt", 6e-3),
         ("delaunay", pytest.approx(5.4e-3)),
@@ -84,19 +88,3 @@ def test_flat_cells_are_refused_with_their_place():
     points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0.4, 0.4, 1e-3]], dtype=float)
     with pytest.raises(InputError, match=r"mesh\.size: 1 flat cells.*350, 350"):
         refuse_flat(Mesh(points, "tetra", {"blade": np.array([[0, 1, 2, 3]])}))
-
-
-def test_a_second_try_is_noted(monkeypatch):
-    """The first algorithm crashes: the answer says what the mesh was made with."""
-    tried = []
-
-    def ask(scene):
-        tried.append(scene.mesh)
-        return "crashed (signal 11)" if len(tried) == 1 else build_here(scene)
-
-    monkeypatch.setattr(apart, "_ask_child", ask)
-    (note,) = build_isolated(SCENE).report["notes"]
-    first, second = tried
-    assert first.algorithm != second.algorithm
-    assert note.startswith(f"gmsh crashed (signal 11) with mesh.algorithm = {first.algorithm!r}")
-    assert f"meshed with {second.algorithm!r}" in note

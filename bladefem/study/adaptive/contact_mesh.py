@@ -16,17 +16,17 @@ from dataclasses import replace
 import numpy as np
 
 from ...data import PressureMap
-from ...errors import NotSolvedError
-from ...hbm.peak import find_peak
 from ...hbm.solution import Solution
-from ...hbm.solver.newton import Options
 from ...hbm.sweep import size
+from .changed_peak import changed_peak
 from .family import Family, carried_displacements, family_member
 from .settings import Settings
 
 # pressed nodes of a seat: 6 left an amplitude between stick and slip 37 % low, 11 19 %, 16 12 %, 21
 # 5 %
 MIN_NODES = 16
+# relative, of the height with half as many points
+PEAK_TOLERANCE = 1e-2
 
 
 def coarse_sentence(maps: Iterable[PressureMap]) -> str:
@@ -70,16 +70,7 @@ def halved_change(
         return np.nan
     other = family_member(family, replace(settings, points=half))
     start = replace(top, w=carried_displacements(top.w, own, other, settings.harmonics))
-    try:
-        peak = find_peak(
-            other.model,
-            top.omega,
-            settings.harmonics,
-            settings.samples,
-            near=start,
-            tolerance=1e-2,
-            options=Options(1e-6, frugal=True),
-        )
-    except NotSolvedError:
+    peak = changed_peak(other.model, settings, start, top.omega, PEAK_TOLERANCE)
+    if peak is None:
         return np.nan
     return abs(peak.height / size(top) - 1)

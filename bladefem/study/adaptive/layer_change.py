@@ -15,12 +15,10 @@ import numpy as np
 from ...contact.equivalent_layer import LayerState, equivalent_springs
 from ...contact.numerical_stiffness import physical_stiffness
 from ...data import Elements
-from ...errors import NotSolvedError
 from ...friction.fourier import synthesis
 from ...hbm.model import ReducedModel
-from ...hbm.peak import find_peak
 from ...hbm.solution import Solution, size
-from ...hbm.solver.newton import Options
+from .changed_peak import changed_peak
 from .family import Family, family_member
 from .settings import Settings
 
@@ -62,17 +60,8 @@ def layer_change(
         return 0.0
     point, height, left = top, size(top), np.inf
     for _ in range(MAX_PASSES):
-        try:
-            peak = find_peak(
-                model,
-                point.omega,
-                settings.harmonics,
-                settings.samples,
-                near=point,
-                tolerance=PEAK_TOLERANCE,
-                options=Options(1e-6, frugal=True),
-            )
-        except NotSolvedError:
+        peak = changed_peak(model, settings, point, point.omega, PEAK_TOLERANCE)
+        if peak is None:
             return np.inf
         left = abs(peak.height / height - 1)
         point, height = peak.solution, peak.height

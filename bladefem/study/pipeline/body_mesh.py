@@ -14,11 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...data import ModeSet, Patch, PortModel
-from ...errors import NotSolvedError
-from ...hbm.peak import find_peak
 from ...hbm.solution import Solution
-from ...hbm.solver.newton import Options
 from ...hbm.sweep import size
+from ..adaptive.changed_peak import changed_peak
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
@@ -138,16 +136,8 @@ def softened_change(
     Args:
         settings, top: of the resonance, and its highest point.
     """
-    try:
-        peak = find_peak(
-            family_member(softer.family(case), settings).model,
-            top.omega * softer.ratio,
-            settings.harmonics,
-            settings.samples,
-            near=top,
-            tolerance=PEAK_TOLERANCE,
-            options=Options(1e-6, frugal=True),
-        )
-    except NotSolvedError:
+    model = family_member(softer.family(case), settings).model
+    peak = changed_peak(model, settings, top, top.omega * softer.ratio, PEAK_TOLERANCE)
+    if peak is None:
         return np.inf
     return abs(peak.height / size(top) - 1)

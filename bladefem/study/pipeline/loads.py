@@ -147,6 +147,20 @@ class Curve:
         return size(self.peak)
 
 
+@dataclass(frozen=True)
+class UnseenErrors:
+    """Relative changes of a resonance amplitude that richer balances do not show; NaN: not
+    estimated.
+    """
+
+    # with half as many contact points
+    halved: float = np.nan
+    # by the estimated error of the body's mesh
+    body_mesh: float = np.nan
+    # with the layer's law in place of its tangent
+    layer_law: float = np.nan
+
+
 def study_loads(
     scene: Scene,
     cases: list[LoadCase],
@@ -211,18 +225,9 @@ def curve_of(
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
-    # nothing is gained by parts of an error that is unknown as a whole
-    known = curve.settings.error is None or bool(np.isfinite(curve.settings.error))
-    halved = np.nan
-    if known and not scene.contact.points:
-        halved = halved_change(models, curve.settings, top)
-    body_mesh = np.nan
-    if known and softer is not None:
-        body_mesh = softened_change(softer, case, curve.settings, top)
-    layer_law = layer_change(models, curve.settings, top, case.decay) if known else np.nan
+    unseen = _unseen_errors(scene, case, models, softer, curve.settings, top)
     interval = None
     if scene.study.interval:
-        model = family_member(models, curve.settings).model
         interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
     return Curve(
         load=case.load,
@@ -234,7 +239,6 @@ def curve_of(
         checked=checked_points(curve),
         stability=marks.verdict,
         multiplier=marks.multiplier,
-        halved=halved,
         peak=top,
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         unstable_peak=None if kept is None else peak_of(curve.points),
@@ -242,8 +246,32 @@ def curve_of(
         interval=interval,
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,
-        body_mesh=body_mesh,
-        layer_law=layer_law,
+        halved=unseen.halved,
+        body_mesh=unseen.body_mesh,
+        layer_law=unseen.layer_law,
+    )
+
+
+def _unseen_errors(
+    scene: Scene,
+    case: LoadCase,
+    models: Family,
+    softer: SofterBody | None,
+    settings: Settings,
+    top: Solution,
+) -> UnseenErrors:
+    """What richer balances do not show of the error of a resonance.
+
+    Args:
+        settings, top: of the resonance, and its highest point.
+    """
+    # nothing is gained by parts of an error that is unknown as a whole
+    if settings.error is not None and not np.isfinite(settings.error):
+        return UnseenErrors()
+    return UnseenErrors(
+        np.nan if scene.contact.points else halved_change(models, settings, top),
+        np.nan if softer is None else softened_change(softer, case, settings, top),
+        layer_change(models, settings, top, case.decay),
     )
 
 

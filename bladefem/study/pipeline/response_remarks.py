@@ -26,6 +26,17 @@ from .stability import (
 TRUSTED_STRESS = 0.2
 # sentences on the search of one curve that are quoted
 MAX_NOTES = 3
+# fields of a curve that are parts of its estimated error, and what lowers them
+LARGEST_PARTS = {
+    "halved": (
+        "what half as many contact points change, expected a finer contact mesh "
+        "(mesh.seat_elements, mesh.contact_size)"
+    ),
+    "layer_law": (
+        "what the tangent of a layer that stiffens leaves out, expected a linear one "
+        "(contact.kn_area) to compare with"
+    ),
+}
 
 
 def response_remarks(
@@ -133,44 +144,30 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
         each = ", ".join(f"{load_of(c)} {100 * (c.error or 0):.2g} %" for c in above)
         yield (
             "estimated error of the resonance amplitude above the wanted "
-            f"{100 * accuracy:.2g} %: {each}{_of_the_contact_mesh(above)}{_of_the_layer(above)}"
+            f"{100 * accuracy:.2g} %: {each}{_largest_parts(above)}"
         )
 
 
-def _of_the_layer(curves: list[Curve]) -> str:
-    """The part of estimated errors that no finer model lowers, where it is the larger."""
-    parts = [
-        f"{100 * c.layer_law:.2g} % under {load_of(c)}"
-        for c in curves
-        if np.isfinite(c.layer_law) and c.layer_law >= (c.error or 0) / 2
-    ]
-    if not parts:
-        return ""
-    return (
-        f"; {', '.join(parts)} are what the tangent of a layer that stiffens leaves out, expected "
-        "a linear one (contact.kn_area) to compare with"
-    )
+def _largest_parts(curves: list[Curve]) -> str:
+    """Parts of estimated errors that no richer balance lowers, where one is half of the error or
+    more.
+    """
+    text = ""
+    for part, meaning in LARGEST_PARTS.items():
+        sizes = [
+            f"{100 * getattr(c, part):.2g} % under {load_of(c)}"
+            for c in curves
+            if np.isfinite(getattr(c, part)) and getattr(c, part) >= (c.error or 0) / 2
+        ]
+        if sizes:
+            text += f"; {', '.join(sizes)} are {meaning}"
+    return text
 
 
 def _beside_unsolved(c: Curve) -> bool:
     """Whether a point next to the highest one did not converge."""
     near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
     return not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all()
-
-
-def _of_the_contact_mesh(curves: list[Curve]) -> str:
-    """The part of estimated errors that a finer contact mesh lowers, where it is the larger."""
-    halved = [
-        f"{100 * c.halved:.2g} % under {load_of(c)}"
-        for c in curves
-        if np.isfinite(c.halved) and c.halved >= (c.error or 0) / 2
-    ]
-    if not halved:
-        return ""
-    return (
-        f"; {', '.join(halved)} are what half as many contact points change, expected a finer "
-        "contact mesh (mesh.seat_elements, mesh.contact_size)"
-    )
 
 
 def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]:
