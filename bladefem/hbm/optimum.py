@@ -35,6 +35,9 @@ SOLVED_HEIGHT_SHARE = 0.7
 FIRST_STEP_SHARE = 0.1
 # share of the highest peak from which a point of the coarse look is climbed
 NEARLY_HIGHEST = 0.9
+# first step on from the outermost values, in the parameter's coordinate, where the range is wanted
+# that keeps near the lowest height
+FIRST_WIDENING_STEP = 0.1
 # dip of the height between two peaks, or distance where it is unknown: below it they are one
 SAME_PEAK_LOSS = 0.02
 
@@ -182,6 +185,7 @@ def lowest_peak(
     *,
     start: float | None = None,
     tolerance: float = 1e-3,
+    rise: float = 0.0,
     options: Options = DEFAULT_OPTIONS,
 ) -> Optimum:
     """``optimum`` along any variation of a model, for example with the seating solved for each
@@ -189,6 +193,8 @@ def lowest_peak(
 
     Args:
         start: value where the search begins; the middle of the bounds when left out.
+        rise: relative; values are tried on both sides until the height has grown by it, or a bound
+            is reached, or a peak is not solved.
 
     Raises:
         InputError: an empty band or range.
@@ -213,10 +219,15 @@ def lowest_peak(
         best = min(tried, key=lambda peak: peak.height)
         missed, count = _look_over_band(search, best.value, best)
         points += count
-        if missed is None:
+        if missed is not None:
+            levels, count = _add_missed_peak(search, levels, missed)
+            points += count
+            continue
+        points += _widen(search, levels, (1 + rise) * best.height)
+        tried = _highest_peaks(levels)
+        # unless another minimum lies farther out
+        if best.height <= (1 + tolerance) * min(peak.height for peak in tried):
             return Optimum(best.value, best, tuple(tried), points)
-        levels, count = _add_missed_peak(search, levels, missed)
-        points += count
     raise NotSolvedError(
         f"optimum of {name} between {bounds}: every look over the band found a higher peak"
     )
@@ -311,6 +322,36 @@ def _close_in(search: _Search, levels: dict[float, list[Peak]]) -> int:
     raise NotSolvedError(
         f"optimum of {search.name} not closed in with {MOST_LEVELS} values, last at {value:.4g}"
     )
+
+
+def _widen(search: _Search, levels: dict[float, list[Peak]], height: float) -> int:
+    """Add levels on both sides until the highest peak of the outermost ones is as high as wanted, a
+    bound is reached, or a peak is not solved.
+
+    Returns:
+        The points spent.
+    """
+    points = 0
+    for end, sign in ((min, -1.0), (max, 1.0)):
+        step = FIRST_WIDENING_STEP
+        while True:
+            outer = end(_highest_peaks(levels), key=lambda peak: peak.value)
+            value = search.moved(outer.value, sign * step)
+            if outer.height >= height or value == outer.value:
+                break
+            try:
+                levels[value], count = _solve_level(search, value, levels[outer.value])
+                points += count
+                highest = max(levels[value], key=lambda peak: peak.height)
+                missed, count = _look_over_band(search, value, highest)
+            except NotSolvedError:
+                levels.pop(value, None)
+                break
+            points += count
+            if missed is not None:
+                levels[value] = _add_peak(search, missed, levels[value])
+            step *= 2
+    return points
 
 
 def _highest_peaks(levels: dict[float, list[Peak]]) -> list[Peak]:

@@ -84,7 +84,7 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
     low, high = _bracket(finite, best)
     return {
         "amplitude": _error_text(best.get("error", np.nan)),
-        "frequency": _spacing_text(best, points),
+        "frequency": _frequency_text(best, points),
         "load": _between_text(low, high, "N"),
         "own load": "by equilibrium, no model error",
         "mass": _mass_text(low, high, best["load"]),
@@ -111,10 +111,10 @@ def _flatness_text(low: float | None, high: float | None) -> str:
     if low is not None and high is not None:
         return _between_text(low, high, "N")
     if low is not None:
-        return f"above {low:.4g} N; how far up was not searched"
+        return f"above {low:.4g} N; how far up was not found"
     if high is not None:
-        return f"below {high:.4g} N; how far down was not searched"
-    return "how flat the optimum is was not searched"
+        return f"below {high:.4g} N; how far down was not found"
+    return "how flat the optimum is was not found"
 
 
 def _error_text(error: float) -> str:
@@ -163,8 +163,10 @@ def _mass_text(
     return f"{100 * (low / load - 1):+.0f} to {100 * (high / load - 1):+.0f} %, as the optimum load"
 
 
-def _spacing_text(best: pd.Series, points: pd.DataFrame | None) -> str:
-    """Half the distance of the points next to the highest one."""
+def _frequency_text(best: pd.Series, points: pd.DataFrame | None) -> str:
+    """How far the highest point may move: to where the amplitude comes within its own estimated
+    error of the highest, and half the distance of the points there at least.
+    """
     if points is None or points.empty:
         return "no estimate"
     curve = points[points["load"] == best["load"]]
@@ -175,4 +177,12 @@ def _spacing_text(best: pd.Series, points: pd.DataFrame | None) -> str:
     if not 0 < here < len(frequency) - 1:
         return "at the end of the band: no resonance seen"
     spacing = (frequency[here + 1] - frequency[here - 1]) / 2
-    return f"± {spacing:.2g} Hz (spacing of points)"
+    error = best.get("error", np.nan)
+    if np.isinf(error):
+        return "no estimate, as of the amplitude"
+    least = (1 - np.nan_to_num(error)) * best["peak_amplitude"]
+    high = curve.loc[curve["converged"] & (curve["amplitude"] >= least), "frequency"]
+    flat = float(abs(high - best["peak_frequency"]).max()) if len(high) else 0.0
+    if flat <= spacing:
+        return f"± {spacing:.2g} Hz (spacing of points)"
+    return f"± {flat:.2g} Hz (flat top: the amplitude is within its error there)"

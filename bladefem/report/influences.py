@@ -47,13 +47,14 @@ def influence_sentence(found: Sequence[Influence]) -> str:
     top = found[0]
     low, high = top.parameter.low, top.parameter.high
     known = [one for one in found if np.isfinite(one.solved).all()]
-    off = [float(np.abs(np.log(one.predicted[:, 1] / one.solved[:, 1])).max()) for one in known]
-    checked = (
-        ""
-        if not off
-        else f"; solved again at the ends of {len(known)} ranges, the derivatives are off by up to "
-        f"{100 * np.expm1(max(off)):.2g} % of the amplitude there"
-    )
+    checked = ""
+    if known:
+        off = np.abs(np.log([one.predicted / one.solved for one in known])).max(axis=(0, 1))
+        load, amplitude, _ = 100 * np.expm1(off)
+        checked = (
+            f"; solved again at the ends of {len(known)} ranges, the derivatives are off by up to "
+            f"{amplitude:.2g} % of the amplitude and {load:.2g} % of the best load there"
+        )
     failed = "".join(f"; {one.reason}" for one in found if one.reason)
     name = PARAMETER_NAMES[top.parameter.name]
     return (

@@ -6,11 +6,12 @@ best load L* is where dA/dL = 0. There
 
     d ln A / dp = A_p / A                    (A does not change with L to first order),
     d L* / dp = -A_Lp / A_LL,
-    d omega / dp = -(S_wp + S_wL dL*/dp) / S_ww   (S: height over frequency, S_w = 0 at the peak).
+    d omega / dp = omega_p + omega_L dL*/dp.
 
-The first derivatives are exact (``hbm.node_gradients``), with the seating solved anew for the
-parameter; second ones are differences of exact first ones. Ranges are wide, so that the two with
-the largest effect on the amplitude are solved again at both ends.
+The first derivatives of A are exact (``hbm.node_gradients``), with the seating solved anew for the
+parameter; second ones, and those of the frequency, are differences over steps so wide that the
+ripple of sampled friction does not count. Ranges are wide, so that the two with the largest effect
+on the amplitude are solved again at both ends.
 """
 
 from __future__ import annotations
@@ -32,7 +33,6 @@ from ..hbm.parallel import share_work
 from ..hbm.parameters import layer_share, vary
 from ..hbm.peak import Peak, find_peak
 from ..hbm.sensitivity import sensitivities
-from ..hbm.solve import solve
 from ..scene.tables import Contact, Scene
 from ..util.communicator import Communicator
 from .adaptive.choice import solver_options
@@ -46,15 +46,19 @@ GIVEN_STIFFNESS = 2.0
 # factor on each side of the friction coefficient and of the damping ratio
 FRICTION_FACTOR = 1.3
 DAMPING_FACTOR = 2.0
-# relative step of a parameter, and of the load, in differences of exact derivatives; sampled
-# friction ripples: with a tenth of it best loads seemed to move by a factor of 60
-DIFFERENCE_STEP = 2e-2
-# share of the frequency on each side of a peak over which its curvature is measured
-CURVATURE_STEP = 5e-4
+# relative step of a parameter by which the seating is differentiated
+SEATING_STEP = 2e-2
+# logarithmic step of a parameter, and of the load, on each side in differences of derivatives and
+# of frequencies; sampled friction ripples: with a seventh of it the best load seemed to move the
+# wrong way with the stiffness
+WIDE_STEP = 0.14
 # relative difference of heights up to which a peak is the one of the best load
 SAME_PEAK = 0.01
 # most harmonics and contact points of a seat in the model that estimates changes
 COARSE_SETTINGS = {"harmonics": 3, "points": 8}
+# least instants of a period there: with 64 slopes ripple by a tenth, and the derivative of the best
+# load by the stiffness had the wrong sign; with so few points and harmonics they cost little
+SMOOTH_SAMPLES = 512
 # parameters that are solved again at the ends of their ranges
 MAX_CHECKED_PARAMETERS = 2
 
@@ -198,15 +202,11 @@ def influences(
             f"next to the resonance of {1e6 * best.amplitude:.4g} um one of "
             f"{1e6 * base.height:.4g} um was found: derivatives of neither tell what both do"
         )
-    slopes = []
-    tilts = []
-    for load in (best.load * (1 - DIFFERENCE_STEP), best.load * (1 + DIFFERENCE_STEP)):
-        peak = study.peak("kt", 1.0, load, base)
-        slopes.append(study.by_load(peak, "kt", 1.0, load))
-        tilts.append(study.by_frequency(study.model("kt", 1.0, load), base))
-    bend = (slopes[1] - slopes[0]) / (2 * DIFFERENCE_STEP)
-    tilt = (tilts[1] - tilts[0]) / (2 * DIFFERENCE_STEP)
-    found = share_work(lambda p: study.influence(p, base, bend, tilt), parameters, comm)
+    sides = [
+        replace(study.peak("kt", 1.0, load, base), value=load)
+        for load in best.load * np.exp([-WIDE_STEP, WIDE_STEP])
+    ]
+    found = share_work(lambda p: study.influence(p, base, sides), parameters, comm)
     found.sort(key=lambda one: -one.span)
     ends = [(one, i) for one in found[:MAX_CHECKED_PARAMETERS] for i in (0, 1)]
     again = share_work(lambda end: study.solved_again(*end), ends, comm)
@@ -222,13 +222,17 @@ def influences(
 
 
 def _coarse(settings: Settings) -> Settings:
-    """The settings with at most COARSE_SETTINGS of what was chosen; nothing is left to choose."""
+    """The settings with at most COARSE_SETTINGS of what was chosen, and many samples; nothing is
+    left to choose.
+    """
     least: dict[str, Any] = {
         name: min(value, getattr(settings, name) or value)
         for name, value in COARSE_SETTINGS.items()
         if name in settings.chosen
     }
-    return replace(settings, **least, chosen=())
+    # 0: exact in time
+    samples = max(settings.samples, SMOOTH_SAMPLES) if settings.samples else 0
+    return replace(settings, **least, samples=samples, chosen=())
 
 
 def _rescaled(
@@ -282,38 +286,30 @@ class _Study:
             options=replace(solver_options(self.scene.accuracy), tolerance=1e-9),
         )
 
-    def by_load(
-        self,
-        peak: Peak,
-        name: str,
-        factor: float,
-        load: float,
-    ) -> float:
+    def by_load(self, peak: Peak, load: float) -> float:
         """Derivative of ln height by ln load, the seating solved anew."""
-        case_at = self.changed(name, factor)
-        ends = [case_at(load * f) for f in (1 - DIFFERENCE_STEP, 1 + DIFFERENCE_STEP)]
-        return self._by_elements(peak, self.model(name, factor, load), ends)
+        case_at = self.changed("kt", 1.0)
+        ends = [case_at(load * f) for f in (1 - SEATING_STEP, 1 + SEATING_STEP)]
+        return self._by_elements(peak, load, ends)
 
     def by_parameter(
         self,
         peak: Peak,
         name: str,
+        load: float,
     ) -> float:
-        """Derivative of ln height at the best load by the logarithm of a parameter."""
-        model = self.model(name, 1.0, self.best.load)
+        """Derivative of ln height by the logarithm of a parameter at a load."""
         if name == "damping":
+            model = self.model(name, 1.0, load)
             slope = sensitivities(model, peak.solution, ["damping"])["damping"].size[0]
             return float(slope) / peak.height
-        ends = [
-            self.changed(name, f)(self.best.load)
-            for f in (1 - DIFFERENCE_STEP, 1 + DIFFERENCE_STEP)
-        ]
-        return self._by_elements(peak, model, ends)
+        ends = [self.changed(name, f)(load) for f in (1 - SEATING_STEP, 1 + SEATING_STEP)]
+        return self._by_elements(peak, load, ends)
 
     def _by_elements(
         self,
         peak: Peak,
-        model: ReducedModel,
+        load: float,
         ends: list[LoadCase],
     ) -> float:
         """The same from the friction elements on both sides of a step.
@@ -321,8 +317,8 @@ class _Study:
         Stiffnesses are those of the whole layer. Elements of a split layer keep theirs over the
         step; for an open one that shifts the load at zero displacement, -kn times its gap.
         """
-        case = self.changed("kt", 1.0)(self.best.load)
-        groups = family_member(self.family_of(case), self.best.settings).groups
+        member = family_member(self.family_of(self.changed("kt", 1.0)(load)), self.best.settings)
+        model, groups = member.model, member.groups
         low, high = (joined_elements(end.elements, groups) for end in ends)
         layers = [physical_stiffness(end.elements, end.series) for end in ends]
         by_layer = _log_rate(*(np.bincount(groups, layer.kn) for layer in layers))
@@ -337,69 +333,43 @@ class _Study:
         gradients = node_gradients(model, peak.solution, names)
         return sum(float(gradients[name] @ rates[name]) for name in names) / peak.height
 
-    def by_frequency(
-        self,
-        model: ReducedModel,
-        peak: Peak,
-        shift: float = 0.0,
-    ) -> float:
-        """Derivative of the height by the circular frequency at the frequency of a peak, or at
-        that frequency times 1 + shift.
-        """
-        settings = self.best.settings
-        point = solve(
-            model,
-            peak.omega * (1 + shift),
-            settings.harmonics,
-            settings.samples,
-            start=peak.solution,
-            options=replace(solver_options(self.scene.accuracy), tolerance=1e-9),
-        )
-        if not point.converged:
-            raise NotSolvedError(f"influence at {peak.solution.frequency:.6g} Hz: {point.reason}")
-        return float(sensitivities(model, point, ["omega"])["omega"].size[0])
-
     def influence(
         self,
         parameter: Parameter,
         base: Peak,
-        bend: float,
-        tilt: float,
+        sides: Sequence[Peak],
     ) -> Influence:
         """All three derivatives of one parameter.
 
         Args:
-            bend, tilt: derivatives by ln load of the height's own by ln load, over the height, and
-                of that by the frequency.
+            base: at the best load.
+            sides: at WIDE_STEP below and above it, with their loads as values.
         """
         name = parameter.name
         load = self.best.load
-        amplitude = self.by_parameter(base, name)
-        slopes = []
-        tilts = []
-        for factor in (1 - DIFFERENCE_STEP, 1 + DIFFERENCE_STEP):
-            peak = self.peak(name, factor, load, base)
-            slopes.append(self.by_load(peak, name, factor, load))
-            tilts.append(self.by_frequency(self.model(name, factor, load), base))
-        moved_load = -(slopes[1] - slopes[0]) / (2 * DIFFERENCE_STEP) / bend
-        model = self.model(name, 1.0, load)
-        sides = [
-            self.by_frequency(model, base, shift) for shift in (-CURVATURE_STEP, CURVATURE_STEP)
-        ]
-        curvature = (sides[1] - sides[0]) / (2 * CURVATURE_STEP * base.omega)
-        tilted = (tilts[1] - tilts[0]) / (2 * DIFFERENCE_STEP) + tilt * moved_load
-        moved = -tilted / curvature / base.omega
+        width = 2 * WIDE_STEP
+        below, above = (
+            np.array([self.by_load(peak, peak.value), self.by_parameter(peak, name, peak.value)])
+            for peak in sides
+        )
+        bend, mixed = (above - below) / width
+        # a height that has no minimum there by these differences tells nothing
+        moved_load = -mixed / bend if bend > 0 else np.nan
+        low, high = (
+            self.peak(name, float(np.exp(step)), load, base) for step in (-WIDE_STEP, WIDE_STEP)
+        )
+        by_load = np.log(sides[1].omega / sides[0].omega) / width
+        moved = np.log(high.omega / low.omega) / width + by_load * moved_load
+        amplitude = self.by_parameter(base, name, load)
+        rates = np.array([moved_load, amplitude, moved])
         centre = np.log([load, base.height, base.solution.frequency])
-        by_parameter = [float(moved_load), float(amplitude), float(moved)]
-        rates = np.array(by_parameter)
         ends = np.log([parameter.low, parameter.high])
-        predicted = np.exp(centre + ends[:, None] * rates)
         return Influence(
             parameter,
-            load=by_parameter[0],
-            amplitude=by_parameter[1],
-            frequency=by_parameter[2],
-            predicted=predicted,
+            load=float(moved_load),
+            amplitude=amplitude,
+            frequency=float(moved),
+            predicted=np.exp(centre + ends[:, None] * rates),
             solved=np.full((2, 3), np.nan),
         )
 
@@ -437,6 +407,6 @@ def _log_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """(n,) derivative of ln |x| by the logarithm that was stepped; 0 where x is 0 or infinite."""
     finite = np.isfinite(low) & np.isfinite(high)
     middle = np.where(finite, low + high, 0.0) / 2
-    change = np.subtract(high, low, out=np.zeros_like(middle), where=finite) / (2 * DIFFERENCE_STEP)
+    change = np.subtract(high, low, out=np.zeros_like(middle), where=finite) / (2 * SEATING_STEP)
     rate = np.divide(change, middle, out=np.zeros_like(middle), where=middle != 0)
     return np.where(abs(rate) < 1e-9, 0.0, rate)

@@ -10,9 +10,9 @@ from bladefem.data import Elements
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import peak as peak_module
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.hbm.optimum import optimum
+from bladefem.hbm.optimum import Variation, lowest_peak, optimum
 from bladefem.hbm.parameters import vary
-from bladefem.hbm.peak import find_peak, track_peak
+from bladefem.hbm.peak import find_peak, track_peak, with_slope
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response, size
@@ -83,6 +83,21 @@ def test_optimum_load_against_a_scan():
     assert best.peak.height <= min(scan.values()) * 1.002
     assert best.peak.height == pytest.approx(min(scan.values()), rel=0.02)
     assert 1.0 < best.value < 1.9
+
+
+def test_the_range_of_nearly_as_good_values_is_enclosed():
+    """Without a wanted rise the search knows nothing above the optimum."""
+    model = reference_model(1e6, 0.06, 1.0, harmonics=3)
+    along = Variation(
+        lambda factor: vary(model, "load", factor),
+        lambda changed, peak, factor: with_slope(changed, peak, "load", factor),
+    )
+    best = lowest_peak(along, (HZ * 1150, HZ * 1450), (0.3, 6.0), 3, 128, start=1.3, rise=0.3)
+    for side in (
+        [peak.height for peak in best.tried if peak.value < best.value],
+        [peak.height for peak in best.tried if peak.value > best.value],
+    ):
+        assert max(side) >= 1.3 * best.peak.height
 
 
 @pytest.mark.parametrize(

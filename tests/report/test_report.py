@@ -151,8 +151,8 @@ def test_answer_says_which_mass_would_press_best():
     ("low", "high", "said"),
     [
         (150.0, 190.0, "between 150 and 190 N"),
-        (150.0, np.nan, "above 150 N; how far up was not searched"),
-        (np.nan, np.nan, "how flat the optimum is was not searched"),
+        (150.0, np.nan, "above 150 N; how far up was not found"),
+        (np.nan, np.nan, "how flat the optimum is was not found"),
     ],
 )
 def test_a_searched_optimum_says_how_flat_it_is(low, high, said):
@@ -271,7 +271,27 @@ def test_every_headline_says_how_sure_it_is():
     sure = {one.what: one.uncertainty for one in found}
     assert sure["optimum normal load per seat"] == "between 100 and 400 N"
     assert sure["resonance amplitude there"].startswith("± 1.2 %")
+    assert re.fullmatch(r"± [\d.]+ Hz \(flat top: .*\)", sure["resonance frequency there"])
+    exact = summary.assign(error=1e-6)
+    found = headlines(response_answer(exact, synthetic.points()), exact, synthetic.points())
+    sure = {one.what: one.uncertainty for one in found}
     assert re.fullmatch(r"± [\d.]+ Hz \(spacing of points\)", sure["resonance frequency there"])
+
+
+def test_a_flat_top_leaves_the_frequency_open():
+    """Where the amplitude is within its own error of the highest, the highest may lie."""
+    summary = synthetic.summary().assign(error=0.1)
+    points = synthetic.points()
+    best = summary[np.isfinite(summary["load"])].nsmallest(1, "peak_amplitude").iloc[0]
+    points["converged"] = True
+    frequency = best["peak_frequency"] + np.array([-3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0])
+    amplitude = best["peak_amplitude"] * np.array([0.2, 0.5, 0.95, 1.0, 0.85, 0.94, 0.3])
+    flat = points[points["load"] == best["load"]].iloc[[0] * 7]
+    flat = flat.assign(frequency=frequency, amplitude=amplitude)
+    points = pd.concat([points[points["load"] != best["load"]], flat])
+    found = headlines(response_answer(summary, points), summary, points)
+    (sure,) = [one.uncertainty for one in found if one.what == "resonance frequency there"]
+    assert sure == "± 2 Hz (flat top: the amplitude is within its error there)"
 
 
 @pytest.mark.parametrize(

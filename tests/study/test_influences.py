@@ -68,6 +68,19 @@ def test_derivatives_are_those_of_repeated_searches(found):
         assert one.load == pytest.approx(change[0], rel=0.1, abs=0.05)
 
 
+def test_derivatives_of_sampled_friction_are_those_of_exact_friction(found):
+    """With few samples slopes ripple: changes are found with many, whatever was chosen."""
+    best, exact = found
+    sampled = replace(SETTINGS, samples=64, chosen=("samples", "harmonics", "points"))
+    scene = load_scene(PLANE, ["accuracy=0.2 %", "contact.mu=1", "excitation.force=0.05 N"])
+    scene = replace(scene, study=replace(scene.study, band=(1150.0, 1450.0)))
+    parameters = [one.parameter for one in exact]
+    again = influences(scene, replace(best, settings=sampled), family, changed, parameters)
+    loads = {one.parameter.name: one.load for one in again}
+    for one in exact:
+        assert loads[one.parameter.name] == pytest.approx(one.load, rel=0.1, abs=0.02)
+
+
 def test_the_largest_influence_comes_first(found):
     spans = [one.span for one in found[1]]
     assert spans == sorted(spans, reverse=True)

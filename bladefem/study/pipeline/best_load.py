@@ -157,6 +157,7 @@ def _search(
         settings.samples,
         start=middle,
         tolerance=HEIGHT_TOLERANCE_SHARE * scene.accuracy,
+        rise=scene.accuracy,
         options=solver_options(scene.accuracy),
     )
 
