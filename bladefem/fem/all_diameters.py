@@ -22,6 +22,7 @@ from ..errors import InputError, NotSolvedError
 from ..util.progress import Progress, without_progress
 from . import cyclic_schur as core
 from .body import Body
+from .compat import MPI
 from .constraint import Constrained, Transformation, at_diameter, high_part, transformation
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
@@ -446,15 +447,15 @@ def lost_modes(
         # rigid motions alone, which geometry counts
         return {}
     shared = _shifted_core(t, shift)
-    lost = {}
-    for n, con in cons.items():
-        exact = _count_below(con, shift, shared)
-        # guards beyond the count have not converged, and may be anywhere
-        if exact != np.count_nonzero(lam[n][:count] < shift):
-            lost[n] = Count(shift, exact)
+    exact = _counts_below(cons, shift, shared, t.body.comm)
     del shared
     give_back()
-    return lost
+    # guards beyond the count have not converged, and may be anywhere
+    return {
+        n: Count(shift, exact[n])
+        for n in cons
+        if exact[n] != np.count_nonzero(lam[n][:count] < shift)
+    }
 
 
 def found_again(
@@ -485,6 +486,35 @@ def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
         return None
     opened = t.opened
     return opened.elimination.shifted((opened.K - shift * opened.M).tocsr())
+
+
+def _counts_below(
+    cons: dict[int, Constrained],
+    shift: float,
+    shared: core.Core | None,
+    comm: MPI.Comm,
+) -> dict[int, int]:
+    """Eigenvalues below the shift in each nodal diameter (collective).
+
+    Raises:
+        NotSolvedError: the shift is an eigenvalue, on all ranks where it is on one.
+    """
+    if shared is None:
+        return {n: _count_below(con, shift, None) for n, con in cons.items()}
+    # all ranks have the whole cut faces: each counts some of the nodal diameters
+    found: dict[int, int] = {}
+    error = None
+    try:
+        for n in list(cons)[comm.rank :: comm.size]:
+            found[n] = _count_below(cons[n], shift, shared)
+    except NotSolvedError as problem:
+        error = problem
+    counts: dict[int, int] = {}
+    for some, failure in comm.allgather((found, error)):
+        if failure is not None:
+            raise failure
+        counts |= some
+    return counts
 
 
 def _count_below(

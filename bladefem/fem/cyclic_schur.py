@@ -237,8 +237,7 @@ def join_cut_faces(
     Raises:
         NotSolvedError: the sector can still move (definite) or a shift hits an eigenvalue.
     """
-    # S is symmetric
-    S = faces.C.conj().T @ (faces.C.T @ core.S).T
+    S = _folded_complement(core, faces)
     if springs is not None:
         S = S + np.diag(springs[faces.masters])
     if not definite:
@@ -261,7 +260,19 @@ def count_negative(core: Core, faces: FaceMap) -> int:
     Raises:
         NotSolvedError: zero is an eigenvalue.
     """
-    return core.negative + _count_negative(faces.C.conj().T @ (faces.C.T @ core.S).T)
+    return core.negative + _count_negative(_folded_complement(core, faces))
+
+
+def _folded_complement(core: Core, faces: FaceMap) -> np.ndarray:
+    """C^H S C (nm, nm) of the real symmetric S, without a complex copy of S."""
+    turned = faces.C.T.tocsr()
+    if not np.iscomplexobj(turned):
+        half = turned @ core.S
+    else:
+        half = np.empty((turned.shape[0], len(core.S)), complex)
+        half.real = turned.real @ core.S
+        half.imag = turned.imag @ core.S
+    return np.asarray(faces.C.conj().T @ half.T)
 
 
 def solve_diameter(rim: Rim, B: np.ndarray) -> np.ndarray:

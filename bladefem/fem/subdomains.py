@@ -187,10 +187,13 @@ def share_boundary(
 
 def own_part(shared: SharedBoundary, X: np.ndarray) -> np.ndarray:
     """(ni + nf, k) with what this rank owns of the boundary, zero elsewhere on it."""
-    out = np.zeros((len(shared.columns), X.shape[1]), X.dtype, order="F")
+    out = np.empty((len(shared.columns), X.shape[1]), X.dtype, order="F")
     inner = len(shared.inside)
-    out[:inner] = X[shared.inside]
-    out[inner + shared.position] = X[shared.outside]
+    # column by column: numpy picks rows of a whole block several times slower
+    for x, z in zip(X.T, out.T, strict=True):
+        np.take(x, shared.inside, out=z[:inner], mode="clip")
+        z[inner:] = 0
+        z[inner + shared.position] = x[shared.outside]
     return out
 
 
@@ -205,8 +208,9 @@ def back_to_ranks(shared: SharedBoundary, Z: np.ndarray) -> np.ndarray:
     """(n_own, k) from values (ni + nf, k) that all ranks agree on."""
     out = np.empty((shared.size, Z.shape[1]), Z.dtype, order="F")
     inner = len(shared.inside)
-    out[shared.inside] = Z[:inner]
-    out[shared.outside] = Z[inner + shared.position]
+    for x, z in zip(out.T, Z.T, strict=True):
+        x[shared.inside] = z[:inner]
+        x[shared.outside] = z[inner + shared.position]
     return out
 
 

@@ -9,6 +9,7 @@ import pytest
 from structured import sector
 
 from bladefem.errors import NotSolvedError
+from bladefem.fem import all_diameters as wheel
 from bladefem.fem import cyclic_schur as core
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
@@ -128,6 +129,19 @@ def test_a_failure_of_one_rank_ends_all(both, monkeypatch):
     monkeypatch.setattr(core, "factorise_matrix", fails)
     with pytest.raises(NotSolvedError, match="memory ran out"):
         opened.elimination.shifted(opened.K)
+
+
+def test_a_count_that_fails_on_one_rank_ends_all(both, monkeypatch):
+    plain = wheel._count_below
+
+    def fails(*args):
+        if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
+            raise NotSolvedError("the shift is an eigenvalue")
+        return plain(*args)
+
+    monkeypatch.setattr(wheel, "_count_below", fails)
+    with pytest.raises(NotSolvedError, match="the shift is an eigenvalue"):
+        all_diameters(both[0], 4, [0, 1, 2])
 
 
 def _ports(t):
