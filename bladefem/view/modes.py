@@ -32,9 +32,11 @@ from .style import (
     SEQUENTIAL_COLOURS,
     aim_camera,
     canvas,
+    enlarged,
     headline,
     open_plotter,
     photograph,
+    reduced,
     show_photograph,
     size_for,
 )
@@ -155,14 +157,16 @@ def photograph_shape(
     direction: tuple[float, float, float],
     size: tuple[int, int] = (1100, 1200),
     values: np.ndarray | None = None,
+    coarse: bool = False,
 ) -> np.ndarray:
     """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in
     grey.
 
     Args:
         values: (n_points,) to be coloured by in place of the magnitude of the shape.
+        coarse: element edges straight from corner to corner, for small pictures.
     """
-    surface = skin(moving_bodies(mesh, shape))
+    surface = skin(moving_bodies(mesh, shape), coarse)
     drawn = np.pad(shape, ((0, 0), (0, 3 - shape.shape[1])))
     moved = surface.points + factor * drawn[surface.nodes]
     magnitude = np.linalg.norm(shape, axis=1) if values is None else values
@@ -206,8 +210,9 @@ def draw_mode_sheet(
             ax.set_axis_off()
         for number, ax in zip(range(count), axes.flat, strict=False):
             shape = np.real(modes.shapes[number] * best_phase(modes.shapes[number]))
+            factor = scale_of(mesh, shape)
             show_photograph(
-                ax, photograph_shape(mesh, shape, scale_of(mesh, shape), direction, (560, 640))
+                ax, photograph_shape(mesh, shape, factor, direction, (560, 640), coarse=True)
             )
             name = families[number] if number < len(families) else ""
             ax.set_title(f"{number + 1}  {modes.frequencies[number]:.5g} Hz\n{name}", fontsize=9)
@@ -313,7 +318,7 @@ def draw_wheel_mode(
         lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
-    image = photograph(parts, direction, up)
+    image = photograph(parts, direction, up, fine=True)
     with canvas(file, size=size_for(image, 5.2, margin=1.0)) as ax:
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
@@ -398,7 +403,8 @@ def wave_frames(
     factor = scale_of(mesh, modes.shapes[number])
     surface = polydata(wheel, wheel.points.copy())
     surface.point_data["signed"] = signed.real
-    plotter = open_plotter((pixels, pixels))
+    size = (pixels, pixels)
+    plotter = open_plotter(enlarged(size), smooth=False)
     plotter.add_mesh(
         surface, scalars="signed", cmap=DIVERGING_COLOURS, clim=(-1, 1), **RENDER_OPTIONS
     )
@@ -408,7 +414,7 @@ def wave_frames(
         surface.points = wheel.points + factor * (motion * turn).real
         surface.point_data["signed"] = (signed * turn).real
         plotter.render()
-        yield np.asarray(plotter.screenshot(return_img=True))
+        yield reduced(np.asarray(plotter.screenshot(return_img=True)), size)
     plotter.close()
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -24,6 +25,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 SEQUENTIAL_COLOURS = "viridis"
 DIVERGING_COLOURS = "RdBu_r"
 INK_COLOUR = "#222222"
+# pixels of the window to one of the picture, along each side, in place of several samples a pixel
+SUPERSAMPLING = 1.5
 FAILED_COLOUR = "#d62728"
 RENDER_OPTIONS = {"show_scalar_bar": False, "ambient": 0.42, "diffuse": 0.62, "specular": 0.05}
 
@@ -84,7 +87,18 @@ def canvas(
         take_words_as_they_are(figure)
         if file is not None:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
+            _settle_layout(figure)
             figure.savefig(file)
+
+
+def _settle_layout(figure: Any) -> None:
+    """Place what a figure holds now: while it is saved, matplotlib would draw it twice for that,
+    pictures included.
+    """
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+        figure.set_layout_engine(None)
 
 
 def take_words_as_they_are(figure: Any) -> None:
@@ -92,6 +106,9 @@ def take_words_as_they_are(figure: Any) -> None:
 
     Numbers along logarithmic axes are formulas of matplotlib's own and stay so.
     """
+    suspects = [text for text in _texts(figure) if "$" in text.get_text()]
+    if not suspects:
+        return
     numbers = {
         id(label)
         for ax in figure.axes
@@ -99,9 +116,20 @@ def take_words_as_they_are(figure: Any) -> None:
         for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
         for label in (tick.label1, tick.label2)
     }
-    for text in figure.findobj(Text):
-        if id(text) not in numbers and "$" in text.get_text():
+    for text in suspects:
+        if id(text) not in numbers:
             text.set_parse_math(False)
+
+
+def _texts(artist: Any) -> Iterator[Text]:
+    """All texts of a figure but those of axes that are switched off: making their ticks takes as
+    long as the picture itself.
+    """
+    if isinstance(artist, Text):
+        yield artist
+    for child in artist.get_children():
+        if not (isinstance(child, Axis) and not child.axes.axison):
+            yield from _texts(child)
 
 
 def log_axis(
@@ -126,7 +154,7 @@ def photograph(
     direction: tuple[float, float, float],
     up: tuple[float, float, float],
     size: tuple[int, int] = (1400, 1100),
-    crop: bool = True,
+    fine: bool = False,
 ) -> np.ndarray:
     """Render pyvista meshes without a window, in parallel projection, and cut away the white
     border.
@@ -136,22 +164,39 @@ def photograph(
         direction: from the object to the eye.
         up: what points upwards in the picture.
         size: width and height before cropping [pixels].
-        crop: leave False when several frames must keep the same window.
+        fine: triangles are about as small as pixels; no part has lines whose width matters.
 
     Returns:
         (rows, columns, 3) uint8.
     """
-    plotter = open_plotter(size)
+    plotter = open_plotter(enlarged(size) if fine else size, smooth=not fine)
     for part in parts:
         plotter.add_mesh(**{**RENDER_OPTIONS, **part})
     aim_camera(plotter, direction, up, np.concatenate([part["mesh"].points for part in parts]))
     image = np.asarray(plotter.screenshot(return_img=True))
     plotter.close()
-    return trim_border(image) if crop else image
+    return trim_border(reduced(image, size) if fine else image)
 
 
-def open_plotter(size: tuple[int, int]) -> Any:
-    """A pyvista plotter on an off-screen EGL surface with the common theme."""
+def enlarged(size: tuple[int, int]) -> tuple[int, int]:
+    """The window [pixels] for a picture that is ``reduced`` to a size."""
+    return round(SUPERSAMPLING * size[0]), round(SUPERSAMPLING * size[1])
+
+
+def reduced(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A picture (rows, columns, 3) drawn larger, at its size (width, height) with smooth edges."""
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR))
+
+
+def open_plotter(size: tuple[int, int], smooth: bool = True) -> Any:
+    """A pyvista plotter on an off-screen EGL surface with the common theme.
+
+    Args:
+        smooth: several samples a pixel; without a graphics card they take three times as long where
+            triangles are small, see ``reduced``.
+    """
     # VTK reads this when it makes its first window: say EGL before, or it complains about a missing
     # X display.
     os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
@@ -163,7 +208,10 @@ def open_plotter(size: tuple[int, int]) -> Any:
     plotter = pyvista.Plotter(
         off_screen=True, window_size=list(size), theme=theme, lighting="light kit"
     )
-    plotter.enable_anti_aliasing("msaa", multi_samples=8)
+    if smooth:
+        plotter.enable_anti_aliasing("msaa", multi_samples=8)
+    else:
+        plotter.disable_anti_aliasing()
     return plotter
 
 

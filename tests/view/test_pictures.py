@@ -32,7 +32,8 @@ from bladefem.view.modes import (
 from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
 from bladefem.view.optimum import draw_optimum
 from bladefem.view.response import draw_responses, smooth_curve
-from bladefem.view.skin import skin, wheel_skin
+from bladefem.view.skin import row_keys, skin, wheel_skin
+from bladefem.view.style import canvas
 
 
 def ink(file):
@@ -100,6 +101,36 @@ def test_unknown_cells_are_refused():
 
     with pytest.raises(InputError, match="wedge"):
         draw_mesh(Mesh(np.zeros((6, 3)), "wedge", {"blade": np.arange(6)[None]}))
+
+
+@pytest.mark.parametrize("step", [1, 10**12])
+def test_rows_of_the_same_nodes_have_one_key(step):
+    """Also where a product of the node numbers would not fit into 64 bits."""
+    rows = step * np.array([[1, 2, 3], [3, 1, 2], [1, 2, 4], [2, 3, 3], [3, 2, 3]])
+    keys = row_keys(rows)
+    assert keys[0] == keys[1] and keys[3] == keys[4] and len(set(keys.tolist())) == 3
+
+
+def test_a_figure_is_drawn_once_to_be_saved(tmp_path, monkeypatch):
+    """Pictures in it would be made smaller twice, once only to find out where they go."""
+    from matplotlib import image
+
+    drawn = []
+    plain = image.AxesImage.make_image
+    monkeypatch.setattr(
+        image.AxesImage, "make_image", lambda *args, **_: drawn.append(1) or plain(*args, **_)
+    )
+    with canvas(tmp_path / "a.png") as ax:
+        ax.imshow(np.zeros((50, 50, 3), np.uint8))
+    assert drawn == [1] and (tmp_path / "a.png").exists()
+
+
+def test_a_dollar_sign_is_no_formula_on_axes_that_are_off(tmp_path):
+    with canvas(tmp_path / "a.png") as ax:
+        ax.set_axis_off()
+        ax.set_title("$mode$", loc="center")
+        ax.text(0.5, 0.5, "a $ b $ c")
+    assert not ax.title.get_parse_math() and not ax.texts[0].get_parse_math()
 
 
 def test_wheel_has_no_cut_faces_and_closes(sector):
