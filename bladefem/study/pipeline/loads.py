@@ -4,7 +4,7 @@ load.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
@@ -170,11 +170,11 @@ def study_loads(
     progress: Progress = without_progress,
     keep: Keep = compute_without_keeping,
     softer: SofterBody | None = None,
+    best: float = 0.0,
 ) -> list[Curve]:
     """One response curve a load case, shared over the ranks; every rank returns all of them.
 
-    Light loads come first and take longest, since their contacts slip and lift most; the next one
-    goes to the rank that is free.
+    Loads that take longest come first, and the next one goes to the rank that is free.
 
     Args:
         family: of a load case, its models.
@@ -185,7 +185,9 @@ def study_loads(
         keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
             and kept.
         softer: the body less the error of its stiffness, for the error by its mesh.
+        best: load with the smallest resonance [N]; 0 where it is not known.
     """
+    order = longest_first([case.load for case in cases], best)
 
     def curve_at(case: LoadCase) -> Curve:
         return keep(case, partial(curve_of, scene, case, family, settings, softer))
@@ -193,7 +195,20 @@ def study_loads(
     def shown(numbers: Iterable[int]) -> Iterable[int]:
         return progress(numbers, "forced responses", total=len(cases), delay=0.0)
 
-    return share_work(curve_at, cases, comm, shown, on_demand=True)
+    curves = share_work(curve_at, [cases[i] for i in order], comm, shown, on_demand=True)
+    return [curves[order.index(i)] for i in range(len(cases))]
+
+
+def longest_first(loads: Sequence[float], best: float = 0.0) -> list[int]:
+    """Numbers of the loads [N] in the order in which they are solved: those below the best one,
+    whose contacts slip and lift most, from there down, then the others upwards.
+
+    Of the shipped wedge 36 N, half of the best load, take 60 s of CPU, 18 and 9 N 30 s each, all
+    heavier ones together 35 s.
+    """
+    below = sorted((i for i, load in enumerate(loads) if load < best), key=lambda i: -loads[i])
+    above = sorted((i for i, load in enumerate(loads) if load >= best), key=lambda i: loads[i])
+    return below + above
 
 
 def curve_of(

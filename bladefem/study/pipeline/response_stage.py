@@ -73,7 +73,7 @@ def run_response(
             "those of the stage, or its elements are far too large"
         )
     sectors = sector_of(mesh).count if is_wheel(mesh) else 0
-    response = _load_responses(scene, cases, family, settings, keep, softer, sectors)
+    response = _load_responses(scene, cases, family, settings, keep, softer, sectors, best)
     with clock("influences"):
         found = _influences(scene, mesh, before.contact, family, best, keep)
     curves = response.curves
@@ -136,6 +136,7 @@ def _load_responses(
     keep: StageRunner,
     softer: SofterBody | None,
     sectors: int,
+    best: Sequence[BestLoad],
 ) -> Response:
     """Curves of all loads, and what is left without friction.
 
@@ -157,6 +158,7 @@ def _load_responses(
                 make,
             ),
             softer,
+            min((b.load for b in best if not b.reason), default=0.0),
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         models = family(cases[-1])
