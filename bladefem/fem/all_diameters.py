@@ -60,7 +60,7 @@ SOLVED_DIAMETERS_BY_LEVEL = (3, 4, 5)
 # diameters solved from scratch at a time: more of them would save little and take memory
 DIAMETERS_AT_A_TIME = 3
 # columns of a sparse product at a time, to spare memory
-COLUMNS_AT_A_TIME = 32
+COLUMNS_AT_A_TIME = 16
 # error of a vector's direction; that of a frequency is its square
 VECTOR_TOLERANCE = 5e-6
 
@@ -69,6 +69,8 @@ VECTOR_TOLERANCE = 5e-6
 class _Space:
     """What the vectors of some nodal diameters span."""
 
+    # (n_own, at least m) memory of W, with room for more
+    store: np.ndarray
     # (n_own, m) nearly orthonormal, real
     W: np.ndarray
     # (m, m) projections of K0, Kc, Ks
@@ -78,20 +80,15 @@ class _Space:
 
 @dataclass(frozen=True)
 class Eigenpairs:
-    """Modes of one nodal diameter as this rank's unknowns, with the factorisation that they came
-    from.
-    """
+    """Modes of one nodal diameter as this rank's unknowns."""
 
-    flex: Flexibility
+    con: Constrained
     # (m,) [rad^2/s^2], ascending
     lam: np.ndarray
     # (n_own, m) M-orthonormal
     X: np.ndarray
-
-    @property
-    def con(self) -> Constrained:
-        """The pencil."""
-        return self.flex.con
+    # the factorisation that they came from; None where nobody needs it again
+    flex: Flexibility | None = None
 
 
 @dataclass(frozen=True)
@@ -143,7 +140,7 @@ def all_diameters(
     steps = progress(
         eigenpairs(t, solved, wanted, direct, tolerance, solver), "nodal diameters", len(wanted)
     )
-    found = {p.con.nodal_diameter: p for p in steps}
+    found = {p.con.nodal_diameter: p if kept is not None else _bare(p, count) for p in steps}
     if prove:
         if isinstance(body, Body) and kept is None and t.opened is not None:
             # nobody else has them: the count takes their memory
@@ -175,22 +172,26 @@ def eigenpairs(
     guessed = len(order) > SOLVED_DIAMETERS_BY_LEVEL[0] and not direct
     scratch = order[: SOLVED_DIAMETERS_BY_LEVEL[0]] if guessed else order
     blocks: list[np.ndarray] = []
+    guard = EXTRA_ROUGH_MODES if guessed else GUARD_MODES
     for first in range(0, len(scratch), DIAMETERS_AT_A_TIME):
-        some = [flexible(cons[n]) for n in scratch[first : first + DIAMETERS_AT_A_TIME]]
-        solved = pairs_together(
-            some, count, tolerance, EXTRA_ROUGH_MODES if guessed else GUARD_MODES, solver
-        )
-        for flex, (lam, X) in zip(some, solved, strict=True):
+        some = [cons[n] for n in scratch[first : first + DIAMETERS_AT_A_TIME]]
+        together = _solve_together(some, count, tolerance, guard, solver)
+        while together:
+            found = together.pop(0)
             if guessed:
-                blocks.append(X)
-            yield _first_pairs(Eigenpairs(flex, lam, X), count, guessed)
+                blocks.append(found.X)
+            yield _first_pairs(found, count, guessed)
+            # its factor and vectors are not kept while others are solved
+            del found
     space = None
+    # real and imaginary part of each vector
+    room = 2 * SOLVED_DIAMETERS_BY_LEVEL[-1] * (count + EXTRA_ROUGH_MODES)
     for i, n in enumerate(order[len(scratch) :], len(scratch)):
         if i in SOLVED_DIAMETERS_BY_LEVEL:
             give_back()
-            space = _extend_space(t, blocks, space)
-            blocks = []
-            give_back()
+            space = _extend_space(t, blocks, space, room)
+        # what the last one took would stay with it, in pieces that do not fit
+        give_back()
         # always so: the first of the levels comes first
         assert space is not None
         helps = i < SOLVED_DIAMETERS_BY_LEVEL[-1]
@@ -208,6 +209,30 @@ def eigenpairs(
         if helps:
             blocks.append(found.X)
         yield _first_pairs(found, count, helps)
+        del found, start
+
+
+def _solve_together(
+    cons: list[Constrained],
+    count: int,
+    tolerance: float,
+    guard: int,
+    solver: Eigensolver,
+) -> list[Eigenpairs]:
+    """A few nodal diameters from scratch."""
+    some = [flexible(con) for con in cons]
+    solved = pairs_together(some, count, tolerance, guard, solver)
+    return [
+        Eigenpairs(flex.con, lam, X, flex) for flex, (lam, X) in zip(some, solved, strict=True)
+    ]
+
+
+def _bare(found: Eigenpairs, count: int) -> Eigenpairs:
+    """The pairs asked for, without guards and factors: of all nodal diameters they would fill a
+    tenth of the memory.
+    """
+    X = found.X[:, :count].copy(order="F")
+    return replace(found, lam=found.lam[:count], X=X, flex=None)
 
 
 def sector_span(t: Transformation, blocks: list[np.ndarray], P: sp.spmatrix) -> SectorSpan:
@@ -217,7 +242,7 @@ def sector_span(t: Transformation, blocks: list[np.ndarray], P: sp.spmatrix) -> 
         blocks: (n_own, k) vectors of each of them, as this rank's unknowns.
         P: (n_points*dim, p) port vectors in mesh numbering.
     """
-    space = _extend_space(t, blocks, None)
+    space = _extend_space(t, list(blocks), None)
     rank = t.body.comm.rank
     own = slice(int(t.start[rank]), int(t.start[rank + 1]))
     ports = sp.csc_matrix(P).T
@@ -256,28 +281,37 @@ def _solve_pairs(
     guard: int = GUARD_MODES,
 ) -> Eigenpairs:
     guard = min(guard, flex.con.T.shape[1] - count)
-    return Eigenpairs(flex, *lowest_pairs(flex, count, tolerance, start, guard, solver))
+    lam, X = lowest_pairs(flex, count, tolerance, start, guard, solver)
+    return Eigenpairs(flex.con, lam, X, flex)
 
 
 def _extend_space(
     t: Transformation,
     blocks: list[np.ndarray],
     known: _Space | None,
+    room: int = 0,
 ) -> _Space:
-    """The parts of more vectors added to a space; what it has already is projected once."""
+    """The parts of more vectors added to a space; what it has already is projected once.
+
+    Args:
+        blocks: (n_own, k) the vectors, which are taken out: both at once would be the peak of
+            memory.
+        room: columns of a new space that are set aside for later ones.
+    """
     new = _span_parts(blocks, t, known)
+    blocks.clear()
     old = 0 if known is None else known.W.shape[1]
-    W = (
-        new
-        if known is None
-        else np.concatenate(
-            [known.W, new], axis=1, out=np.empty((len(new), old + new.shape[1]), order="F")
-        )
-    )
-    columns = _project_columns(t, W, slice(old, W.shape[1]))
+    width = old + new.shape[1]
+    store = np.empty((len(new), max(room, width)), order="F") if known is None else known.store
+    assert width <= store.shape[1]
+    store[:, old:width] = new
+    del new
+    W = store[:, :width]
+    columns = _project_columns(t, W, slice(old, width))
     if known is None:
-        return _Space(W, *columns)
+        return _Space(store, W, *columns)
     return _Space(
+        store,
         W,
         *(
             [_append_columns(*each) for each in zip(A, B, (1, 1, -1), strict=True)]

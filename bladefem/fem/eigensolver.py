@@ -316,7 +316,10 @@ def krylov_schur(
         )
     if guard and len(lam) < count + guard and len(pencil.known):
         more, rough = _rough_pairs(pencil, X, count + guard - len(lam))
-        return np.concatenate([lam, more]), np.asfortranarray(np.hstack([X, rough]))
+        lam, X = np.concatenate([lam, more]), np.asfortranarray(np.hstack([X, rough]))
+    pencil.known = _Columns()
+    # iterations that advance together end one after the other
+    give_back()
     return lam, X
 
 

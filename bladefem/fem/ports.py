@@ -164,10 +164,11 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
     n = p.con.nodal_diameter
     load = model.static_load if n == 0 else None
     P = model.P
-    rim = p.flex.factor.parts
-    if model.shared is None or not isinstance(rim, Rim) or p.flex.R.shape[1]:
+    flex = p.flex or flexible(p.con)
+    rim = flex.factor.parts
+    if model.shared is None or not isinstance(rim, Rim) or flex.R.shape[1]:
         return port_model(
-            p.con, P, model.names, model.count, load, model.kind, p.flex, model.solver, model.spin
+            p.con, P, model.names, model.count, load, model.kind, flex, model.solver, model.spin
         )
     _check_ports(p.con, P)
     G, offset = _closed_flexibility(model.shared, rim)
