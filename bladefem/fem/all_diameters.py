@@ -222,9 +222,7 @@ def _solve_together(
     """A few nodal diameters from scratch."""
     some = [flexible(con) for con in cons]
     solved = pairs_together(some, count, tolerance, guard, solver)
-    return [
-        Eigenpairs(flex.con, lam, X, flex) for flex, (lam, X) in zip(some, solved, strict=True)
-    ]
+    return [Eigenpairs(flex.con, lam, X, flex) for flex, (lam, X) in zip(some, solved, strict=True)]
 
 
 def _bare(found: Eigenpairs, count: int) -> Eigenpairs:
