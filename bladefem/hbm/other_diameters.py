@@ -12,6 +12,8 @@ d = 1 .. gcd(EO, N) / 2 are all.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy import linalg
 
@@ -31,6 +33,21 @@ from .stability import (
     linearised_contacts,
     map_operations,
 )
+
+# relative distance from the leading multiplier at which its disturbance is solved for
+SHIFT = 1e-7
+# solutions after which the disturbance is known
+ITERATIONS = 3
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Of the disturbance of a class that grows most."""
+
+    # modulus of its Floquet multiplier; NaN where it would take too many operations
+    multiplier: float = float("nan")
+    # of the blade modes that have most of its energy [rad/s]; NaN likewise
+    omega: float = float("nan")
 
 
 def class_diameters(d: int, engine_order: int, sectors: int) -> tuple[int, ...]:
@@ -56,15 +73,28 @@ def class_multiplier(
     instants: int = INSTANTS_PER_PERIOD,
     most: float = MAX_OPERATIONS,
 ) -> float:
-    """Largest modulus of the Floquet multipliers of a class of disturbances; NaN where it would
-    take too many operations.
+    """Largest modulus of the Floquet multipliers of a class of disturbances; arguments and errors
+    are those of `class_growth`.
+    """
+    return class_growth(model, solution, bodies, angle, instants, most).multiplier
+
+
+def class_growth(
+    model: ReducedModel,
+    solution: Solution,
+    bodies: ReducedModel,
+    angle: float,
+    instants: int = INSTANTS_PER_PERIOD,
+    most: float = MAX_OPERATIONS,
+) -> Growth:
+    """What grows most, or decays least, of a class of disturbances.
 
     Args:
         solution: a motion of the model, in the wave.
         bodies: the model with the bodies of the class: that of harmonic h = 0 .. r-1 moves with the
             phase 2 pi h / r plus the angle between two blades that are T / r apart.
         angle: `class_angle` of the class.
-        most: operations above which it is not made.
+        most: operations above which it is not looked for.
 
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
@@ -74,10 +104,26 @@ def class_multiplier(
     ring = _class_ring(bodies, r, angle)
     contacts, nodes = linearised_contacts(model, solution, ring, S, copies=2)
     if map_operations(contacts, r, S) > most:
-        return float("nan")
+        return Growth()
     part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // r)
-    values = linalg.eigvals(_handed_on(ring, part, angle), check_finite=False)
-    return float(abs(values).max() ** r)
+    handed = _handed_on(ring, part, angle)
+    values = linalg.eigvals(handed, check_finite=False)
+    leading = values[np.argmax(abs(values))]
+    return Growth(float(abs(leading) ** r), _moving_mode(ring, handed, leading))
+
+
+def _moving_mode(ring: SectorModes, handed: np.ndarray, leading: complex) -> float:
+    """Frequency of the modes that have most of the energy of a disturbance [rad/s], by inverse
+    iteration; rigid dampers have none.
+    """
+    M = len(ring.stiffness)
+    factors = linalg.lu_factor(handed - (1 + SHIFT) * leading * np.eye(len(handed)))
+    x = np.random.default_rng(0).standard_normal(len(handed)).astype(complex)
+    for _ in range(ITERATIONS):
+        x = linalg.lu_solve(factors, x)
+        x /= np.linalg.norm(x)
+    energy = ring.stiffness * abs(x[:M]) ** 2 + abs(x[M : 2 * M]) ** 2
+    return float(np.sqrt(ring.stiffness[np.argmax(energy * (ring.stiffness > 0))]))
 
 
 def _class_ring(bodies: ReducedModel, r: int, angle: float) -> SectorModes:

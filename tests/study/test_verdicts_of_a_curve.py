@@ -93,7 +93,7 @@ def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
     """The highest first; motions that stay unstable end it, and lift-off is left alone."""
     model = bouncing()
     points = [
-        replace(p, states={**p.states, "lift": lift})
+        replace(p, states={**p.states, "slip": 1, "lift": lift})
         for p, lift in zip(response(model, [1.1, 1.2, 1.3, 1.0], 7, 128), (0, 0, 0, 1), strict=True)
     ]
     order = np.argsort([-abs(p.probe[1, 0]) for p in points[:3]])
@@ -114,6 +114,57 @@ def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
     assert told.verdict[order[0]] == STABLE
     assert [told.verdict[i] for i in (order[1], order[2], 3)] == [UNSTABLE] * 3
     assert list(stability_of(model, points).verdict) == [UNSTABLE] * 4
+
+
+def closed_points(model, states):
+    points = response(model, [1.1, 1.2, 1.3], 7, 128)
+    return [replace(p, states={**p.states, "lift": 0, **states}) for p in points]
+
+
+def test_the_highest_motion_that_is_not_unstable_is_judged_again_too(monkeypatch):
+    """Seven harmonics call motions of the shipped wedge stable that a march leaves."""
+    model = bouncing()
+    points = closed_points(model, {"slip": 1})
+    order = np.argsort([-abs(p.probe[1, 0]) for p in points])
+    lost = points[order[0]].omega
+    asked = []
+
+    def verdict(of, motion, *limits):
+        asked.append((motion.omega, motion.harmonics))
+        leaves = motion.harmonics > 7 and motion.omega == lost
+        return Verdict(UNSTABLE, 1.1) if leaves else Verdict(STABLE, 1.0)
+
+    monkeypatch.setattr(stability, "stability_verdict", verdict)
+    richer = [RicherModel(model, 15, 256), RicherModel(model, 31, 512)]
+    told = stability_of(model, points, richer)
+    assert told.verdict[order[0]] == UNSTABLE and told.multiplier[order[0]] == 1.1
+    assert [told.verdict[i] for i in order[1:]] == [STABLE] * 2
+    # the richest motion decides, and lower points are left as they are
+    assert [a for a in asked if a[1] > 7] == [(points[i].omega, 31) for i in order[:2]]
+    asked.clear()
+    stability_of(model, closed_points(model, {"slip": 0}), richer)
+    assert all(harmonics == 7 for _, harmonics in asked)
+
+
+def test_the_richest_motion_that_is_found_decides(monkeypatch):
+    model = bouncing()
+    point = closed_points(model, {"slip": 1})[0]
+    starts = []
+    solved = stability.solve_near
+
+    def near(of, omega, harmonics, samples, start, options):
+        starts.append(start.harmonics)
+        found = solved(of, omega, harmonics, samples, start, options)
+        return replace(found, converged=harmonics != 31)
+
+    monkeypatch.setattr(stability, "solve_near", near)
+    richer = [RicherModel(model, h, 16 * (h + 1)) for h in (15, 31, 23)]
+    told, spent = stability.judged_again(Verdict(UNSTABLE, 1.2), point, richer)
+    # each starts from the richest before that was found
+    assert starts == [7, 15, 15]
+    exact = solved(model, point.omega, 23, 16 * 24, point)
+    assert told.multiplier == pytest.approx(stability_verdict(model, exact).multiplier, rel=1e-4)
+    assert spent > 0
 
 
 def test_a_model_with_two_tangents_is_marched_by_steps():

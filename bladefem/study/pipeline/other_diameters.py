@@ -3,21 +3,22 @@ harmonics never reach?
 
 Only the motion that is given as the resonance is asked (`bladefem.hbm.other_diameters`), with the
 bodies that `bladefem.reduction.other_diameters` has for these diameters. What replaces the wave
-there is no wave, and is not looked for.
+there is no wave, and is not looked for; the modes that a growing disturbance moves tell a ripple
+from a motion of the blade.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import gcd, isfinite
+from math import gcd, isfinite, nan, pi
 
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
-from ...hbm.other_diameters import class_angle, class_diameters, class_multiplier
+from ...hbm.other_diameters import Growth, class_angle, class_diameters, class_growth
 from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import Solution
-from ...hbm.solve import solve
+from ...hbm.solve import solve_near
 from ...hbm.stability import (
     INSTANT_REFINEMENT,
     INSTANTS_PER_PERIOD,
@@ -30,10 +31,9 @@ from .stability import JUDGED_OPTIONS, Disturbances, judged_motion, model_in_tim
 
 # growth from which on more instants are taken not to make a motion stable
 NEAR_ONE_GROWTH = 0.02
-# with which the motion is judged: with 7 and 128 one that a march of twelve blades keeps to was
-# called unstable by 4 % a period
-CLASS_HARMONICS = 15
-CLASS_SAMPLES = 256
+# harmonics and samples with which the motion is judged, the second where the first are not solved:
+# seven and fifteen call waves unstable that a march keeps, and fifteen call one stable that leaves
+CLASS_SETTINGS = ((31, 512), (15, 256))
 # operations of the verdict on one class, some 0.5 s
 CLASS_OPERATIONS = 1.5e10
 
@@ -46,6 +46,8 @@ class ClassVerdict:
     diameters: tuple[int, ...]
     # largest modulus of their Floquet multipliers
     multiplier: float
+    # of the blade modes that have most of the energy of what grows most [Hz]
+    frequency: float = nan
 
     @property
     def unstable(self) -> bool:
@@ -76,38 +78,50 @@ def class_verdicts(
         blades = blades_of_wave(model)
     except InputError:
         return ()
-    harmonics = min(max(settings.harmonics, blades - 1, CLASS_HARMONICS), models.harmonics)
+    judged, harmonics = _richest(models, settings, judged_motion(model, motion), blades)
     rich = replace(settings, harmonics=harmonics)
     model = model_in_time(models, rich)
-    judged = _richer(model, judged_motion(model, motion), harmonics)
     found = []
     for d in classes:
         angle = class_angle(d, engine_order, sectors)
-        largest = _largest(model, judged, models.disturbed(rich, d), angle)
-        if isfinite(largest):
-            found.append(ClassVerdict(class_diameters(d, engine_order, sectors), largest))
+        most = _leading(model, judged, models.disturbed(rich, d), angle)
+        if isfinite(most.multiplier):
+            diameters = class_diameters(d, engine_order, sectors)
+            found.append(ClassVerdict(diameters, most.multiplier, most.omega / (2 * pi)))
     return tuple(found)
 
 
-def _richer(model: ReducedModel, motion: Solution, harmonics: int) -> Solution:
-    """The motion with more harmonics, or itself where it is not found with them."""
-    samples = max(motion.samples, CLASS_SAMPLES)
-    try:
-        found = solve(model, motion.omega, harmonics, samples, start=motion, options=JUDGED_OPTIONS)
-    except (InputError, NotSolvedError):
-        return motion
-    return found if found.converged else motion
+def _richest(
+    models: Family,
+    settings: Settings,
+    motion: Solution,
+    blades: int,
+) -> tuple[Solution, int]:
+    """The motion with the first of CLASS_SETTINGS with which it is found, or itself; and how many
+    harmonics the bodies need for it and for its wave to repeat.
+    """
+    for harmonics, samples in CLASS_SETTINGS:
+        wanted = min(max(settings.harmonics, blades - 1, harmonics), models.harmonics)
+        model = model_in_time(models, replace(settings, harmonics=wanted))
+        samples = max(motion.samples, samples)
+        try:
+            found = solve_near(model, motion.omega, wanted, samples, motion, JUDGED_OPTIONS)
+        except (InputError, NotSolvedError):
+            continue
+        if found.converged:
+            return found, wanted
+    return motion, max(motion.harmonics, blades - 1)
 
 
-def _largest(model: ReducedModel, motion: Solution, bodies: ReducedModel, angle: float) -> float:
-    """The multiplier of a class, with more instants where it is close to one."""
-    largest = class_multiplier(model, motion, bodies, angle, most=CLASS_OPERATIONS)
-    if not UNSTABLE_GROWTH < largest - 1 < NEAR_ONE_GROWTH:
-        return largest
+def _leading(model: ReducedModel, motion: Solution, bodies: ReducedModel, angle: float) -> Growth:
+    """The growth of a class, with more instants where its multiplier is close to one."""
+    found = class_growth(model, motion, bodies, angle, most=CLASS_OPERATIONS)
+    if not UNSTABLE_GROWTH < found.multiplier - 1 < NEAR_ONE_GROWTH:
+        return found
     more = INSTANT_REFINEMENT * INSTANTS_PER_PERIOD
     most = INSTANT_REFINEMENT * CLASS_OPERATIONS
-    finer = class_multiplier(model, motion, bodies, angle, more, most)
-    return finer if isfinite(finer) else largest
+    finer = class_growth(model, motion, bodies, angle, more, most)
+    return finer if isfinite(finer.multiplier) else found
 
 
 def sentence_of_classes(
@@ -131,10 +145,12 @@ def sentence_of_classes(
     if not lost:
         return f"{start} {listed}, and is stable against them{others}"
     each = "; ".join(
-        f"{', '.join(map(str, v.diameters))} (multiplier {v.multiplier:.4g})" for v in lost
+        f"{', '.join(map(str, v.diameters))} (multiplier {v.multiplier:.4g}, mostly in modes near "
+        f"{v.frequency:.4g} Hz)"
+        for v in lost
     )
     return (
-        f"{start} {listed}, and seems to be left by those of {each}: blades then no longer move "
-        "alike; ripples of high frequency may be called growing that more harmonics, or a march of "
-        f"the wheel, let decay{others}"
+        f"{start} {listed}, and is left by those of {each}: blades then no longer move alike; the "
+        "wheel was not marched from there, and modes far above the excitation mostly put a ripple "
+        f"on the same motion{others}"
     )

@@ -48,9 +48,10 @@ JUDGED_HARMONICS = 7
 JUDGED_SAMPLES = 128
 # a motion that Newton's method does not reach from the point is not looked for: one such search
 # cost twice the verdicts of a curve
-JUDGED_OPTIONS = replace(DEFAULT_OPTIONS, fallbacks=False)
-# harmonics and samples with which an unstable motion is judged again: with seven, waves of the
-# shipped wedge under 290 N grow by 28 % a period that neither 15 or 31 nor a march let grow
+JUDGED_OPTIONS = replace(DEFAULT_OPTIONS, iterations=25, fallbacks=False)
+# harmonics and samples up to which an unstable motion is followed to be judged again: with seven,
+# waves of the shipped wedge under 290 N grow by 28 % a period that a march lets decay, and with
+# fifteen under 73 N by 26 %
 CONFIRMING = ((15, 256), (31, 512))
 # of the amplitude: by which the motion with so many may differ to be the same one
 SAME_MOTION = 0.03
@@ -96,9 +97,10 @@ def stability_of(
     they allow the other local maxima, its neighbours, and points spread evenly over the curve; at
     last whichever point is then the highest of those that are not unstable. Unstable ones are
     judged again with more harmonics, from the highest down, as far as CONFIRMING_OPERATIONS allow
-    it and until CONFIRMED_MOTIONS of them stay unstable.
+    it and until CONFIRMED_MOTIONS of them stay unstable; so is the highest that is not.
     """
     found = [Verdict(UNKNOWN, reason="it was left out for its cost") for _ in points]
+    motions = list(points)
     costs = [_judging_operations(model, point) for point in points]
     maxima = _maxima(points)
     budget = CURVE_OPERATIONS
@@ -107,19 +109,24 @@ def stability_of(
         highest = i in maxima[:1]
         if i in judged or (costs[i] > budget and not highest):
             continue
-        motion = judged_motion(model, points[i])
-        found[i] = stability_verdict(model, motion, MAX_OPERATIONS if highest else costs[i])
+        motions[i] = judged_motion(model, points[i])
+        found[i] = stability_verdict(model, motions[i], MAX_OPERATIONS if highest else costs[i])
         judged.add(i)
         budget -= costs[i]
-    stayed = _judge_again(found, points, richer, range(len(points)), CONFIRMED_MOTIONS)
+    again = _judge_again(found, motions, richer)
     for _ in range(POINTS_JUDGED_IN_ADDITION):
         lasting = [i for i in range(len(points)) if found[i].verdict != UNSTABLE]
         top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
-        if top is None or top in judged:
+        if top is None or top in again:
             break
-        found[top] = stability_verdict(model, judged_motion(model, points[top]))
+        if top not in judged:
+            motions[top] = judged_motion(model, points[top])
+            found[top] = stability_verdict(model, motions[top])
+        stayed = sum(found[i].verdict == UNSTABLE for i in again)
+        if found[top].verdict != UNSTABLE or stayed < CONFIRMED_MOTIONS:
+            found[top], _ = judged_again(found[top], motions[top], richer)
         judged.add(top)
-        stayed += _judge_again(found, points, richer, [top], CONFIRMED_MOTIONS - stayed)
+        again.add(top)
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
     return Stability(
         np.array([v.verdict for v in found]),
@@ -147,57 +154,66 @@ def richer_models(models: Family, settings: Settings) -> list[RicherModel]:
 
 def _judge_again(
     found: list[Verdict],
-    points: Sequence[Solution],
+    motions: Sequence[Solution],
     richer: Sequence[RicherModel],
-    rows: Sequence[int],
-    wanted: int,
-) -> int:
-    """Judge unstable points again, from the highest down, and put the verdicts in their places;
-    where contacts lift off, more harmonics mostly are not solved, and it is not tried.
+) -> set[int]:
+    """Judge unstable motions again, from the highest down, and put the verdicts in their places.
 
     Args:
-        rows: numbers of the points in question.
-        wanted: motions that stay unstable, after which no other one is judged again.
+        motions: those that were judged.
 
     Returns:
-        how many stayed so.
+        numbers of those that were judged again.
     """
     budget = CONFIRMING_OPERATIONS
     stayed = 0
-    unstable = [i for i in rows if found[i].verdict == UNSTABLE and not points[i].states["lift"]]
-    for i in sorted(unstable, key=lambda i: -size(points[i])) if richer else ():
-        if budget <= 0 or stayed >= wanted:
+    again: set[int] = set()
+    unstable = [i for i in range(len(found)) if found[i].verdict == UNSTABLE]
+    for i in sorted(unstable, key=lambda i: -size(motions[i])):
+        if budget <= 0 or stayed >= CONFIRMED_MOTIONS:
             break
-        found[i], spent = _judged_again(found[i], points[i], richer)
+        found[i], spent = judged_again(found[i], motions[i], richer)
+        again.add(i)
         stayed += found[i].verdict == UNSTABLE
         budget -= spent
-    return stayed
+    return again
 
 
-def _judged_again(
+def judged_again(
     verdict: Verdict,
-    point: Solution,
+    motion: Solution,
     richer: Sequence[RicherModel],
 ) -> tuple[Verdict, float]:
-    """The verdict on the motion with more harmonics where that one is stable, else the one there
+    """The verdict on a motion with as many more harmonics as it is found with, else the one there
     was; and the operations that it took.
+
+    Where all contacts stick, more harmonics change nothing; where some lift off, they mostly are
+    not solved, and it is not tried.
+
+    Args:
+        motion: the one that was judged.
+        richer: models from poor to rich; the motion with one is the start for the next.
     """
     spent = 0.0
-    for some in richer:
+    found = None
+    last = motion
+    known = verdict.verdict in (STABLE, UNSTABLE)
+    for some in richer if known and motion.states["slip"] and not motion.states["lift"] else ():
         spent += RICHER_OPERATIONS
         try:
-            motion = solve_near(
-                some.model, point.omega, some.harmonics, some.samples, point, JUDGED_OPTIONS
+            again = solve_near(
+                some.model, motion.omega, some.harmonics, some.samples, last, JUDGED_OPTIONS
             )
         except (InputError, NotSolvedError):
-            break
-        if not motion.converged or abs(size(motion) / size(point) - 1) > SAME_MOTION:
             continue
-        spent += verdict_operations(some.model, motion)
-        again = stability_verdict(some.model, motion)
-        if again.verdict == STABLE:
-            return again, spent
-    return verdict, spent
+        if again.converged and abs(size(again) / size(motion) - 1) <= SAME_MOTION:
+            found = some.model
+            last = again
+    if found is None:
+        return verdict, spent
+    told = stability_verdict(found, last)
+    spent += verdict_operations(found, last)
+    return told if told.verdict in (STABLE, UNSTABLE) else verdict, spent
 
 
 def _judging_operations(model: ReducedModel, point: Solution) -> float:
