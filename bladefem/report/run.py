@@ -34,6 +34,7 @@ from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.coriolis import CORIOLIS_SHARE, has_coriolis
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve, design_table
+from ..study.pipeline.response_remarks import load_of
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..study.pipeline.stability import UNIQUE
 from ..study.pipeline.state_check import state_sentence
@@ -72,6 +73,8 @@ from .write import Page, write_report
 
 # the figure of the blade's motion under the best load
 MOTION_FIGURE = "response/damped_motion"
+# relative difference of frequencies that no search resolves
+SAME_FREQUENCY = 1e-4
 MESH_ERROR_NOTE = (
     "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
     "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
@@ -199,7 +202,7 @@ def _report_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]
         *_coriolis(result),
         method(_states(result)),
         method(linear_sentence(cycles)),
-        *_beyond_stick(result),
+        *beyond_stick(result),
     ]
     if result.response.influences:
         messages.append(influence_sentence(result.response.influences))
@@ -318,18 +321,25 @@ def _states(result: SolvedRun) -> str:
     )
 
 
-def _beyond_stick(result: SolvedRun) -> list[str]:
-    """Why a resonance may lie above that of full stick."""
+def beyond_stick(result: SolvedRun) -> list[str]:
+    """Why resonances lie above that of full stick, where the static load leaves points open."""
     stuck = result.response.limits[1].peak_frequency
-    above = [curve for curve in result.response.curves if curve.peak_frequency > stuck]
-    return (
-        [
-            "resonances above that of full stick: contact points that the static load leaves open "
-            "close in vibration, and count as open in full stick"
-        ]
-        if above
-        else []
-    )
+    opened = {
+        load
+        for load, maps in result.contact.maps.items()
+        if any((one.force <= 0).any() for one in maps)
+    }
+    above = [
+        load_of(curve)
+        for curve in result.response.curves
+        if curve.load in opened and curve.peak_frequency > (1 + SAME_FREQUENCY) * stuck
+    ]
+    if not above:
+        return []
+    return [
+        f"resonances above that of full stick under {', '.join(above)}: contact points that the "
+        "static load leaves open close in vibration, and count as open in full stick"
+    ]
 
 
 def _tables(result: SolvedRun) -> dict[str, pd.DataFrame]:

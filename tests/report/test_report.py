@@ -5,6 +5,7 @@ import re
 import sys
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -15,6 +16,7 @@ from bladefem.io.run_folder import keep_given
 from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
+from bladefem.report.run import beyond_stick
 from bladefem.report.statements import (
     ResponseAnswer,
     assumed_stiffness,
@@ -383,3 +385,20 @@ def test_what_is_not_determined_has_no_bracket():
     told = ResponseAnswer([("optimum normal load per seat", "not determined", "why")], [])
     (found,) = headlines(told, summary, None)
     assert found.uncertainty == "see what to do next"
+
+
+@pytest.mark.parametrize(
+    ("force", "frequency", "said"),
+    [(0.0, 103.0, True), (0.0, 100.001, False), (1.0, 103.0, False)],
+)
+def test_resonances_above_full_stick_are_explained_by_open_contacts_alone(force, frequency, said):
+    """By the rounding of a search, or with all points pressed, there is nothing to explain."""
+    curve = SimpleNamespace(load=80.0, mass=None, peak_frequency=frequency)
+    limit = SimpleNamespace(peak_frequency=100.0)
+    result = SimpleNamespace(
+        response=SimpleNamespace(curves=[curve], limits=(limit, limit)),
+        contact=SimpleNamespace(maps={80.0: (SimpleNamespace(force=np.array([2.0, force])),)}),
+    )
+    found = beyond_stick(result)
+    assert bool(found) == said
+    assert not said or "full stick under 80 N: contact points" in found[0]
