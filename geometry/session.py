@@ -52,7 +52,11 @@ def gmsh_session() -> Iterator[ModuleType]:
 
 
 @contextmanager
-def gmsh_step(parameter: str, action: str) -> Iterator[None]:
+def gmsh_step(
+    parameter: str,
+    action: str,
+    remedy: str = "change this parameter",
+) -> Iterator[None]:
     """Turn a failure of gmsh into one sentence that names the parameter to change.
 
     Raises:
@@ -65,6 +69,4 @@ def gmsh_step(parameter: str, action: str) -> Iterator[None]:
         if type(error) is not Exception:
             raise
         reason = " ".join(str(error).split()) or "no reason given"
-        raise InputError(
-            f"{parameter}: gmsh could not {action} ({reason}); change this parameter"
-        ) from error
+        raise InputError(f"{parameter}: gmsh could not {action} ({reason}); {remedy}") from error

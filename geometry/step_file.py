@@ -35,6 +35,8 @@ from .session import gmsh_session, gmsh_step
 # (dimension, name) to entities
 Named = dict[tuple[int, str], list[int]]
 CONTACT_FACES = ("seat_left", "seat_right", "damper_left", "damper_right")
+# what to do about a file that gmsh cannot read
+STEP_REMEDY = "expected a STEP file of solids; export it anew from CAD"
 # elements along a model that is only looked at
 PREVIEW_ELEMENTS = 30
 SI_PREFIXES = {
@@ -86,7 +88,7 @@ def read_step(
     unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     text = path.read_text(errors="replace")
     with gmsh_session() as gmsh:
-        with gmsh_step("imported.file", f"import '{file}'"):
+        with gmsh_step("imported.file", f"import '{file}'", STEP_REMEDY):
             _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
         # shapes of another size are more than the drawing library can handle
         box = np.array(gmsh.model.getBoundingBox(-1, -1))
@@ -124,7 +126,7 @@ def coarse_step(file: str | Path) -> RawMesh:
     if not path.is_file():
         raise InputError(f"'{file}': there is no such file")
     with gmsh_session() as gmsh:
-        with gmsh_step("imported.file", f"import '{file}'"):
+        with gmsh_step("imported.file", f"import '{file}'", STEP_REMEDY):
             _import_shapes(gmsh, path, 1.0)
         for (dimension, name), tags in _named_entities(
             gmsh, path.read_text(errors="replace")

@@ -8,6 +8,7 @@ import argparse
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator
@@ -19,6 +20,8 @@ from ..util.communicator import Communicator
 
 # [s] that a failed rank waits for the others to fail as well
 WAIT_FOR_RANKS_SECONDS = 10.0
+# [s] after which a signal that got lost comes again
+REPEAT_SECONDS = 0.1
 
 
 def communicator() -> Any:
@@ -122,6 +125,17 @@ def _catch_signals() -> Iterator[list[int]]:
         stopped.append(number)
         raise KeyboardInterrupt
 
+    def repeat(unraisable: Any) -> None:
+        """Python drops what is raised while it takes an object down: the signal is sent again, and
+        objects that the interrupt left half made go without a traceback.
+        """
+        if not stopped:
+            usual(unraisable)
+        elif issubclass(unraisable.exc_type, KeyboardInterrupt):
+            threading.Timer(REPEAT_SECONDS, os.kill, (os.getpid(), stopped[0])).start()
+
+    usual = sys.unraisablehook
+    sys.unraisablehook = repeat
     # only a main thread may
     with suppress(ValueError):
         for number in (signal.SIGTERM, signal.SIGINT):
@@ -130,6 +144,7 @@ def _catch_signals() -> Iterator[list[int]]:
     try:
         yield stopped
     finally:
+        sys.unraisablehook = usual
         for number, handler in before.items():
             signal.signal(number, handler)
 

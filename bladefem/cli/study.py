@@ -185,6 +185,8 @@ def _parse_variation(text: str) -> tuple[str, list[str]]:
     name, equals, values = (part.strip() for part in text.partition("="))
     if equals:
         field_at(name)
+    if name == "title":
+        raise InputError("--vary title: changes no result, expected a field that does")
     if not equals or not split_values(values):
         raise InputError(
             f"--vary {text}: expected key=values, such as damper.angle='30, 40, 50 deg'"

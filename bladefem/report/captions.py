@@ -20,7 +20,7 @@ CAPTIONS = {
     "On the screen: choose a mode, drag to rotate, move the phase through one period.",
     "modes/excited_modes": "Modes in the excited nodal diameter, named after those of the clamped "
     "blade.",
-    "modes/frequencies": "Natural frequencies of all nodal diameters, without damper.",
+    "modes/frequencies": "Natural frequencies of the nodal diameters asked for, without damper.",
     "modes/effective_masses": "Effective masses: the share of the moving mass that follows a "
     "motion of the root along each axis.",
     "modes/wave": "The excited mode as a wave that turns round the wheel.",

@@ -105,6 +105,8 @@ def _parse_float(value: object, field: Field) -> float:
 
 
 def _parse_int(value: object, field: Field) -> int:
+    if isinstance(value, str) and not any(letter.isdigit() for letter in value):
+        raise InputError(f"{field.name} = {shortened(repr(value))}: expected a whole number")
     number = parse(value, "1", field.name)
     if number != int(number):
         raise InputError(f"{field.name} = {value}: expected a whole number")
@@ -201,13 +203,14 @@ def _in_range(
     if _within_range(number, low, high):
         return number
     if low is not None and high is not None:
-        limit = f"{show(low, unit)} to {show(high, unit)}"
+        between = "or" if isinstance(number, int) and high == low + 1 else "to"
+        limit = f"{show(low, unit)} {between} {show(high, unit)}"
     else:
         bounds = {"at least": low, "at most": high}
         limit = " ".join(f"{word} {show(n, unit)}" for word, n in bounds.items() if n is not None)
-    raise InputError(
-        f"{field.name} = {show(number, unit)}: expected {limit}{_forgotten_unit(written, field)}"
-    )
+    # -300 degC would be shown as -26.85 K, which nobody wrote
+    shown = written if unit == "K" and isinstance(written, str) else show(number, unit)
+    raise InputError(f"{field.name} = {shown}: expected {limit}{_forgotten_unit(written, field)}")
 
 
 def _within_range(

@@ -19,6 +19,11 @@ from .tables import Scene
 from .units import shortened, show, show_exactly
 from .validate import validate
 
+# the scene inside the folder of a run
+FOLDER_SCENE = "scene.toml"
+# what is mistaken for a scene: files that 'bladefem look' reads
+MESH_SUFFIXES = (".step", ".stp", ".inp", ".cdb", ".bdf", ".nas", ".msh", ".med", ".unv", ".vtu")
+
 
 class Row(NamedTuple):
     """One line of the resolved table."""
@@ -55,10 +60,20 @@ def load_scene(path: str | Path, overrides: Iterable[str] = ()) -> Scene:
 def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, Any]:
     """The nested tables of a scene file as written, with the overrides put in."""
     path = Path(path)
+    if path.suffix.lower() in MESH_SUFFIXES:
+        raise InputError(
+            f"{path}: expected a scene file (TOML), not a mesh or a drawing; 'bladefem look {path} "
+            "--scene' writes one for it"
+        )
     try:
         # editors on Windows put a byte order mark before the text
         tables = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
+        if path.name == FOLDER_SCENE and path.parent.is_dir():
+            raise InputError(
+                f"{path.parent}: a folder without {FOLDER_SCENE}, expected a scene file or the "
+                f"folder of an earlier run{_nearby_scenes(path)}"
+            ) from None
         raise InputError(f"{path}: there is no such scene file{_nearby_scenes(path)}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
@@ -72,7 +87,7 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
         _put_value(tables, name, value)
     if "kind" not in tables:
         raise InputError(
-            f"{path}: not a scene without its kind, expected kind = one of "
+            f"{path}: kind is missing, expected kind = one of "
             f"{', '.join(repr(kind) for kind in KINDS)}"
         )
     return tables

@@ -195,10 +195,7 @@ def _split_number(
         raise InputError(f"{name} = {shortened(value)}: expected a number{_in_unit(unit)}")
     match = _NUMBER.fullmatch(value)
     if not match:
-        raise InputError(
-            f"{name} = {shortened(repr(value))}: expected a number with a unit such as "
-            f"{_unit_examples(unit)}"
-        )
+        raise InputError(f"{name} = {shortened(repr(value))}: expected {_expected(unit)}")
     return float(match[1]), match[2] or ""
 
 
@@ -250,6 +247,11 @@ def _scale_unit(value: float, unit: str) -> tuple[float, str]:
 
 def _in_unit(unit: str) -> str:
     return "" if unit == "1" else f" in {unit}"
+
+
+def _expected(unit: str) -> str:
+    examples = _unit_examples(unit)
+    return examples if unit == "1" else f"a number with a unit such as {examples}"
 
 
 def _unit_examples(unit: str) -> str:

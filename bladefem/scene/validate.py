@@ -213,7 +213,7 @@ def _check_study(scene: Scene) -> Iterator[str]:
 def _check_excitation(scene: Scene) -> Iterator[str]:
     # its length must not vanish in rounding
     if not hypot(*scene.excitation.direction) > SHORTEST_DIRECTION:
-        yield "excitation.direction = 0, 0, 0: expected a direction"
+        yield "excitation.direction = 0, 0, 0: expected a direction, not all zero, such as 0, 1, 0"
     modes = scene.model.modes
     mode = scene.excitation.mode
     if modes is not None and mode > modes:

@@ -180,7 +180,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"pattern file {path}: not found")
+        raise InputError(f"mistuning.pattern = '{path}': there is no such file")
     text = path.read_text(encoding="utf-8").splitlines()
     rows = [line.split("#")[0].strip() for line in text]
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]

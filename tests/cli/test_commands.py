@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -306,6 +307,7 @@ def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
         "aerofoil.twist=10, 20",
         "mesh.size=",
         "kind=wedge sector, punch",
+        "title=one, two",
     ],
 )
 def test_study_checks_all_values_before_the_first_run(vary, pipeline, tmp_path, capsys):
@@ -538,8 +540,42 @@ def test_a_signal_that_a_library_turns_into_an_error_is_still_an_interrupt(
     assert signal.getsignal(signal.SIGTERM) is before
 
 
+class SignalledAtItsEnd:
+    """The signal arrives while Python takes the object down, where exceptions are dropped."""
+
+    def __del__(self):
+        signal.raise_signal(signal.SIGTERM)
+
+
+def test_a_signal_that_a_destructor_swallows_comes_again(pipeline, tmp_path, capsys):
+    def behaviour(_):
+        SignalledAtItsEnd()
+        time.sleep(5)
+
+    pipeline.state.behaviour, before = behaviour, sys.unraisablehook
+    assert main(["response", WEDGE, "-o", str(tmp_path)]) == 143
+    assert capsys.readouterr().err.startswith("bladefem: ended by SIGTERM")
+    assert sys.unraisablehook is before
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ("", "a folder without scene.toml, expected a scene file or the folder of an earlier run"),
+        ("sector.step", "expected a scene file (TOML), not a mesh or a drawing; 'bladefem look"),
+        ("kindless.toml", "kind is missing, expected kind = one of 'wedge sector'"),
+    ],
+)
+def test_what_is_no_scene_is_named(given, message, tmp_path, capsys):
+    (tmp_path / "kindless.toml").write_text("title = 'no kind'\n")
+    assert main(["check", str(tmp_path / given)]) == 2
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1
+
+
 ONE_RANK_FAILS = """
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 import bladefem.cli.ranks as ranks

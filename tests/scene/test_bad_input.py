@@ -31,7 +31,10 @@ REFUSED = [
     ("aerofoil.span=inf", "finite"),
     ("contact.mu=-0.1", "expected 0 to 2"),
     ("excitation.engine_order=6.5", "excitation.engine_order = 6.5: expected a whole number"),
-    ("excitation.engine_order=six", "expected a number"),
+    ("excitation.engine_order=six", "engine_order = 'six': expected a whole number"),
+    ("contact.mu=little", "contact.mu = 'little': expected a plain number or %"),
+    ("mesh.order=3", "mesh.order = 3: expected 1 or 2"),
+    ("temperature.uniform=-300 degC", "temperature.uniform = -300 degC: expected 0 K to 5000 K"),
     ("disc.sectors=36 mm", "expected a plain number"),
     ("operation.stiffening=maybe", "expected true or false"),
     ("operation.coriolis=maybe", "operation.coriolis = maybe: expected true, false or auto"),
@@ -67,7 +70,7 @@ REFUSED = [
     ("aerofoil.chord_root=90 mm", "platform.length"),
     ("model.nodal_diameters=0, 19", "expected 0 to 18, half the number of sectors"),
     ("study.band=200, 100 Hz", "lower frequency first"),
-    ("excitation.direction=0, 0, 0", "expected a direction"),
+    ("excitation.direction=0, 0, 0", "expected a direction, not all zero, such as 0, 1, 0"),
     ("plane.length=100 mm", "[plane]: a scene of kind 'wedge sector' does not use this table"),
 ]
 

@@ -35,7 +35,7 @@ def conditions(scene: Scene) -> Iterator[str]:
         )
     yield from _seat_conditions(scene)
     if not any(scene.imported.axis):
-        yield "imported.axis = 0, 0, 0: expected a direction"
+        yield "imported.axis = 0, 0, 0: expected a direction, not all zero, such as 0, 0, 1"
     if scene.imported.sectors in (1, 2):
         yield (
             f"imported.sectors = {scene.imported.sectors}: expected 0 for a single body, or at "
