@@ -6,6 +6,8 @@ Everything here is a guess to be looked at: nothing of it decides a run.
 
 from __future__ import annotations
 
+import json
+import os
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
@@ -165,8 +167,13 @@ def is_drawing(file: Path) -> bool:
     return file.suffix.lower() in (".step", ".stp")
 
 
-def starting_scene(look: Look) -> str:
-    """Text of a scene that holds what was guessed, with the rest as comments."""
+def starting_scene(look: Look, folder: Path | None = None) -> str:
+    """Text of a scene that holds what was guessed, with the rest as comments.
+
+    Args:
+        folder: where the scene will be; file names in it start there. That of the file when None.
+    """
+    file = os.path.relpath(look.file, folder or look.file.parent)
     names = [f"{new} = {old}" for new, old in look.alike.items()]
     taken = _names_of(look.raw) | set(look.alike)
     if look.cut is not None:
@@ -179,11 +186,11 @@ def starting_scene(look: Look) -> str:
     drawing = is_drawing(look.file)
     origin = "guessed from cut faces" if look.cut else "no cut faces were found"
     lines = [
-        f'title = "{look.file.stem}"',
+        f"title = {_quoted(look.file.stem)}",
         'kind = "imported"',
         "",
         "[imported]",
-        f'file = "{look.file.name}"',
+        f"file = {_quoted(file)}",
         *([] if drawing else [f"scale = {look.scale:g}".ljust(32) + "# guessed: to metres"]),
         f"sectors = {look.cut.sectors if look.cut else 0}".ljust(32) + f"# {origin}",
         f"axis = {[float(v) for v in axis]}".ljust(32) + "# of the engine",
@@ -196,6 +203,11 @@ def starting_scene(look: Look) -> str:
         lines.append('linear = "promote"'.ljust(32) + "# first-order cells get mid-side nodes")
     missing = ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing)]
     return "\n".join([*lines, *(missing if look.missing else []), ""])
+
+
+def _quoted(text: str) -> str:
+    """A basic string of TOML, which has the escapes of JSON."""
+    return json.dumps(text, ensure_ascii=False)
 
 
 def _cell_counts(raw: RawMesh) -> dict[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable
 from functools import partial
@@ -53,6 +54,24 @@ def refuse_picture(file: str) -> None:
         raise InputError(
             f"--view {file}: expected a file name that ends with {' or '.join(PICTURES)}"
         )
+    make_folder_of(file, "--view")
+
+
+def make_folder_of(file: str | Path, option: str) -> None:
+    """The folder of a file that is written after the work is there and takes files before it.
+
+    Raises:
+        InputError: it cannot be made, or not be written.
+    """
+    folder = Path(file).parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{option} {file}: folder {folder} cannot be made ({error.strerror})"
+        ) from None
+    if not os.access(folder, os.W_OK):
+        raise InputError(f"{option} {file}: folder {folder} cannot be written")
 
 
 def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:

@@ -12,7 +12,7 @@ from geometry.look import is_drawing
 
 from ..errors import InputError
 from ..util.communicator import Communicator
-from .commands import refuse_picture
+from .commands import make_folder_of, refuse_picture
 from .tables import plain_table
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
         target = Path(options.scene or Path(options.file).with_suffix(".toml"))
         if target.exists():
             raise InputError(f"--scene {target}: the file is there already, expected another name")
+        make_folder_of(target, "--scene")
     if options.view:
         refuse_picture(options.view)
     found = look_at(options.file)
@@ -56,7 +57,7 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
         draw_look(found, options.view)
         print(f"picture: {options.view}")
     if target is not None:
-        target.write_text(starting_scene(found), encoding="utf-8")
+        target.write_text(starting_scene(found, target.parent), encoding="utf-8")
         print(f"scene: {target}")
 
 

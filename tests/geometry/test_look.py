@@ -11,6 +11,7 @@ from structured import box
 import bladefem
 from bladefem.cli.main import main
 from bladefem.errors import InputError
+from bladefem.scene.toml import load_scene
 from geometry.imported import read_mesh
 from geometry.look import look_at, starting_scene
 from geometry.numbered_faces import face_corners, numbered_faces
@@ -112,6 +113,27 @@ def test_command(deck, capsys):
     assert tomllib.loads(deck.with_suffix(".toml").read_text())["kind"] == "imported"
     assert main(["look", str(deck), "--scene"]) == 2
     assert "is there already" in capsys.readouterr().err
+
+
+def test_a_scene_in_another_folder_finds_the_file(deck, tmp_path):
+    scene = tmp_path / "scenes" / 'of "blade".toml'
+    assert main(["look", str(deck), "--scene", str(scene)]) == 0
+    assert Path(load_scene(scene).imported.file).samefile(deck)
+
+
+def test_a_name_with_quotes_comes_back(deck, tmp_path):
+    quoted = tmp_path / 'blade "A".inp'
+    quoted.write_bytes(deck.read_bytes())
+    table = tomllib.loads(starting_scene(look_at(quoted)))
+    assert table["title"] == 'blade "A"' and table["imported"]["file"] == 'blade "A".inp'
+
+
+@pytest.mark.parametrize("option", ["--view", "--scene"])
+def test_a_target_that_cannot_be_written_is_refused_before_the_work(option, deck, capsys):
+    target = deck / "no folder" / "a.png"
+    assert main(["look", str(deck), option, str(target)]) == 2
+    said = capsys.readouterr()
+    assert "cannot be made" in said.err and said.err.count("\n") == 1 and not said.out
 
 
 def test_a_file_without_solids(tmp_path):
