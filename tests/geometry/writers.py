@@ -62,6 +62,31 @@ def write_cdb(mesh, file):
     file.write_text("\n".join([*lines, "FINISH"]) + "\n")
 
 
+def write_bdf(mesh, file):
+    """Nastran bulk data as a preprocessor exports it: case control first, nodes in long fields,
+    CTETRA and, for the faces, CTRIA6 shells over two lines; names in comments only.
+
+    Returns the property of each body and face.
+    """
+    lines = ["$ exported", "SOL 103", "CEND", "METHOD = 1", "BEGIN BULK", "EIGRL,1,,,10"]
+    for i, (x, y, z) in enumerate(mesh.points, 1):
+        lines.append(f"GRID*   {i:16d}{'':16s}{x:16.9E}{y:16.9E}*")
+        lines.append(f"*       {z:16.9E}")
+    groups = [("CTETRA", "PSOLID", n, c[:, TO_ABAQUS["tetra10"]]) for n, c in mesh.bodies.items()]
+    groups += [("CTRIA6", "PSHELL", name, facets) for name, facets in mesh.faces.items()]
+    number, properties = 0, {}
+    for pid, (card, kind, name, cells) in enumerate(groups, 1):
+        properties[name] = pid
+        lines += [f"$ {name}", f"{kind:8s}{pid:8d}{1:8d}"]
+        for cell in (cells + 1).tolist():
+            number += 1
+            words = [f"{v:8d}" for v in (number, pid, *cell)]
+            lines.append(f"{card:8s}" + "".join(words[:8]) + "+" * (len(words) > 8))
+            lines += ["+       " + "".join(words[8:])] * (len(words) > 8)
+    file.write_text("\n".join([*lines, "MAT1    1       2.1+11          0.3", "ENDDATA"]) + "\n")
+    return properties
+
+
 def write_step(file, kind, names):
     """STEP file in millimetres of a "block" or a "disc" segment; names[solid] lists that solid's
     faces, in order.
