@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from models import rebounding
@@ -11,6 +13,7 @@ from bladefem.hbm.sweep import size
 from bladefem.hbm.time_model import time_system
 from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline.kept_band import kept_band
+from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import in_one_body
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
 
@@ -80,3 +83,14 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
     assert module._affordable(None)
     monkeypatch.setattr(module, "march_operations", lambda model, periods: 3.5e11)
     assert not module._affordable(None)
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "reason", "share"),
+    [(0.9, 1.04, "", 0.04), (0.8, 0.95, "", 0.0), (np.nan, np.nan, "too long", 0.0)],
+)
+def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
+    band = module.KeptBand(380.0, lowest, highest, 200, reason)
+    curve = SimpleNamespace(kept=band, peak_amplitude=1.0)
+    assert Curve.kept_above.fget(curve) == pytest.approx(share)
+    assert Curve.kept_above.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0

@@ -117,15 +117,24 @@ class Curve:
     @property
     def error(self) -> float | None:
         """Estimated relative error of the resonance amplitude: that of the balance, what half as
-        many contact points change (the contact mesh), the body's mesh, and the tangent of a layer
-        that stiffens; None where it was not asked for.
+        many contact points change (the contact mesh), the body's mesh, the tangent of a layer that
+        stiffens, and what the blade was marched to above it; None where it was not asked for.
         """
         if self.settings.error is None:
             return None
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
         layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
-        return self.settings.error + contact_mesh + body_mesh + layer_law
+        return self.settings.error + contact_mesh + body_mesh + layer_law + self.kept_above
+
+    @property
+    def kept_above(self) -> float:
+        """How far the blade was marched to above the resonance given, where the highest motion is
+        unstable; relative to that resonance.
+        """
+        if self.kept is None or self.kept.reason:
+            return 0.0
+        return max(0.0, self.kept.highest / self.peak_amplitude - 1)
 
     @property
     def keeps_unstable(self) -> bool:
@@ -240,7 +249,8 @@ def curve_of(
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
-    unseen = _unseen_errors(scene, case, models, softer, curve.settings, top)
+    # at a maximum: from a point beside it other models find the maximum
+    unseen = _unseen_errors(scene, case, models, softer, curve.settings, peak_of(curve.points))
     interval = None
     if scene.study.interval:
         interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
