@@ -41,8 +41,9 @@ Share of the count, bladefem alone on a busy machine:
      49 632  0 to 12             9.6         0.93  0.08
     148 482  5                  19.5         1.68  0.21
 
-With vectors given back before the last solves, and no second copy of the space of guesses, these
-take 0.54 GB (nodal diameter 5) and 0.87 GB (0 to 12), not yet compared with ccx in one run.
+With vectors given back before the last solves, no second copy of the space of guesses, and without
+the factors of cut faces that nobody needs again, these take 0.54 GB (nodal diameter 5) and 0.79 GB
+(0 to 12; 9.0 s on a busy machine), not yet compared with ccx in one run.
 
     python benchmarks/fem_ccx.py 45000 151000      both sides in one run, some 12 minutes
 """

@@ -1,6 +1,6 @@
 """A million degrees of freedom: ten modes of one complex nodal diameter of a sector, on one rank.
 
-    python benchmarks/million.py [dofs] [core|disk]
+    python benchmarks/million.py [dofs or a pickled mesh] [core|disk]
 
 The way (factors in memory, or on disk in MUMPS_OOC_TMPDIR) is chosen by the memory model when left
 out. Where gmsh's first algorithm fails, the mesh takes twice as long and is finer by a tenth than
@@ -26,6 +26,7 @@ from fem_ccx import SECTORS, measured
 
 from bladefem.scene.tables import Scene
 from geometry.isolated_process import build_isolated
+from geometry.mesh import Mesh
 
 # element size [m] and degrees of freedom of a sector, and how these grow
 KNOWN_SIZE, KNOWN_DOFS, GROWTH = 1.23e-3, 701e3, 2.95
@@ -51,17 +52,25 @@ print(json.dumps({
 """
 
 
+def sector_mesh(dofs: float) -> Mesh:
+    """The default sector with about this many degrees of freedom."""
+    size = KNOWN_SIZE * (KNOWN_DOFS / dofs) ** (1 / GROWTH)
+    scene = Scene()
+    scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))
+    return build_isolated(replace(scene, mesh=replace(scene.mesh, size=size)))
+
+
 def main() -> None:
     """Mesh and solve, one line each."""
     from bladefem.fem.memory import modal_solve_memory
 
-    wanted = float(sys.argv[1]) if len(sys.argv) > 1 else 1e6
+    wanted = sys.argv[1] if len(sys.argv) > 1 else "1e6"
     way = sys.argv[2] if len(sys.argv) > 2 else "auto"
-    size = KNOWN_SIZE * (KNOWN_DOFS / wanted) ** (1 / GROWTH)
-    scene = Scene()
-    scene = replace(scene, disc=replace(scene.disc, sectors=SECTORS))
     clock = time.perf_counter()
-    mesh = build_isolated(replace(scene, mesh=replace(scene.mesh, size=size)))
+    if Path(wanted).is_file():
+        mesh = pickle.loads(Path(wanted).read_bytes())
+    else:
+        mesh = sector_mesh(float(wanted))
     dofs = 3 * len(np.unique(mesh.bodies["blade"]))
     print(f"{dofs} degrees of freedom, mesh in {time.perf_counter() - clock:.0f} s", flush=True)
     with tempfile.TemporaryDirectory() as name:

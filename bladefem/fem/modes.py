@@ -9,6 +9,7 @@ has; so the inertia of K - s M counts the eigenvalues, and what was missed is fo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 
@@ -235,7 +236,15 @@ def elastic_pairs(
 
 
 def _rotation_probe(con: Constrained, width: int) -> np.ndarray:
-    return np.random.default_rng(20).standard_normal((con.T.shape[0], width))
+    return _random_vectors(con.T.shape[0], width)
+
+
+@lru_cache(maxsize=1)
+def _random_vectors(rows: int, width: int) -> np.ndarray:
+    """The same for all nodal diameters, one after the other; not to be written to."""
+    found = np.random.default_rng(20).standard_normal((rows, width))
+    found.flags.writeable = False
+    return found
 
 
 def canonical(
