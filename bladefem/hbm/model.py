@@ -278,6 +278,20 @@ def in_series(side: PortModel, compliance: np.ndarray) -> PortModel:
     return replace(side, residual=residual)
 
 
+def softened_layer(model: ReducedModel) -> ReducedModel:
+    """The model whose layer is as soft as its elements: nothing of it is left to the bodies."""
+    series = model.series
+    if series is None:
+        return model
+
+    def make() -> ReducedModel:
+        return replace(
+            model, sides=tuple(in_series(side, -series) for side in model.sides), series=None
+        )
+
+    return model.once("softened layer", make)
+
+
 def _has_loss(damping: np.ndarray) -> bool:
     """Some motion loses work: Coriolis forces alone, skew-Hermitian, take none."""
     if damping.ndim == 1:

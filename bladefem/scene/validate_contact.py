@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import atan
 
 from .kinds import kind_named
-from .tables import Scene, Seat
+from .tables import Contact, Scene, Seat
 from .units import show
 
 SEAT_SHAPE_FIELDS = ("crown", "crown_across", "edge_radius", "edge_width")
@@ -103,22 +103,36 @@ def _check_history(scene: Scene) -> Iterator[str]:
         yield f"{name}: operation.speed = 0 rpm presses nothing, expected a positive speed"
     if contact.stiffness == "map":
         yield f"{name}: expected contact.stiffness = 'given', friction acts on a layer known before"
-    both = [contact.mu if seat.mu is None else seat.mu for seat in (contact.left, contact.right)]
-    mu = min(both)
-    if not max(both) > 0:
+    if not max(friction_of_seats(contact)) > 0:
         yield f"{name}: contact.mu = 0 leaves no friction, expected 'frictionless'"
+    locked = self_locking(scene)
+    if locked:
+        yield f"{locked}, so that {name} does not tell its load; expected a larger angle"
+
+
+def friction_of_seats(contact: Contact) -> tuple[float, float]:
+    """Friction coefficients of the left and of the right seat."""
+    left, right = (
+        contact.mu if seat.mu is None else seat.mu for seat in (contact.left, contact.right)
+    )
+    return left, right
+
+
+def self_locking(scene: Scene) -> str:
+    """What says that friction alone holds the damper between its seats; empty where it does not."""
     flank_angles = kind_named(scene.kind).flank_angles
     if flank_angles is None:
-        return
+        return ""
+    both = friction_of_seats(scene.contact)
     # both reactions may lie on one line, within the friction cone of either seat
     angle = sum(flank_angles(scene)) / 2
     limit = (atan(both[0]) + atan(both[1])) / 2
-    if angle <= limit:
-        yield (
-            f"damper.angle = {show(angle, 'rad')}: with contact.mu = {mu:g} friction "
-            f"alone holds the damper between its seats (self-locking up to {show(limit, 'rad')})"
-            f", so that {name} does not tell its load; expected a larger angle"
-        )
+    if angle > limit:
+        return ""
+    return (
+        f"damper.angle = {show(angle, 'rad')}: with contact.mu = {min(both):g} friction alone "
+        f"holds the damper between its seats (self-locking up to {show(limit, 'rad')})"
+    )
 
 
 def _check_interval(scene: Scene) -> Iterator[str]:

@@ -8,6 +8,7 @@ from .kinds import kind_named
 from .part_materials import part_materials
 from .tables import Material, Scene
 from .units import show
+from .validate_contact import self_locking
 
 # Young's modulus [Pa]: plastics to diamond
 MODULUS_RANGE = (1e9, 1e12)
@@ -22,6 +23,8 @@ def implausible_values(scene: Scene) -> list[str]:
     said = [*_doubtful_materials(scene), *_doubtful_mesh(scene)]
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
+    if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
+        said.append(f"{locked}, which a seating without friction does not know")
     return said
 
 

@@ -41,6 +41,11 @@ def test_shipped_scenes_raise_none(file):
             "mesh.size = 8 mm: larger than the thinnest part, the aerofoil halfway up with 5.18 mm",
         ),
         ("mesh.size=1 m", "mesh.size = 1 m: larger than"),
+        (
+            "damper.angle=16 deg",
+            "friction alone holds the damper between its seats (self-locking up to 16.6992 deg), "
+            "which a seating without friction does not know",
+        ),
     ],
 )
 def test_of_the_wedge(override, sentence):

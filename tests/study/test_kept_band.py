@@ -94,3 +94,27 @@ def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, 
     curve = SimpleNamespace(kept=band, peak_amplitude=1.0)
     assert Curve.kept_above.fget(curve) == pytest.approx(share)
     assert Curve.kept_above.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0
+
+
+def marches_that_grow(point, instants_that_hold):
+    """A march whose motion grows fivefold unless it has so many instants."""
+
+    def march(model, point, disturbance, periods, instants):
+        growth = 1.0 if instants >= instants_that_hold else 5.0
+        wave = growth * size(point) * np.cos(2 * np.pi * np.arange(instants) / instants)
+        return SimpleNamespace(motion=np.tile(wave, (periods, 1, 1)), settled=True)
+
+    return march
+
+
+@pytest.mark.parametrize(("holds", "ratio"), [(256, 1.0), (512, 1.0), (1024, 5.0)])
+def test_growth_where_contacts_lift_off_is_marched_with_more_instants(monkeypatch, holds, ratio):
+    """Impacts in steps that are too long gain energy: they are no motion of the blade."""
+    model = rebounding(10.0, 0.1, 0.04)
+    point = solve(model, 3.0, 15, 1024)
+    assert point.states["lift"] > 0
+    monkeypatch.setattr(module, "march_operations", lambda *_: 1.0)
+    monkeypatch.setattr(module, "march_ring", marches_that_grow(point, holds))
+    found = module._band_by_steps(model, point)
+    assert found.highest == pytest.approx(ratio * size(point))
+    assert found.periods == (200 if holds == 256 else 100)

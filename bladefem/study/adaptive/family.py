@@ -16,7 +16,7 @@ import numpy as np
 
 from ...data import Elements, PortModel, RigidBody
 from ...friction.law_table import merged_laws
-from ...hbm.model import ReducedModel
+from ...hbm.model import ReducedModel, softened_layer
 from ...reduction.assemble import recombine_contact
 from ...reduction.truncate import truncate_modes
 from .settings import Settings
@@ -53,7 +53,11 @@ def family_member(family: Family, settings: Settings) -> Member:
     """The model of some settings; what does not change the model (samples, errors) is not looked
     at.
     """
-    return family.build(replace(settings, error=None, chosen=(), samples=0))
+    plain = replace(settings, error=None, chosen=(), samples=0, softened=False)
+    member = family.build(plain)
+    if not settings.softened:
+        return member
+    return replace(member, model=softened_layer(member.model))
 
 
 def lowest_harmonics(family: Family, settings: Settings) -> int:

@@ -37,6 +37,7 @@ from .resonance_choice import (
     settings_of_lift_off,
 )
 from .settings import Settings, enriched_settings
+from .stiff_layer import softened_where_lifting, with_harmonics_of_stiff_layer
 
 # of the accuracy: to which a sweep closes in its maxima
 MAXIMUM_SHARE = 0.1
@@ -68,11 +69,11 @@ def resonance_curve(
     """
     settings = with_excited_harmonics(family, replace(settings, error=None))
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
-    if lifts_off_widely(settings, peak_of(points)):
-        settings = settings_of_lift_off(settings)
+    suited = _suited_to_lift_off(family, settings, peak_of(points))
+    if suited != settings:
+        settings = suited
         points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
-    top = peak_of(points)
-    used = settings
+    used, top = with_harmonics_of_stiff_layer(family, settings, peak_of(points), accuracy)
     swept = settings, 1.0
     notes: list[str] = []
     for number in range(MAX_SWEEPS):
@@ -96,6 +97,12 @@ def resonance_curve(
             break
         used = missed or used
     return Checked(used, points, found, tuple(notes))
+
+
+def _suited_to_lift_off(family: Family, settings: Settings, top: Solution) -> Settings:
+    """Settings for contacts that lift off at the resonance, where they do."""
+    softer = softened_where_lifting(family, settings, top)
+    return settings_of_lift_off(softer) if lifts_off_widely(settings, top) else softer
 
 
 def _swept(

@@ -43,6 +43,8 @@ class Settings:
     error: float | None = None
     # names that are chosen here and not by the user
     chosen: tuple[str, ...] = ()
+    # a stiff layer is taken as soft as its friction elements, see adaptive.stiff_layer
+    softened: bool = False
 
     @property
     def method(self) -> str:
@@ -84,9 +86,10 @@ class Settings:
                 else f"all {nodes} contact points of each seat"
             )
         harmonics = "1 harmonic" if self.harmonics == 1 else f"{self.harmonics} harmonics"
+        layer = ", a softer layer in place of the stiff one" if self.softened else ""
         return (
             f"model: {self.modes} modes, {harmonics}, {self.samples} samples, "
-            f"{points}, {self.damper} damper ({error}; {kind})"
+            f"{points}, {self.damper} damper{layer} ({error}; {kind})"
         )
 
 
@@ -172,7 +175,12 @@ def restarted_settings(settings: Settings) -> Settings:
     """
     names = [name for name in ("harmonics", "samples", "points") if name in settings.chosen]
     return _enough_samples(
-        replace(settings, **{name: FIRST_SETTINGS[name] for name in names}, error=None)
+        replace(
+            settings,
+            **{name: FIRST_SETTINGS[name] for name in names},
+            error=None,
+            softened=False,
+        )
     )
 
 

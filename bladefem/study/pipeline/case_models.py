@@ -13,7 +13,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...data import Patch, PortModel
-from ...hbm.model import ReducedModel
+from ...hbm.model import ReducedModel, softened_layer
 from ...reduction.assemble import wheel_models
 from ...reduction.other_diameters import has_rigid_motion, spanned_models
 from ...reduction.truncate import truncate_modes
@@ -25,6 +25,7 @@ from ..adaptive.choice import covered_band
 from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
 from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak, peak_from
 from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
+from ..adaptive.stiff_layer import softened_where_lifting
 from .assemble_model import LoadCase, joint_model
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
 from .changed_cases import seated_case
@@ -113,7 +114,8 @@ def family_of_case(
         )
         H, damper = settings.harmonics, settings.damper
         model = joint_model(scene, mesh, reduced, patches, case, H, damper, sides)
-        return coarsened_elements(model, family_member(family, settings).groups)
+        joined = coarsened_elements(model, family_member(family, settings).groups)
+        return softened_layer(joined) if settings.softened else joined
 
     family = Family(
         shared,
@@ -201,6 +203,7 @@ def reduced_sector(
         mode = scene.excitation.mode
         with naming_the_load(case, model, mode, scene.excitation.force):
             rough = covered_band(model, settings, scene.study.band, mode, 1.0)
+            settings = softened_where_lifting(family, settings, peak_of(rough))
             peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
         enough = choose_at_peak(family, settings, peak, scene.accuracy, fixed=("modes",))
         settings, _, found = cheaper_settings(family, *enough, scene.accuracy)

@@ -27,6 +27,7 @@ from ..adaptive.family import Family, family_member
 from ..adaptive.layer_change import layer_change
 from ..adaptive.resonance_curve import resonance_curve, too_large_to_follow
 from ..adaptive.settings import Settings, restarted_settings
+from ..adaptive.stiff_layer import stiff_layer_change
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
 from .kept_band import KeptBand, kept_of_family
@@ -166,7 +167,7 @@ class UnseenErrors:
     halved: float = np.nan
     # by the estimated error of the body's mesh
     body_mesh: float = np.nan
-    # with the layer's law in place of its tangent
+    # with the layer's law in place of its tangent, or a stiff layer in place of a softer one
     layer_law: float = np.nan
 
 
@@ -296,7 +297,9 @@ def _unseen_errors(
     return UnseenErrors(
         np.nan if scene.contact.points else halved_change(models, settings, top),
         np.nan if softer is None else softened_change(softer, case, settings, top),
-        layer_change(models, settings, top, case.decay),
+        stiff_layer_change(models, settings, top, scene.accuracy)
+        if settings.softened
+        else layer_change(models, settings, top, case.decay),
     )
 
 

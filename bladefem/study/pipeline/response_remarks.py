@@ -33,8 +33,9 @@ LARGEST_PARTS = {
         "(mesh.seat_elements, mesh.contact_size)"
     ),
     "layer_law": (
-        "what the tangent of a layer that stiffens leaves out, expected a linear one "
-        "(contact.kn_area) to compare with"
+        "what the tangent of a layer that stiffens leaves out, or the softer layer that stands for "
+        "a stiff one where contacts lift off, expected a linear, softer one (contact.kn_area) to "
+        "compare with"
     ),
 }
 

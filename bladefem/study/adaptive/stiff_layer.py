@@ -1,0 +1,197 @@
+"""Stiff layers where most contacts lift off: the balance takes a softer one, and the resonance is
+followed from there to that of the layer itself; what it changes counts in the reported error.
+
+A split layer leaves a negative compliance to the bodies (``contact.numerical_stiffness``). Where
+contacts lift off, Newton's method seldom gets from few harmonics to more with it: on the shipped
+wedge with 1e5 N/mm^3 under 80 and 320 N it took 67 and 261 s, without that compliance 15 and 12 s.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import NotSolvedError
+from ...hbm.model import ReducedModel, in_series
+from ...hbm.peak import Peak, find_peak
+from ...hbm.solution import Solution
+from .choice import solver_options
+from .family import Family, family_member
+from .resonance_choice import LIFTING_POINTS, peak_from
+from .settings import Settings
+
+# harmonics at most of the models that follow the resonance; they have LIFTING_POINTS contact points
+PATH_HARMONICS = 15
+# elements on the way over those of the balance: 0.2 of the bodies' stiffness. With no stiffer ones
+# the step from 2e4 to 4e4 N/mm^3 takes 28 s on the shipped wedge under 80 N, with these 1 s
+PATH_STIFFNESS_RATIO = 4.0
+# compliances in series, over those of the elements, with which harmonics are added
+SOFTENINGS = (0.0, 1.0, 2.0)
+# of the way, which is linear in the layer's compliance; a search that fails takes 7 s and more, so
+# that it ends there
+PATH_SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)
+# Newton steps of a point on it
+PATH_STEPS = 15
+# relative accuracy of its heights
+PATH_ACCURACY = 0.01
+# of the way: what is left beyond it is extrapolated
+ENOUGH_OF_THE_WAY = 0.5
+
+
+def softened_where_lifting(family: Family, settings: Settings, top: Solution) -> Settings:
+    """The settings with a softer layer where that is split, and at least half of the contacts lift
+    off at the resonance.
+    """
+    split = family_member(family, settings).model.series is not None
+    lifts = 2 * top.states["lift"] >= len(top.w)
+    return replace(settings, softened=True) if split and lifts else settings
+
+
+def with_harmonics_of_stiff_layer(
+    family: Family,
+    settings: Settings,
+    top: Solution,
+    accuracy: float,
+) -> tuple[Settings, Solution]:
+    """Settings with PATH_HARMONICS where a stiff layer is softened, and the resonance with them;
+    the same as before where it was not found, or the harmonics are given.
+
+    Where they are not solved one after the other, they are added with a layer of half the stiffness
+    or less: with rigid faces under 80 N on the shipped wedge neither 7 nor 15 harmonics are solved
+    from the resonance with three.
+
+    Args:
+        top: the highest point of a sweep with these settings.
+    """
+    if not settings.softened or "harmonics" not in settings.chosen:
+        return settings, top
+    ways = (_climbed(family, settings, top, accuracy, softening) for softening in SOFTENINGS)
+    return next((found for found in ways if found is not None), (settings, top))
+
+
+def _climbed(
+    family: Family,
+    settings: Settings,
+    top: Solution,
+    accuracy: float,
+    softening: float,
+) -> tuple[Settings, Solution] | None:
+    """The resonance with more and more harmonics, found with so many times the compliance of the
+    elements in series; None where one of these was not found.
+    """
+    most = min(PATH_HARMONICS, settings.most)
+    steps = [(softening, H) for H in (3, 7) if settings.harmonics <= H < most]
+    wanted = settings
+    for more, H in [*steps, (softening, most), (0.0, most)]:
+        samples = settings.samples and max(settings.samples, 8 * (H + 1))
+        wanted = replace(settings, harmonics=H, samples=samples)
+        model = softer_model(family_member(family, wanted).model, more)
+        peak = _peak_on_the_way(model, wanted, top, accuracy)
+        if peak is None:
+            return None
+        top = peak.solution
+    return wanted, top
+
+
+def softer_model(model: ReducedModel, softening: float) -> ReducedModel:
+    """The model with so many times the compliance of its elements in series with them."""
+    e = model.elements
+    own = np.column_stack([e.kn, *[e.kt] * e.tangents])
+    more = softening * np.divide(1.0, own, out=np.zeros_like(own), where=own > 0)
+    return replace(model, sides=tuple(in_series(side, more) for side in model.sides), series=more)
+
+
+def stiff_layer_change(
+    family: Family,
+    settings: Settings,
+    top: Solution,
+    accuracy: float,
+) -> float:
+    """Relative change of a resonance amplitude from the softer layer to the layer itself; inf where
+    less than half of the way between them was solved.
+
+    Where the way was not solved to its end, the largest change on it is taken to go on in
+    proportion to the layer's compliance.
+
+    Args:
+        settings, top: of the resonance, and its highest point.
+    """
+    few = settings.points
+    points = LIFTING_POINTS if few is None else min(few, LIFTING_POINTS)
+    small = replace(
+        settings, harmonics=min(settings.harmonics, PATH_HARMONICS), points=points, error=None
+    )
+    try:
+        base = peak_from(family, settings, top, small, accuracy, fallbacks=False)
+    except NotSolvedError:
+        return np.inf
+    layer = family_member(family, replace(small, softened=False)).model
+    largest = 0.0
+    solved = 0.0
+    near = base.solution
+    for share in PATH_SHARES:
+        peak = _peak_on_the_way(stiffened_model(layer, share), small, near, accuracy)
+        if peak is None:
+            break
+        change = abs(peak.height / base.height - 1)
+        if share == 1.0:
+            return change
+        near = peak.solution
+        solved = share
+        largest = max(largest, change)
+    return largest / solved if solved >= ENOUGH_OF_THE_WAY else np.inf
+
+
+def _peak_on_the_way(
+    model: ReducedModel,
+    settings: Settings,
+    near: Solution,
+    accuracy: float,
+) -> Peak | None:
+    """The resonance next to one with a somewhat softer layer; None where it is not solved."""
+    options = replace(solver_options(accuracy), fallbacks=False, iterations=PATH_STEPS)
+    try:
+        return find_peak(
+            model,
+            near.omega,
+            settings.harmonics,
+            settings.samples,
+            near=near,
+            tolerance=PATH_ACCURACY,
+            enough=PATH_ACCURACY,
+            options=options,
+        )
+    except NotSolvedError:
+        return None
+
+
+def stiffened_model(split: ReducedModel, share: float) -> ReducedModel:
+    """A split model whose layer is, by a share in its compliance, on the way from the stiffness of
+    its elements (0) to the layer itself (1); with stiffer elements, where the layer is.
+    """
+    if split.series is None:
+        return split
+    e = split.elements
+    own = np.column_stack([e.kn, *[e.kt] * e.tangents])
+    # none where the normal load is prescribed
+    springs = own > 0
+    compliance = np.divide(1.0, own, out=np.zeros_like(own), where=springs)
+    wanted = compliance + share * split.series
+    stiffer = compliance / PATH_STIFFNESS_RATIO
+    elements = np.maximum(wanted, stiffer)
+    left = np.where(springs, wanted - elements, 0.0)
+    stiffness = np.divide(1.0, elements, out=np.zeros_like(own), where=springs)
+    ratio = np.divide(stiffness[:, 0], e.kn, out=np.ones_like(e.kn), where=e.kn > 0)
+    return replace(
+        split,
+        # an open node keeps its gap, a pressed one its force
+        elements=replace(
+            e,
+            kn=stiffness[:, 0],
+            kt=stiffness[:, 1],
+            n0=np.where(e.n0 > 0, e.n0, ratio * e.n0),
+        ),
+        sides=tuple(in_series(side, left - split.series) for side in split.sides),
+        series=left,
+    )

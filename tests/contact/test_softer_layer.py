@@ -1,0 +1,118 @@
+"""A softer layer in place of a stiff one where contacts lift off, and what that changes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_patch import blade_side, patch_model, patch_on_half_space, problem_of
+
+from bladefem.contact.numerical_stiffness import numerical_stiffness
+from bladefem.hbm.model import softened_layer
+from bladefem.hbm.peak import find_peak
+from bladefem.hbm.solution import size
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import Options
+from bladefem.study.adaptive.family import family_member, family_of
+from bladefem.study.adaptive.resonance_curve import resonance_curve
+from bladefem.study.adaptive.settings import Settings
+from bladefem.study.adaptive.stiff_layer import (
+    softened_where_lifting,
+    softer_model,
+    stiff_layer_change,
+    stiffened_model,
+)
+
+# [N]
+FORCE = 30.0
+# stiffness per unit area that stands for rigid faces [N/m^3]
+RIGID = 1e22
+# [rad/s] near the resonance
+OMEGA = 2 * np.pi * 440.0
+SETTINGS = Settings(4, 3, 64, "rigid")
+
+
+@pytest.fixture(scope="module")
+def stiff():
+    return patch_model(RIGID, FORCE)
+
+
+def numerical_areal():
+    """Stiffness per unit area of the elements of a split layer [N/m^3]."""
+    patch, local = patch_on_half_space()
+    return numerical_stiffness(problem_of(patch, blade_side(patch, local)))
+
+
+def height(model, omega=OMEGA):
+    """Amplitude at the probe [m]."""
+    point = solve(model, omega, 3, 64)
+    assert point.converged
+    return size(point)
+
+
+def test_a_softened_layer_is_the_one_of_the_elements(stiff):
+    """Against the model whose layer is given with that stiffness and not split."""
+    areal = numerical_areal()
+    whole = patch_model(areal, FORCE, split=False)
+    softened = softened_layer(stiff)
+    assert softened.series is None
+    assert softened_layer(stiff) is softened
+    assert height(softened) == pytest.approx(height(whole), rel=1e-8)
+
+
+def test_the_way_begins_at_the_softer_layer_and_ends_at_the_layer(stiff):
+    assert height(stiffened_model(stiff, 0.0)) == pytest.approx(
+        height(softened_layer(stiff)), rel=1e-8
+    )
+    # where no contact opens the unknowns of the elements do not matter; few harmonics see the rest
+    weak = patch_model(RIGID, 1.0)
+    assert height(stiffened_model(weak, 1.0)) == pytest.approx(height(weak), rel=1e-6)
+    assert abs(height(softened_layer(weak)) / height(weak) - 1) > 1e-3
+
+
+def test_a_softer_model_has_the_layer_in_series(stiff):
+    """Elements with their own compliance once more: a layer of half the stiffness."""
+    areal = numerical_areal()
+    half = patch_model(areal / 2, 1.0, split=False)
+    softened = softened_layer(patch_model(RIGID, 1.0))
+    assert height(softer_model(softened, 1.0)) == pytest.approx(height(half), rel=1e-6)
+
+
+def test_settings_take_the_softer_layer_where_contacts_lift_off(stiff):
+    family = family_of(stiff, [len(stiff.elements.kt)])
+    lifting = solve(softened_layer(stiff), OMEGA, 3, 64)
+    assert 2 * lifting.states["lift"] >= len(lifting.w)
+    softened = softened_where_lifting(family, SETTINGS, lifting)
+    assert softened.softened
+    assert family_member(family, softened).model.series is None
+    weak = patch_model(RIGID, 1.0)
+    resting = solve(weak, OMEGA, 3, 64)
+    assert softened_where_lifting(family, SETTINGS, resting) == SETTINGS
+    soft = softened_layer(stiff)
+    other = family_of(soft, [len(soft.elements.kt)])
+    assert softened_where_lifting(other, SETTINGS, lifting) == SETTINGS
+
+
+def test_the_change_is_that_of_the_resonances():
+    """Of a layer a fifth stiffer, against the resonances of both, none of them split."""
+    areal = numerical_areal()
+    layer = patch_model(1.2 * areal, FORCE)
+    whole = patch_model(1.2 * areal, FORCE, split=False)
+    family = family_of(layer, [len(layer.elements.kt)])
+    settings = replace(SETTINGS, softened=True, points=16)
+    options = Options(tolerance=1e-6, fallbacks=False)
+    softer = family_member(family, settings).model
+    stiffer = family_member(family_of(whole, [len(whole.elements.kt)]), settings).model
+    soft = find_peak(softer, OMEGA, 3, 64, tolerance=1e-3, options=options)
+    true = find_peak(stiffer, soft.omega, 3, 64, near=soft, tolerance=1e-3, options=options)
+    expected = abs(true.height / soft.height - 1)
+    assert expected > 0.01
+    found = stiff_layer_change(family, settings, soft.solution, 0.05)
+    assert found == pytest.approx(expected, abs=0.01)
+
+
+def test_a_curve_takes_the_softer_layer_by_itself(stiff):
+    family = family_of(stiff, [len(stiff.elements.kt)])
+    curve = resonance_curve(family, replace(SETTINGS, points=4), (440.0, 520.0), 1, 0.2)
+    assert curve.settings.softened
+    assert all(p.converged for p in curve.points)
+    assert "a softer layer in place of the stiff one" in curve.settings.sentence()
