@@ -306,10 +306,7 @@ def choose_at_peak(
             for name, need in errors.needs.items()
             if need <= NEGLIGIBLE_SHARE * accuracy or (far and not np.isfinite(need))
         }
-        # more costs minutes on a layer that is a softer one anyway: an elastic damper with 23
-        # harmonics 30 s on the shipped wedge with rigid faces under 80 N, for the same error
-        settled = settings.softened and settings.harmonics >= MANY_HARMONICS
-        if settled or sum(errors.needs.values()) <= sufficient * accuracy:
+        if _near_enough(settings, errors, sufficient * accuracy):
             break
         hard = far or 2 * peak.solution.states["lift"] >= len(peak.solution.w)
         first = _harmonics_first(errors, accuracy) if hard else ""
@@ -323,6 +320,15 @@ def choose_at_peak(
             break
         settings = better
     return settings, peak, errors
+
+
+def _near_enough(settings: Settings, errors: PeakErrors, limit: float) -> bool:
+    """The errors together keep to a limit, or more harmonics cost minutes on a layer that is a
+    softer one anyway: with an elastic damper 30 s on the shipped wedge with rigid faces under 80 N,
+    for the same error.
+    """
+    settled = settings.softened and settings.harmonics >= MANY_HARMONICS
+    return settled or sum(errors.needs.values()) <= limit
 
 
 def _harmonics_first(errors: PeakErrors, accuracy: float) -> str:

@@ -72,7 +72,6 @@ def family_of_case(
     case: LoadCase,
 ) -> Family:
     """All models of a load case that the reduced sector allows."""
-    nodes = len(case.elements.kt)
     reduced = with_damper_mass(reduced, case.mass)
     most = affordable_harmonics(case)
 
@@ -94,7 +93,7 @@ def family_of_case(
             settings.damper,
         )
         groups = (
-            np.arange(nodes)
+            np.arange(len(case.elements.kt))
             if settings.points is None
             else element_labels(patches, settings.points, scene.contact.points)
         )
