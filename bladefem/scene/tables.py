@@ -347,6 +347,11 @@ class Mistuning:
         4, "1", 2, 1000, "wheels of each load that are solved in full where the damper law is asked"
     )
     families: int = quantity(3, "1", 1, 10, "blade-alone modes that deviate")
+    blades: tuple[str, ...] | None = quantity(
+        None,
+        help="blades of another shape, by number from 1, texts like '7: aerofoil.chord_tip = 41 "
+        "mm; aerofoil.twist = 21 deg', of an imported blade '7: imported.file = other.msh'",
+    )
     orders: tuple[str, ...] | None = quantity(
         None,
         help="further engine orders, multiples of the first, as texts like '18: 0.3 N; 90 deg'",

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, get_type_hints
 from ..errors import InputError, suggestion
 from .fields import Field, convert_value, each_field, field_at, value_at
 from .kinds import KINDS, kind_named
+from .other_blades import whole_entry
 from .tables import Scene
 from .units import shortened, show, show_exactly
 from .validate import validate
@@ -109,6 +110,11 @@ def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
         whole = str((Path(folder) / scene.mistuning.pattern).resolve())
         scene = dataclasses.replace(
             scene, mistuning=dataclasses.replace(scene.mistuning, pattern=whole)
+        )
+    if scene.mistuning.blades:
+        blades = tuple(whole_entry(entry, Path(folder)) for entry in scene.mistuning.blades)
+        scene = dataclasses.replace(
+            scene, mistuning=dataclasses.replace(scene.mistuning, blades=blades)
         )
     if scene.temperature.file:
         whole = str((Path(folder) / scene.temperature.file).resolve())

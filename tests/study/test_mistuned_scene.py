@@ -180,6 +180,29 @@ def test_a_second_run_finds_the_wheel(folder):
     assert not any(text.startswith("whole_wheel: found") for text in drawn.messages)
 
 
+def test_blades_of_another_shape(tmp_path):
+    """Two of one shape, meshed anew, on a wheel that is tuned otherwise."""
+    entry = "aerofoil.chord_tip = 41 mm"
+    overrides = [f"mistuning.blades=3: {entry}, 20: {entry}", "mistuning.pattern=none.csv"]
+    scene = vary(load_scene(MISTUNED, [*COARSE_MISTUNED, *overrides]), mistuning__pattern=None)
+    scene = vary(scene, mistuning__scatter=None)
+    run = with_whole_wheel(pipeline.run(scene, tmp_path))
+    (found,) = run.wheel
+    odd = [2, 19]
+    assert set(found.others.changes) == set(odd)
+    shift = found.deviation[2]
+    assert 0.002 < shift[0] < 0.02
+    np.testing.assert_array_equal(found.deviation[19], shift)
+    assert not found.deviation[np.setdiff1d(np.arange(36), odd)].any()
+    assert found.factor > 1.0
+    # the motion of all finite elements with the deviations' forces is that of the reduced wheel
+    assert found.stress.mismatch < 5e-3
+    said = [text for text in run.messages if text.startswith("blades 3, 20 of another shape")]
+    assert f"{100 * shift[0]:+.3g} %" in said[0]
+    again = with_whole_wheel(pipeline.run(scene, tmp_path))
+    assert any(text.startswith("other_blades: found") for text in again.messages)
+
+
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     """Four wheels, the lowest and the highest also in full; a second call finds them."""
     scene = load_scene(MISTUNED, COARSE_MISTUNED)
@@ -209,6 +232,25 @@ def test_statistics_by_the_damper_law_are_checked_in_full(folder):
         ),
         (["mistuning.orders=half: 0.3 N"], "expected a whole order and a force"),
         (["mistuning.orders=13.5: 0.3 N"], "expected a whole order and a force"),
+        (
+            ["mistuning.blades=37: aerofoil.twist = 21 deg"],
+            "'37: .*': expected a blade from 1 to 36",
+        ),
+        (
+            ["mistuning.blades=3: platform.gap = 2 mm"],
+            r"'platform.gap', expected one of \[aerofoil\]",
+        ),
+        (["mistuning.blades=3 aerofoil.twist"], "expected the number of a blade and fields"),
+        (["mistuning.blades=3: aerofoil.twist = 210 deg"], "'3: .*': aerofoil.twist = 210 deg"),
+        (["mistuning.blades=3: aerofoil.twits = 21 deg"], "'3: .*': .*aerofoil.twist"),
+        (
+            ["mistuning.blades=3: aerofoil.twist = 21 deg, 3: aerofoil.span = 119 mm"],
+            "blade 3 is given twice",
+        ),
+        (
+            ["mistuning.blades=3: aerofoil.twist = 21 deg", "mistuning.level=damper law"],
+            'expected no mistuning.blades or "whole wheel"',
+        ),
     ],
 )
 def test_bad_input_is_refused_before_long_work(overrides, message):

@@ -16,6 +16,7 @@ from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
 from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
+from .other_blades import OtherBlades, other_blade_sentences
 
 # points of the first look at a band
 FIRST_LOOK_POINTS = 15
@@ -52,6 +53,8 @@ class PatternResponse:
     sector_difference: float
     # of the blade that moves most, at its resonance
     stress: DampedStress
+    # blades of another shape
+    others: OtherBlades | None = None
 
     @property
     def factor(self) -> float:
@@ -106,6 +109,7 @@ def pattern_response(
     deviation: np.ndarray,
     curve: Curve,
     stress: Callable[[Pattern, WheelSolution, int], DampedStress],
+    others: OtherBlades | None = None,
 ) -> PatternResponse:
     """The wheel with one pattern, under the load of a curve.
 
@@ -114,8 +118,12 @@ def pattern_response(
         families: (q,) circular frequencies of the blade-alone modes [rad/s].
         deviation: (N, q) relative deviations of these.
         stress: of a blade, by the pattern, the solution and the blade's number.
+        others: blades of another shape, in addition.
     """
     pattern = frequency_pattern(families, deviation)
+    if others is not None:
+        pattern = others.added(pattern, *deviation.shape)
+        deviation = deviation + others.frequencies(*deviation.shape)
     settings = curve.settings
     H = max(settings.harmonics, *wheel.excitation)
     samples = max(settings.samples, 8 * (H + 1))
@@ -144,6 +152,7 @@ def pattern_response(
         float(change) if richer.converged and solution.converged else float("nan"),
         tuned.height / curve.peak_amplitude - 1,
         stress(pattern, solution, peak.blade),
+        others,
     )
 
 
@@ -163,7 +172,11 @@ def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
         )
         if not r.peak.closed_in:
             text += "; the highest point is an end of the band, the resonance may be higher"
+        if r.others is not None and r.peak.blade in r.others.changes:
+            text += "; that blade has another shape, its stress is that of the others' shape"
         sentences.append(text)
+    if found[0].others is not None:
+        sentences.extend(other_blade_sentences(found[0].others))
     far = max(abs(r.sector_difference) for r in found)
     sentences.append(
         "the whole wheel holds mean displacements in the preload state, which moves the tuned "

@@ -11,6 +11,10 @@ import numpy as np
 
 from ...errors import InputError
 from ...io.stage_cache import cached_stage, found_remark, on_root
+from ...scene.fields import value_at
+from ...scene.kinds import kind_named
+from ...scene.other_blades import other_blades
+from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.message import warning
 from ...util.progress import Progress, without_progress
@@ -34,6 +38,7 @@ from ..pipeline.stages import Bodies
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_stress import WheelShapes, all_modes, blade_stress
 from .law_level import law_level, with_checks
+from .other_blades import OtherBlades, changed_blades
 from .pattern_response import (
     SEARCH_TOLERANCE,
     PatternResponse,
@@ -57,14 +62,24 @@ def with_whole_wheel(
     bodies = Bodies(run.scene, run.mesh, comm, progress)
     sector, remarks = _kept_sector(run, [best], bodies, comm)
     deviation = scene_deviations(run.scene, sector.reduced.sectors, len(sector.families))
-    key = stage_key("whole wheel", run.scene, best.load, best.mass, best.peak.omega, deviation)
+    others, other_remarks = _kept_blades(run, comm)
+    key = stage_key(
+        "whole wheel",
+        run.scene,
+        best.load,
+        best.mass,
+        best.peak.omega,
+        deviation,
+        *_blade_keys(run.scene),
+    )
     found, seconds = cached_stage(
         run.folder,
         "whole_wheel",
         key,
-        lambda: on_root(comm, lambda: _best_response(run, sector, deviation, best, bodies)),
+        lambda: on_root(comm, lambda: _best_response(run, sector, deviation, best, bodies, others)),
         comm,
     )
+    remarks.extend(other_remarks)
     if seconds is not None:
         remarks.append(found_remark("whole_wheel", seconds))
     result = replace(
@@ -82,6 +97,7 @@ def _best_response(
     deviation: np.ndarray,
     curve: Curve,
     bodies: Bodies,
+    others: OtherBlades | None,
 ) -> PatternResponse:
     """The response of all blades under the load of a curve, with the stress of the highest one; on
     one rank.
@@ -94,13 +110,13 @@ def _best_response(
     def stress(pattern: Pattern, solution: WheelSolution, blade: int) -> DampedStress:
         alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
         alone.kept.update(bodies.kept)
-        _, readings = blade_readings(alone, run.clamped, len(sector.families))
+        _, readings = blade_readings(alone, run.clamped, len(sector.families), run.modes)
         patches = list(run.contact.problem.patches)
         shapes = WheelShapes(alone, patches, all_modes(alone), readings)
         points = curve.settings.points
         return blade_stress(shapes, wheel, pattern, case, solution, blade, points)
 
-    return pattern_response(wheel, sector.families, deviation, curve, stress)
+    return pattern_response(wheel, sector.families, deviation, curve, stress, others)
 
 
 def scatter_of_run(
@@ -118,9 +134,10 @@ def scatter_of_run(
     curves = run.response.curves
     sector, _ = _kept_sector(run, curves, Bodies(scene, run.mesh, comm, progress), comm)
     made = _wheels(run, sector, curves)
+    others, _ = _kept_blades(run, comm)
     return joined_loads(
         [
-            _kept_statistics(run, sector, curve, wheel, comm, progress)
+            _kept_statistics(run, sector, curve, wheel, others, comm, progress)
             for curve, wheel in zip(curves, made, strict=True)
         ]
     )
@@ -142,6 +159,7 @@ def _kept_statistics(
     sector: WheelSector,
     curve: Curve,
     wheel: Wheel,
+    others: OtherBlades | None,
     comm: Communicator | None,
     progress: Progress,
 ) -> Amplification:
@@ -150,13 +168,20 @@ def _kept_statistics(
     spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
     H = max(curve.settings.harmonics, *wheel.excitation)
     samples = max(curve.settings.samples, 8 * (H + 1))
+    families = len(sector.families)
+    if others is not None:
+        spread += abs(others.frequencies(wheel.count, families)).max()
+
+    def made(deviation: np.ndarray) -> Pattern:
+        pattern = frequency_pattern(sector.families, deviation)
+        return pattern if others is None else others.added(pattern, wheel.count, families)
 
     def compute() -> Amplification:
         patterns = drawn_patterns(
             wheel,
             scene_scatter(scene),
             scene.mistuning.wheels,
-            lambda deviation: frequency_pattern(sector.families, deviation),
+            made,
         )
         if scene.mistuning.level == LAW_LEVEL:
             grid = frequency_grid(wheel, curve, TUNED_PATTERN, spread)
@@ -183,7 +208,7 @@ def _kept_statistics(
             progress,
         )
 
-    key = stage_key("scatter", scene, curve.load, curve.peak.omega)
+    key = stage_key("scatter", scene, curve.load, curve.peak.omega, *_blade_keys(scene))
     found, _ = cached_stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)
     return found
 
@@ -205,11 +230,41 @@ def _kept_sector(
     def compute() -> WheelSector:
         # the stress of a blade needs the shapes of the same modes
         all_modes(bodies, modes)
-        return reduce_wheel(bodies, patches, modes, run.clamped, families)
+        return reduce_wheel(bodies, patches, modes, run.clamped, families, run.modes)
 
-    key = stage_key("wheel", scene, modes)
+    key = stage_key("wheel", scene, modes, bool(scene.mistuning.blades))
     sector, seconds = cached_stage(run.folder, "wheel_sector", key, compute, comm)
     return sector, [] if seconds is None else [found_remark("wheel_sector", seconds)]
+
+
+def _kept_blades(run: SolvedRun, comm: Communicator | None) -> tuple[OtherBlades | None, list[str]]:
+    """The blades of another shape, computed or found in the folder, and the remark that they were;
+    None where the scene gives none.
+    """
+    scene = run.scene
+    if not scene.mistuning.blades:
+        return None, []
+    given = _given_blades(scene)
+    key = stage_key("other blades", scene, *_blade_keys(scene))
+
+    def compute() -> OtherBlades:
+        return changed_blades(scene, run.mesh, run.clamped, run.modes, given)
+
+    found, seconds = cached_stage(
+        run.folder, "other_blades", key, lambda: on_root(comm, compute), comm
+    )
+    return found, [] if seconds is None else [found_remark("other_blades", seconds)]
+
+
+def _blade_keys(scene: Scene) -> list[str]:
+    """What the meshes of other blades depend on."""
+    return [stage_key("mesh", other) for other in _given_blades(scene).values()]
+
+
+def _given_blades(scene: Scene) -> dict[int, Scene]:
+    """The scenes of the blades of another shape."""
+    name = kind_named(scene.kind).sectors
+    return {} if name is None else other_blades(scene, value_at(scene, name))
 
 
 def _cases(run: SolvedRun) -> dict[tuple[float, float | None], LoadCase]:

@@ -9,6 +9,7 @@ import numpy as np
 from ...errors import InputError
 from ...scene.fields import value_at
 from ...scene.kinds import kind_named
+from ...scene.other_blades import other_blades
 from ...scene.tables import Scene
 from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
 
@@ -18,7 +19,8 @@ LAW_LEVEL = "damper law"
 
 def is_mistuned(scene: Scene) -> bool:
     """The scene gives how its blades differ."""
-    return scene.mistuning.pattern is not None or scene.mistuning.scatter is not None
+    given = scene.mistuning
+    return any(x is not None for x in (given.pattern, given.scatter, given.blades))
 
 
 def check_mistuning(scene: Scene) -> None:
@@ -36,6 +38,12 @@ def check_mistuning(scene: Scene) -> None:
     if count == 0:
         raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
     scene_deviations(scene, count, scene.mistuning.families)
+    other_blades(scene, count)
+    if scene.mistuning.blades and scene.mistuning.level == LAW_LEVEL:
+        raise InputError(
+            'mistuning.level = "damper law": knows the frequencies of blades alone, expected no '
+            'mistuning.blades or "whole wheel"'
+        )
     if read_orders(scene) and scene.mistuning.level == LAW_LEVEL:
         raise InputError(
             'mistuning.level = "damper law": takes one engine order, expected no mistuning.orders '
@@ -91,6 +99,8 @@ def scene_deviations(
                 "no stiffness, expected relative deviations of frequency above -1"
             )
         return np.broadcast_to(values, (count, families)).copy()
+    if given.scatter is None and given.blades:
+        return np.zeros((count, families))
     if given.scatter is None:
         raise InputError("mistuning: expected a pattern file or a scatter")
     # the same first wheel as the statistics draw

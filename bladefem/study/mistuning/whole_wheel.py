@@ -4,6 +4,7 @@ its blade-alone modes, joined with the friction elements of a load case.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import pi
 
@@ -24,6 +25,7 @@ from ..pipeline.contact_cycle import element_labels
 from ..pipeline.coriolis import with_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
 from ..pipeline.stages import Bodies, Reduced, reduce_sector, with_damper_mass
+from .other_blades import foot_of
 from .validate import read_orders
 
 
@@ -42,6 +44,7 @@ def reduce_wheel(
     modes: int,
     clamped: ModeSet | None,
     families: int,
+    wheel_modes: Sequence[ModeSet] = (),
 ) -> WheelSector:
     """The sector in nodal diameters 0 to N/2.
 
@@ -49,11 +52,12 @@ def reduce_wheel(
         modes: modes kept in each nodal diameter.
         clamped: modes of the aerofoil held at its root.
         families: of these that deviate from blade to blade.
+        wheel_modes: modes of the tuned wheel, wanted where some blades have another shape.
 
     Raises:
         InputError: the scene is no wheel, or names no aerofoil.
     """
-    omega, readings = blade_readings(bodies, clamped, families)
+    omega, readings = blade_readings(bodies, clamped, families, wheel_modes)
     diameters = range(sector_of(bodies.mesh).count // 2 + 1)
     reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
     return WheelSector(reduced, omega)
@@ -63,10 +67,13 @@ def blade_readings(
     bodies: Bodies,
     clamped: ModeSet | None,
     families: int,
+    modes: Sequence[ModeSet] = (),
 ) -> tuple[np.ndarray, np.ndarray]:
     """Circular frequencies (q,) of the blade-alone modes [rad/s], and the columns (n_points*dim, q)
-    that read their coordinates; the arguments are those of `reduce_wheel`.
+    that read their coordinates, with more for the motion of the root where some blades have another
+    shape; the arguments are those of `reduce_wheel`.
     """
+    from ...fem.held_part import section_readings
     from ...fem.readings import modal_readings
 
     if bodies.mesh.sector is None or "cyclic" not in bodies.mesh.pairs:
@@ -81,7 +88,12 @@ def blade_readings(
             f"mistuning.families = {families}: expected at most {len(clamped.frequencies)}"
         )
     omega = 2 * pi * clamped.frequencies[:families]
-    return omega, modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
+    readings = modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
+    if bodies.scene.mistuning.blades:
+        # a blade of another shape has another inertia under motions of its root too
+        foot = foot_of(bodies.mesh, modes, families)
+        readings = np.hstack([readings, section_readings(bodies.mesh, foot.nodes, foot.motions)])
+    return omega, readings
 
 
 def whole_wheel(

@@ -109,6 +109,12 @@ STAGE_INPUTS = {
     "wheel": StageInputs(
         after=("modes", "reduction"), fields=("mistuning.families",), code=("bladefem.study",)
     ),
+    # aerofoils of another shape
+    "other blades": StageInputs(
+        after=("modes",),
+        fields=("mistuning.blades", "mistuning.families"),
+        code=("bladefem.fem", "bladefem.study"),
+    ),
     # all blades under one load; the deviations of a pattern file come with the key
     "whole wheel": StageInputs(
         after=("wheel", "response", "stress"),
