@@ -33,9 +33,12 @@ class WheelFlexibility:
     # (N, H+1, k, k) modal impedances of the free bodies, T = (Z + N)^-1
     Z: np.ndarray
     T: np.ndarray
-    # (H+1, N, q, q) dynamic stiffness of the deviations, and LU factors of 1 + E A_yy; empty: tuned
+    # (H+1, N, q, q) dynamic stiffness of the deviations, and LU factors of 1 + E A_yy in the
+    # readings that deviate; empty: tuned
     E: np.ndarray
     factors: tuple[tuple[np.ndarray, np.ndarray], ...]
+    # (N q,) true where a reading deviates in some harmonic
+    active: np.ndarray
     # readings of blades and dampers that the deviations act on
     deviating: slice
     # whether the mean takes part in the balance
@@ -68,7 +71,9 @@ class WheelFlexibility:
         z = np.empty_like(y)
         for h, factors in enumerate(self.factors):
             right = (self.E[h] @ y[:, :, h, None]).ravel()
-            z[:, :, h] = linalg.lu_solve(factors, right, check_finite=False).reshape(y.shape[:2])
+            solved = np.zeros_like(right)
+            solved[self.active] = linalg.lu_solve(factors, right[self.active], check_finite=False)
+            z[:, :, h] = solved.reshape(y.shape[:2])
         return z
 
 
@@ -92,6 +97,7 @@ def wheel_flexibility(
     _, Z, T, shared = wheel.kept["last"]
     E = np.zeros((0, 0, 0, 0))
     factors: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    active = np.zeros(0, dtype=bool)
     dampers = pattern.heavier_dampers
     deviating = parts.deviating(dampers)
     if not pattern.tuned:
@@ -101,8 +107,10 @@ def wheel_flexibility(
             ]
         sizes = parts.blade.stop - parts.blade.start, deviating.stop - parts.damper.start
         E = np.array([pattern.change(h * omega, *sizes) for h in range(harmonics + 1)])
-        factors = tuple(_factorise_blocks(A, E[h]) for h, A in enumerate(shared[dampers]))
-    return WheelFlexibility(omega, parts, Z, T, E, factors, deviating, wheel.coupled)
+        # one blade of another shape has many readings, the others none or few
+        active = E.any(axis=(0, 3)).ravel()
+        factors = tuple(_factorise_blocks(A, E[h], active) for h, A in enumerate(shared[dampers]))
+    return WheelFlexibility(omega, parts, Z, T, E, factors, active, deviating, wheel.coupled)
 
 
 def to_diameters(x: np.ndarray) -> np.ndarray:
@@ -134,10 +142,13 @@ def _reading_matrix(
     return full.transpose(0, 2, 1, 3).reshape(count * q, count * q)
 
 
-def _factorise_blocks(A: np.ndarray, E: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """LU factors of 1 + E A for E (N, q, q)."""
+def _factorise_blocks(
+    A: np.ndarray, E: np.ndarray, active: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """LU factors of 1 + E A for E (N, q, q), in the readings (N q,) in which E is not zero."""
     count, q = E.shape[:2]
-    system = (E @ A.reshape(count, q, count * q)).reshape(count * q, count * q)
+    own = np.ascontiguousarray(A[:, active]).reshape(count, q, -1)
+    system = np.asfortranarray((E @ own).reshape(count * q, -1)[active])
     system[np.diag_indices_from(system)] += 1.0
     factors = linalg.lu_factor(system, overwrite_a=True, check_finite=False)
     if not abs(np.diag(factors[0])).min() > 0:
