@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 MAX_JUDGED_MAXIMA = 4
 # operations of all verdicts on a curve, some 0.5 s: less than its points take
 CURVE_OPERATIONS = 1.2e10
-# of solving a point again with more harmonics
+# of solving a point again with JUDGED_HARMONICS; more take as many times more as their square
 RICHER_OPERATIONS = 5e8
 # points that are judged in addition, as long as the highest one that is not unstable is not judged
 POINTS_JUDGED_IN_ADDITION = 8
@@ -57,8 +57,8 @@ CONFIRMING = ((15, 256), (31, 512))
 SAME_MOTION = 0.03
 # motions that stay unstable, after which no other one of a curve is judged again
 CONFIRMED_MOTIONS = 2
-# operations of all these verdicts on a curve, some 2.5 s
-CONFIRMING_OPERATIONS = 6e10
+# operations of all these verdicts on a curve, some 3.5 s: eight motions of the shipped wedge
+CONFIRMING_OPERATIONS = 1e11
 # harmonics with whose bodies a travelling wave is asked whether it repeats
 RING_HARMONICS = (7, 15, 31)
 
@@ -199,7 +199,7 @@ def judged_again(
     last = motion
     known = verdict.verdict in (STABLE, UNSTABLE)
     for some in richer if known and motion.states["slip"] and not motion.states["lift"] else ():
-        spent += RICHER_OPERATIONS
+        spent += RICHER_OPERATIONS * (some.harmonics / JUDGED_HARMONICS) ** 2
         try:
             again = solve_near(
                 some.model, motion.omega, some.harmonics, some.samples, last, JUDGED_OPTIONS
