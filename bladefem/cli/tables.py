@@ -99,41 +99,46 @@ def survey_tables(found: Survey) -> str:
     """Frequencies, and the short tables of what was asked for in addition."""
     parts = [frequency_table(found.run.modes)]
     if found.campbell is not None:
-        rows = [
-            [row.engine_order, row.mode, f"{row.frequency:.2f}", f"{30 * row.speed / pi:.1f}"]
-            for row in found.campbell.crossings.itertuples()
-        ]
-        parts.append(
-            plain_table(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"])
-            if rows
-            else "no engine order crosses a mode in this range of speeds"
-        )
+        parts.append(_crossing_table(found.campbell.crossings))
     if found.convergence is not None:
-        given = "given" in found.convergence.summary
-        rows = [
-            [
-                row.mode,
-                *([f"{row.given:.2f}", f"{100 * row.given_error:.3f}"] if given else []),
-                f"{row.frequency:.2f}",
-                "" if row.reason else f"{row.limit:.2f}",
-                "" if row.reason else f"{row.order:.2f}",
-                f"{100 * row.error:.3f}",
-                row.reason,
-            ]
-            for row in found.convergence.summary.itertuples()
-        ]
-        head = ["mode", *(["as given [Hz]", "its error [%]"] if given else []), "finest [Hz]"]
-        parts.append(plain_table(rows, [*head, "limit [Hz]", "order", "error [%]", "why no limit"]))
+        parts.append(_convergence_table(found.convergence.summary))
     if found.answer is not None:
-        parts.append(
-            report_table(
-                found.answer.resonances[["mode", "frequency", "amplitude", "phase", "largest"]]
-            )
-        )
+        columns = ["mode", "frequency", "amplitude", "phase", "largest"]
+        parts.append(report_table(found.answer.resonances[columns]))
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]
         parts.append(plain_table(rows, ["mode", "mode of the other run", "MAC"]))
     return "\n\n".join(parts)
+
+
+def _crossing_table(crossings: pd.DataFrame) -> str:
+    """Where engine orders cross modes in the Campbell diagram."""
+    if crossings.empty:
+        return "no engine order crosses a mode in this range of speeds"
+    rows = [
+        [row.engine_order, row.mode, f"{row.frequency:.2f}", f"{30 * row.speed / pi:.1f}"]
+        for row in crossings.itertuples()
+    ]
+    return plain_table(rows, ["engine order", "mode", "crossing [Hz]", "speed [rpm]"])
+
+
+def _convergence_table(summary: pd.DataFrame) -> str:
+    """Frequencies on the finest mesh and their limit; those of a user's own mesh come first."""
+    given = "given" in summary
+    rows = [
+        [
+            row.mode,
+            *([f"{row.given:.2f}", f"{100 * row.given_error:.3f}"] if given else []),
+            f"{row.frequency:.2f}",
+            "" if row.reason else f"{row.limit:.2f}",
+            "" if row.reason else f"{row.order:.2f}",
+            f"{100 * row.error:.3f}",
+            row.reason,
+        ]
+        for row in summary.itertuples()
+    ]
+    head = ["mode", *(["as given [Hz]", "its error [%]"] if given else []), "finest [Hz]"]
+    return plain_table(rows, [*head, "limit [Hz]", "order", "error [%]", "why no limit"])
 
 
 def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:

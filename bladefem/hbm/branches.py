@@ -445,12 +445,9 @@ def _sorted_out(
         for end, number in zip(path.ends, (first, len(pieces) - 1), strict=True):
             if end:
                 ends.setdefault(end, number)
-        heights = np.array([size(p.solution, probe) for p in path.points])
-        for i in range(1, len(heights) - 1):
-            if heights[i] > heights[i - 1] and heights[i] >= heights[i + 1]:
-                point = path.points[i].solution
-                own = (n for n in range(first, len(pieces)) if any(p is point for p in pieces[n]))
-                maxima.append((point, next(own)))
+        for point in _local_maxima(path, probe):
+            own = (n for n in range(first, len(pieces)) if any(p is point for p in pieces[n]))
+            maxima.append((point, next(own)))
     frequencies = [np.array([p.omega for p in piece]) for piece in pieces]
 
     def apart(n: int, i: int, other: int, j: int) -> float:
@@ -472,6 +469,16 @@ def _sorted_out(
     resonances.sort(key=lambda r: -r.height)
     pieces.extend(left_over)
     return Branches(tuple(map(tuple, pieces)), tuple(resonances), tuple(dict.fromkeys(notes)))
+
+
+def _local_maxima(path: _Path, probe: int) -> list[Solution]:
+    """Points of a path that are higher than the one before and not lower than the one after."""
+    heights = [size(p.solution, probe) for p in path.points]
+    return [
+        path.points[i].solution
+        for i in range(1, len(heights) - 1)
+        if heights[i] > heights[i - 1] and heights[i] >= heights[i + 1]
+    ]
 
 
 def _pieces(points: Sequence[PathPoint]) -> list[list[Solution]]:

@@ -231,6 +231,15 @@ def linearised_contacts(
     return contacts, NodeSteps(*(ring[:, moving] for ring in rings))
 
 
+def _prescribed_normal(model: ReducedModel, S: int) -> tuple[np.ndarray, np.ndarray]:
+    """The part (n, S) [N] of the normal loads that the motion does not make, at S instants, and its
+    change in one step at their rate there.
+    """
+    load = model.normal_load(max((0, *model.normal)))[:, None]
+    base = synthesis(load.shape[2] // 2, S).T
+    return load[:, 0] @ base, _rates(load)[:, 0] @ base * (2 * np.pi / S)
+
+
 def _steps_of_nodes(
     model: ReducedModel,
     solution: Solution,
@@ -247,10 +256,7 @@ def _steps_of_nodes(
     base = synthesis(K // 2, S).T
     motion = w @ base
     change = _rates(w) @ base * (2 * np.pi / S)
-    load = model.normal_load(max((0, *model.normal)))[:, None]
-    known = synthesis(load.shape[2] // 2, S).T
-    N = load[:, 0] @ known
-    dN = _rates(load)[:, 0] @ known * (2 * np.pi / S)
+    N, dN = _prescribed_normal(model, S)
     if d > t:
         N = N + e.kn[:, None] * motion[:, 0]
         dN = dN + e.kn[:, None] * change[:, 0]
@@ -273,7 +279,7 @@ def _steps_of_nodes(
         B1[:, :, 0, 0] = (e.kn[:, None] * (N > 0)).T
         B1[:, :, f:, 0] = by_load[..., 1] * e.kn[:, None]
         B0[:, :, f:, 0] = by_load[..., 0] * e.kn[:, None]
-    closed = (N > 0).all(axis=1)
+    closed: np.ndarray = np.asarray(np.all(N > 0, axis=1))
     return A, B1, B0, share, stuck & closed, closed & bool(f)
 
 

@@ -73,25 +73,38 @@ def _higher_force_harmonics(
     """
     if not uses_coulomb_kernels(model):
         return _harmonics_by_law(model, w, most)
-    e = model.elements
     p, n, d, K = w.shape
     S = INSTANTS_PER_HARMONIC * (most + 1)
-    tangents = e.tangents
-    u = (w.reshape(-1, K) @ synthesis(K // 2, S).T).reshape(p, n, d, S)
-    N = np.array(
-        np.broadcast_to(model.normal_series(S) if model.normal else e.n0[:, None], (p, n, S))
-    )
-    if d > tangents:
-        N += e.kn[:, None] * u[:, :, 0]
-    offset = model.offset.reshape(n, d)[:, d - tangents :, None]
-    g = e.kt[:, None, None] * (u[:, :, d - tangents :] + offset)
-    f = np.empty((p * n, tangents, S))
-    second_period(g.reshape(p * n, tangents, S), N.reshape(p * n, S), np.tile(e.mu, p), f)
-    f = f.reshape(p, n, tangents, S)
-    if d > tangents:
-        f = np.concatenate([np.maximum(N, 0.0)[:, :, None], f], axis=2)
-    high = (2 / S * synthesis(most, S)[:, K:]).T @ f.reshape(-1, S).T
+    motion = (w.reshape(-1, K) @ synthesis(K // 2, S).T).reshape(p, n, d, S)
+    forces = _sampled_forces(model, motion)
+    high = (2 / S * synthesis(most, S)[:, K:]).T @ forces.reshape(-1, S).T
     return (high[::2] - 1j * high[1::2]).reshape(most - K // 2, p, n * d)
+
+
+def _sampled_forces(model: ReducedModel, motion: np.ndarray) -> np.ndarray:
+    """Contact forces (p, n, d, S) [N] of Coulomb's law at S instants, from the motions there [m];
+    the normal force comes first where the normal load follows the motion.
+    """
+    e = model.elements
+    p, n, d, S = motion.shape
+    tangents = e.tangents
+    given = model.normal_series(S) if model.normal else e.n0[:, None]
+    normal = np.array(np.broadcast_to(given, (p, n, S)))
+    if d > tangents:
+        normal += e.kn[:, None] * motion[:, :, 0]
+    offset = model.offset.reshape(n, d)[:, d - tangents :, None]
+    stuck = e.kt[:, None, None] * (motion[:, :, d - tangents :] + offset)
+    friction = np.empty((p * n, tangents, S))
+    second_period(
+        stuck.reshape(p * n, tangents, S),
+        normal.reshape(p * n, S),
+        np.tile(e.mu, p),
+        friction,
+    )
+    friction = friction.reshape(p, n, tangents, S)
+    if d == tangents:
+        return friction
+    return np.concatenate([np.maximum(normal, 0.0)[:, :, None], friction], axis=2)
 
 
 def _harmonics_by_law(

@@ -7,15 +7,37 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from ..errors import InputError
 
-# form of a DMIG matrix of which one triangle is given
+# form of a DMIG matrix that is given whole, and of one of which one triangle is
+SQUARE_FORM = 1
 SYMMETRIC_FORM = 6
 # types of complex matrices, single and double
 COMPLEX_TYPES = (3, 4)
+
+
+class _Header(NamedTuple):
+    """The entry before those of a matrix."""
+
+    form: int
+    type: int
+
+    @property
+    def is_complex(self) -> bool:
+        return self.type in COMPLEX_TYPES
+
+
+class _Term(NamedTuple):
+    """One term of a matrix; row and column are point and component."""
+
+    name: str
+    column: tuple[int, int]
+    row: tuple[int, int]
+    value: complex
 
 
 def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
@@ -30,41 +52,58 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
     Raises:
         InputError: no DMIG entry, an entry that cannot be read, or rectangular matrices.
     """
-    forms: dict[str, tuple[int, int]] = {}
-    entries: list[tuple[str, tuple[int, int], tuple[int, int], complex]] = []
-    for number, fields in _read_entries(Path(path)):
+    headers, terms = _headers_and_terms(Path(path))
+    _refuse_headers(path, headers, terms)
+    dofs = sorted({dof for term in terms for dof in (term.row, term.column)})
+    place = {dof: i for i, dof in enumerate(dofs)}
+    matrices = {
+        name: np.zeros((len(dofs),) * 2, complex if header.is_complex else float)
+        for name, header in headers.items()
+    }
+    for term in terms:
+        matrix = matrices[term.name]
+        header = headers[term.name]
+        i = place[term.row]
+        j = place[term.column]
+        matrix[i, j] = term.value if header.is_complex else term.value.real
+        if header.form == SYMMETRIC_FORM:
+            matrix[j, i] = matrix[i, j]
+    return matrices | {"dofs": np.array(dofs)}
+
+
+def _headers_and_terms(path: Path) -> tuple[dict[str, _Header], list[_Term]]:
+    """What the entries of a file say, by the name of the matrix; an entry of point 0 is a header.
+
+    Raises:
+        InputError: an entry that cannot be read.
+    """
+    headers: dict[str, _Header] = {}
+    terms: list[_Term] = []
+    for number, fields in _read_entries(path):
         try:
             name = fields[1].upper()
             point = int(fields[2])
             if point == 0:
-                forms[name] = int(fields[3]), int(fields[4])
+                headers[name] = _Header(int(fields[3]), int(fields[4]))
             else:
                 column = point, int(fields[3] or 0)
-                entries += [(name, column, *term) for term in _column_terms(fields[5:])]
+                terms += [_Term(name, column, *term) for term in _column_terms(fields[5:])]
         except (ValueError, IndexError) as error:
             raise InputError(
                 f"file {path}, line {number}: cannot read the DMIG entry {' '.join(fields)}"
             ) from error
-    if not entries or {name for name, *_ in entries} - set(forms):
+    return headers, terms
+
+
+def _refuse_headers(path: str | Path, headers: dict[str, _Header], terms: list[_Term]) -> None:
+    """Matrices without a header, or rectangular ones."""
+    if not terms or {term.name for term in terms} - set(headers):
         raise InputError(f"file {path}: expected DMIG matrices, each with its header")
-    wide = [name for name, (form, _) in forms.items() if form not in (1, SYMMETRIC_FORM)]
+    wide = [name for name, h in headers.items() if h.form not in (SQUARE_FORM, SYMMETRIC_FORM)]
     if wide:
         raise InputError(
             f"file {path}: {', '.join(wide)} is rectangular, expected square matrices (form 1 or 6)"
         )
-    dofs = sorted({dof for _, column, row, _ in entries for dof in (column, row)})
-    place = {dof: i for i, dof in enumerate(dofs)}
-    matrices = {
-        name: np.zeros((len(dofs),) * 2, complex if kind in COMPLEX_TYPES else float)
-        for name, (_, kind) in forms.items()
-    }
-    for name, column, row, value in entries:
-        i = place[row]
-        j = place[column]
-        matrices[name][i, j] = value if forms[name][1] in COMPLEX_TYPES else value.real
-        if forms[name][0] == SYMMETRIC_FORM:
-            matrices[name][j, i] = matrices[name][i, j]
-    return matrices | {"dofs": np.array(dofs)}
 
 
 def read_ansys(path: str | Path) -> dict[str, np.ndarray]:

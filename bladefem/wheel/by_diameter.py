@@ -78,9 +78,10 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
     stiffness, viscous, hysteretic = _modal_terms(wheel, most)
     # the flow does nothing to the mean
     still, _, _ = _modal_terms(replace(wheel, influence=None), most)
+    contact = slice(sizes[0])
     mean = np.array(
         [
-            _mean_flexibility(still[d], L[d, : sizes[0]], springs[: sizes[0]], N[d], wheel.hold)
+            _mean_flexibility(still[d], L[d, contact], springs[contact], N[d], wheel.hold)
             for d in range(len(diameters))
         ]
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,30 +101,40 @@ def solve_wheel(
     return _solution(balance, end, method)
 
 
+def _starts(
+    balance: WheelBalance,
+    start: WheelSolution | None,
+    options: Options,
+) -> list[tuple[str, Callable[[], np.ndarray | None]]]:
+    """Names of the attempts and what gives the motion that Newton starts from (None: nothing), the
+    likeliest first; motions are computed when their turn comes.
+    """
+    wheel = balance.wheel
+    H = balance.stuck.shape[3] // 2
+    omega = balance.flex.omega
+    starts: list[tuple[str, Callable[[], np.ndarray | None]]] = [
+        ("newton from the tuned wheel", lambda: _tuned(wheel, omega, H, balance.samples)),
+        ("newton from full stick", lambda: balance.stuck),
+    ]
+    if wheel.coupled and options.fallbacks:
+        starts.append(("newton from held means", lambda: _held(balance, options)))
+    if start is not None:
+        fitted = _fitted(start.w, wheel, H)
+        near = max(NEIGHBOUR_HALF_WIDTHS * np.max(wheel.damping.ratio), SAME_FREQUENCY)
+        close = abs(start.omega / omega - 1) < near
+        starts.insert(0 if close else len(starts), ("newton", lambda: fitted))
+    return starts
+
+
 def _attempts(
     balance: WheelBalance,
     start: WheelSolution | None,
     options: Options,
 ) -> tuple[WheelNewton, str]:
     """The first attempt that converges, or the best one, with the cost of all."""
-    wheel = balance.wheel
-    H = balance.stuck.shape[3] // 2
-    omega = balance.flex.omega
     tried: list[tuple[WheelNewton, str]] = []
-    ways = [
-        ("newton from the tuned wheel", lambda: _tuned(wheel, omega, H, balance.samples)),
-        ("newton from full stick", lambda: balance.stuck),
-    ]
-    if wheel.coupled and options.fallbacks:
-        ways.append(("newton from held means", lambda: _held(balance, options)))
-    if start is not None:
-        fitted = _fitted(start.w, wheel, H)
-        close = abs(start.omega / omega - 1) < max(
-            NEIGHBOUR_HALF_WIDTHS * np.max(wheel.damping.ratio), SAME_FREQUENCY
-        )
-        ways.insert(0 if close else len(ways), ("newton", lambda: fitted))
-    for name, attempt in ways:
-        begin = attempt()
+    for name, first_motion in _starts(balance, start, options):
+        begin = first_motion()
         if begin is None:
             continue
         tried.append((newton_wheel(balance, begin, options), name))

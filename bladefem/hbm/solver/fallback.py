@@ -77,22 +77,32 @@ def match_harmonics(w: np.ndarray, H: int) -> np.ndarray:
     return matched
 
 
+def _newton_attempts(
+    balance: Balance,
+    start: np.ndarray | None,
+    options: Options,
+) -> Iterator[Attempt]:
+    """Newton from the given start and from full stick, with each merit function."""
+    stick = start_in_stick(balance)
+    merits = NEWTON_MERITS if runs_compiled(balance) else NEWTON_MERITS[::-1]
+    for w in ([] if start is None else [start]) + [stick]:
+        for method, merit in merits:
+            yield Attempt(method, newton(balance, w, options, merit))
+
+
 def _attempts_in_order(
     balance: Balance,
     start: np.ndarray | None,
     options: Options,
 ) -> Iterator[Attempt]:
-    stick = start_in_stick(balance)
-    near: Newton | None = None
-    for w in ([] if start is None else [start]) + [stick]:
-        for method, merit in NEWTON_MERITS if runs_compiled(balance) else reversed(NEWTON_MERITS):
-            end = newton(balance, w, options, merit)
-            yield Attempt(method, end)
-            near = end if near is None or end.state.error < near.state.error else near
+    """Every way to the solution, the cheapest first; each is tried when it is asked for."""
+    plain = []
+    for attempt in _newton_attempts(balance, start, options):
+        yield attempt
+        plain.append(attempt.end)
     if not options.fallbacks:
         return
-    # the start in stick was tried in any case
-    assert near is not None
+    near = min(plain, key=lambda end: end.state.error)
     for factor in (2, 4) if near.state.error < CLOSE_RESIDUAL else ():
         denser = replace(balance, samples=factor * balance.samples)
         yield Attempt("more samples", newton(denser, near.state.w, options), denser.samples)

@@ -331,20 +331,34 @@ def covered_band(
     Raises:
         NotSolvedError: no point converged.
     """
-    (low, high), limits = band or default_band(model, mode), _halfway(model, mode)
+    swept = band or default_band(model, mode)
+    limits = _halfway(model, mode)
     for _ in range(1 if band and not widen else MAX_BAND_WIDENINGS):
         left_open: list[str] = []
-        points = response_points(model, settings, (low, high), accuracy, paths, left_open, known)
+        points = response_points(model, settings, swept, accuracy, paths, left_open, known)
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
         if good[0] < top < good[-1]:
             break
-        low, high = (low - (high - low), high) if top == good[0] else (low, high + (high - low))
-        low = max(low, limits[0])
-        high = min(high, limits[1])
+        swept = _doubled_band(swept, top == good[0], limits)
     if notes is not None:
         notes[:] = left_open
     return points
+
+
+def _doubled_band(
+    band: tuple[float, float],
+    downwards: bool,
+    limits: tuple[float, float],
+) -> tuple[float, float]:
+    """Twice the band [Hz] on the side of its highest point, inside the limits."""
+    low, high = band
+    width = high - low
+    if downwards:
+        low -= width
+    else:
+        high += width
+    return max(low, limits[0]), min(high, limits[1])
 
 
 def _halfway(model: ReducedModel, mode: int) -> tuple[float, float]:

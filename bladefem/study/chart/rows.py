@@ -159,29 +159,28 @@ def chart_rows(
         )
         job = waiting[k]
         left = end - clock.now()
-        if (
-            reason := ""
-            if job.needed
-            else _too_dear(known.expected(k, job), k in known.own, left, job)
-        ):
+        measured = k in known.own
+        reason = _too_dear(known.expected(k, job), measured, left, job)
+        if reason and not job.needed:
             done[k] = _lost(waiting.pop(k), known.own.get(k, np.nan), reason)
             continue
-        share = (
-            np.inf
-            if job.needed
-            else FIRST_CALL_FACTOR * left
-            if k in known.own
-            else UNKNOWN_COST_SHARE * left
-        )
-        allowed = share, min(left, FIRST_CALL_FACTOR * share) if not job.needed else np.inf
+        allowed = (np.inf, np.inf) if job.needed else _allowed_seconds(left, measured)
         timing = timed_sweep(job.model, job.run, job.bench.omegas, allowed, clock)
-        if len(timing.points) < len(job.bench.omegas) and k not in known.own:
+        if len(timing.points) < len(job.bench.omegas) and not measured:
             known.own[k] = timing.seconds
             continue
         done[k] = _row(waiting.pop(k), timing)
         if done[k]["converged"]:
             known.kind[job.kind] = timing.seconds
     return [done[k] for k in range(len(jobs))]
+
+
+def _allowed_seconds(left: float, measured: bool) -> tuple[float, float]:
+    """What one job may take of the time that is left, as :func:`timed_sweep` has it: little of it
+    where its cost was never measured.
+    """
+    share = (FIRST_CALL_FACTOR if measured else UNKNOWN_COST_SHARE) * left
+    return share, min(left, FIRST_CALL_FACTOR * share)
 
 
 def _eligible(waiting: dict[int, Job]) -> list[int]:

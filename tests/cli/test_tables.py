@@ -1,0 +1,56 @@
+"""Tables on the terminal."""
+
+from __future__ import annotations
+
+from math import pi
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+
+from bladefem.cli.tables import survey_tables
+
+
+def survey(**parts):
+    modes = SimpleNamespace(nodal_diameter=3, frequencies=np.array([100.0]), residuals=[1e-9])
+    nothing = dict.fromkeys(("campbell", "convergence", "answer", "mac"))
+    return SimpleNamespace(run=SimpleNamespace(modes=[modes]), **(nothing | parts))
+
+
+def test_crossings_are_in_revolutions_a_minute():
+    crossing = {"engine_order": [9], "mode": [1], "frequency": [382.5], "speed": [255 * pi / 3]}
+    found = survey(campbell=SimpleNamespace(crossings=pd.DataFrame(crossing)))
+    table = survey_tables(found).split("\n\n")[1]
+    assert "speed [rpm]" in table and table.splitlines()[-1].split() == [
+        "9",
+        "1",
+        "382.50",
+        "2550.0",
+    ]
+    none = pd.DataFrame(crossing).iloc[:0]
+    said = survey_tables(survey(campbell=SimpleNamespace(crossings=none)))
+    assert said.endswith("no engine order crosses a mode in this range of speeds")
+
+
+def test_a_mode_without_a_limit_says_why():
+    summary = pd.DataFrame(
+        {
+            "mode": [1, 2],
+            "frequency": [100.0, 200.0],
+            "limit": [99.0, np.nan],
+            "order": [4.0, np.nan],
+            "error": [0.01, 0.02],
+            "reason": ["", "it wavers"],
+        }
+    )
+    found = survey(convergence=SimpleNamespace(summary=summary))
+    rows = survey_tables(found).split("\n\n")[1].splitlines()
+    assert rows[-2].split() == ["1", "100.00", "99.00", "4.00", "1.000"]
+    assert rows[-1].split() == ["2", "200.00", "2.000", "it", "wavers"]
+    own = summary.assign(given=[101.0, 202.0], given_error=[0.02, 0.03])
+    head, _, first, _ = (
+        survey_tables(survey(convergence=SimpleNamespace(summary=own)))
+        .split("\n\n")[1]
+        .splitlines()
+    )
+    assert "as given [Hz]" in head and first.split()[:3] == ["1", "101.00", "2.000"]
