@@ -42,7 +42,7 @@ def test_iterative_and_dense_steps_agree(monkeypatch):
 def test_the_preconditioner_takes_over_where_plain_gmres_is_too_slow(monkeypatch):
     from bladefem.hbm.solver import newton_krylov as iterative
 
-    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
+    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: -1)
     model = patch(side=4, inner=6).model
     balance = Balance(model, condense(model, 0.8, 3), 64)
     state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
@@ -78,7 +78,7 @@ def test_steps_next_to_a_singular_derivative_reach_their_accuracy(monkeypatch, d
     from bladefem.hbm.solver import newton_krylov as iterative
 
     if not directions:
-        monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
+        monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: -1)
     A, change = nearly_singular()
     J = np.eye(252) + plain_jacobian(A, change)
     right = np.random.default_rng(1).standard_normal((36, 7))
@@ -94,7 +94,7 @@ def test_dense_factors_are_the_last_resort(monkeypatch):
     right = np.random.default_rng(1).standard_normal((36, 7))
     monkeypatch.setattr(policy, "DENSE_UNKNOWNS", 0)
     monkeypatch.setattr(iterative, "GMRES_PASSES", 0)
-    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
+    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: -1)
     step = residual_module._choose_inverse(by_harmonic(A), change)(right, 1e-5)
     J = np.eye(252) + plain_jacobian(A, change)
     assert np.linalg.norm(J @ step.ravel() - right.ravel()) < 1e-9 * np.linalg.norm(right)
@@ -186,7 +186,7 @@ def test_gmres_takes_both_forms_of_the_flexibility(monkeypatch, hundred_nodes, b
     """Its products and harmonic blocks by modes are those of the matrices."""
     from bladefem.hbm.solver import newton_krylov as iterative
 
-    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
+    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: -1)
     balance = Balance(hundred_nodes, condense(hundred_nodes, 0.9, 3), 88)
     state = evaluate_balance(balance, 1.2 * start_in_stick(balance))
     n, d, K = state.w.shape
@@ -216,7 +216,7 @@ def test_blocks_serve_a_whole_newton_run(monkeypatch):
     """
     from bladefem.hbm.solver import newton_krylov as iterative
 
-    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: False)
+    monkeypatch.setattr(iterative, "conjugate_residuals", lambda *_: -1)
     made, model = [], patch(side=6, inner=12, n0=0.1).model
     plain = iterative._harmonic_blocks
     monkeypatch.setattr(iterative, "_harmonic_blocks", lambda *a: made.append(1) or plain(*a))

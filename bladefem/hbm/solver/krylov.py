@@ -19,12 +19,14 @@ from .deflation import apply_deflation
 
 # after which it is given up
 MOST_DIRECTIONS = 60
+# in place of their number, where they did not find the solution
+NOT_FOUND = -1
 
 
 @njit(**KERNEL)
 def conjugate_residuals(flex, C, r, accuracy, level, x):
-    """Fill x (N,) with the solution for r (N,), to a relative residual; False where it is not
-    found.
+    """Fill x (N,) with the solution for r (N,), to a relative residual; the number of directions
+    that took, or NOT_FOUND.
 
     A as `flex` gives it, C (nodes, N/nodes, N/nodes) real; level as `bladefem.hbm.solver.deflation`
     gives it.
@@ -40,7 +42,7 @@ def conjugate_residuals(flex, C, r, accuracy, level, x):
     x[:] = 0.0
     for k in range(MOST_DIRECTIONS):
         if np.sqrt(np.dot(rest, rest)) <= goal:
-            return True
+            return k
         apply_deflation(level, rest, P[k])
         copy_vector(P[k], Q[k])
         for i in range(0, N, block):
@@ -53,11 +55,11 @@ def conjugate_residuals(flex, C, r, accuracy, level, x):
                 Q[k, j] -= share * Q[i, j]
         length = np.sqrt(np.dot(Q[k], Q[k]))
         if not length > 0.0:
-            return False
+            return NOT_FOUND
         step = np.dot(Q[k], rest) / length**2
         for j in range(N):
             x[j] += step * P[k, j]
             rest[j] -= step * Q[k, j]
             P[k, j] /= length
             Q[k, j] /= length
-    return False
+    return NOT_FOUND

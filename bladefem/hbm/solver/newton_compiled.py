@@ -218,7 +218,7 @@ def _apply_inverse(r, accuracy, flex, C, factors, level):
     if (
         r.size > BLOCKED_LU_UNKNOWNS
         and factors[1].size == 0
-        and conjugate_residuals(flex, C, r, accuracy, level, x)
+        and conjugate_residuals(flex, C, r, accuracy, level, x) >= 0
     ):
         return x, factors
     if factors[1].size == 0 and r.size <= DENSE_FALLBACK_UNKNOWNS:

@@ -18,7 +18,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 from ...friction.fourier import to_complex, to_real
 from ..linear.contact_flexibility import Flexibility, flexibility_product, sizes
 from .deflation import no_level, second_level
-from .krylov import conjugate_residuals
+from .krylov import NOT_FOUND, conjugate_residuals
 
 # vectors kept by GMRES
 GMRES_BASIS = 80
@@ -30,18 +30,23 @@ POOR_REDUCTION = 0.1
 SINGLE_PRECISION_REDUCTION = 1e-3
 # products of one solve from which new harmonic blocks pay: they cost about as many
 RENEWING_PRODUCTS = 80
+# directions of one solve from which a second level of an earlier derivative is given up: forming
+# one costs about as many
+RENEWING_DIRECTIONS = 12
 
 
 @dataclass
 class Memory:
-    """Harmonic blocks of an earlier derivative, which serve the next ones of the same Newton run as
+    """Preconditioners of an earlier derivative, which serve the next ones of the same Newton run as
     well.
     """
 
-    # the active nodes that the blocks belong to
+    # the active nodes that they belong to
     nodes: bytes = b""
     # (H+1, a, a)
     blocks: np.ndarray | None = None
+    # the second level of `bladefem.hbm.solver.deflation`
+    level: tuple[np.ndarray, ...] | None = None
     # the last system took long: blocks are worth their time
     slow: bool = False
     # linear solvers of the policy that ran so far
@@ -84,6 +89,8 @@ class _System:
     memory: Memory
     motions: np.ndarray | None
     count: int = 0
+    # the second level belongs to this derivative
+    fresh: bool = False
 
     @cached_property
     def single(self) -> Parts:
@@ -98,25 +105,42 @@ class _System:
         )
         return halved, change.astype(np.float32)
 
-    @cached_property
-    def level(self) -> tuple[np.ndarray, ...]:
-        """The second level."""
+    def renew_level(self) -> None:
+        """The second level of this derivative."""
         flex, change = self.double
+        self.fresh = True
         if self.motions is None or self.motions.size == 0:
-            return no_level()
+            self.memory.level = no_level()
+            return
         d = len(self.motions) // len(change)
-        return second_level(flex, change, self.motions, np.arange(len(change)), d)
+        nodes = np.arange(len(change))
+        self.memory.level = second_level(flex, change, self.motions, nodes, d)
+
+    def reach(self, residual: np.ndarray, accuracy: float, x: np.ndarray) -> int:
+        """Fill x by conjugate residuals with the present level; the number of directions."""
+        flex, change = self.double
+        found = conjugate_residuals(flex, change, residual.ravel(), accuracy, self.memory.level, x)
+        return int(found)
 
     def directions(
         self,
         residual: np.ndarray,
         accuracy: float,
     ) -> np.ndarray | None:
-        """The solution by conjugate residuals, or None where they do not find it."""
-        flex, change = self.double
+        """The solution by conjugate residuals, or None where they do not find it.
+
+        The second level is that of an earlier derivative as long as this takes few directions.
+        """
+        if self.memory.level is None:
+            self.renew_level()
         x = np.empty(residual.size)
-        found = conjugate_residuals(flex, change, residual.ravel(), accuracy, self.level, x)
-        return x.reshape(residual.shape) if found else None
+        count = self.reach(residual, accuracy, x)
+        if count == NOT_FOUND and not self.fresh:
+            self.renew_level()
+            count = self.reach(residual, accuracy, x)
+        if count > RENEWING_DIRECTIONS and not self.fresh:
+            self.memory.level = None
+        return None if count == NOT_FOUND else x.reshape(residual.shape)
 
     def product(
         self,

@@ -343,11 +343,8 @@ def _linearise_blocks(
         return lambda residual, accuracy=0.0: residual.copy()
     flex = select_nodes(balance.linear.condensed.flex, active, d)
     if memory is not None and memory.nodes != active.tobytes():
-        memory.nodes, memory.blocks, memory.slow = (
-            active.tobytes(),
-            None,
-            memory.slow or memory.blocks is not None,
-        )
+        memory.slow = memory.slow or memory.blocks is not None
+        memory.nodes, memory.blocks, memory.level = active.tobytes(), None, None
     inverse = _choose_inverse(flex, change, memory, balance.linear.condensed.motions[dofs])
 
     def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
