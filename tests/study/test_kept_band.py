@@ -80,9 +80,9 @@ def test_what_cannot_be_marched_says_why(monkeypatch):
 def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(monkeypatch):
     """8.8e10 operations on the shipped wedge; fewer points there end on another motion."""
     monkeypatch.setattr(module, "march_operations", lambda model, periods: 8.8e10)
-    assert module._affordable(None)
+    assert module.affordable_march(None)
     monkeypatch.setattr(module, "march_operations", lambda model, periods: 3.5e11)
-    assert not module._affordable(None)
+    assert not module.affordable_march(None)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.response_remarks import beyond_tolerance, resonance_warnings
 
 
@@ -17,6 +18,7 @@ def curve(
     estimated=(0.0, 0.0, 0.0),
     converged=True,
     layer_law=np.nan,
+    in_time=None,
 ):
     """Three points, the resonance in the middle."""
     return SimpleNamespace(
@@ -25,6 +27,8 @@ def curve(
         error=error,
         halved=halved,
         layer_law=layer_law,
+        in_time=in_time,
+        peak_amplitude=656e-6,
         frequency=np.array([99.0, 100.0, 101.0]),
         peak_frequency=100.0,
         converged=np.array([converged, True, True]),
@@ -53,6 +57,14 @@ def test_the_part_of_the_layer_is_told_where_it_is_the_larger():
     curves = [curve(18.0, 0.08, layer_law=0.07), curve(36.0, 0.09, layer_law=0.01)]
     (above,) = resonance_warnings(curves, 0.05)
     assert "; 7 % under 18 N are what the tangent of a layer that stiffens leaves out" in above
+
+
+def test_an_error_from_a_march_says_so():
+    band = KeptBand(369.8, 640e-6, 662e-6, 200, points=16)
+    told, above = resonance_warnings([curve(36.0, 0.08, in_time=band)], 0.05)
+    assert "error of the resonance amplitude, 656 um; it is estimated from a march" in told
+    assert "with 16 contact points a seat, which keeps between 640 and 662 um" in told
+    assert above.endswith("above the wanted 5 %: 36 N 8 %")
 
 
 def test_a_resonance_next_to_an_unsolved_point_is_told():

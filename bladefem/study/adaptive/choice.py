@@ -4,8 +4,8 @@ tolerance is met.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -50,6 +50,9 @@ class Checked:
     errors: dict[float, float]
     # what the sweep could not do, in sentences
     notes: tuple[str, ...] = ()
+    # parts of the error of the resonance by what richer models change (settings.DIRECTIONS); empty
+    # where they are not known one by one
+    parts: Mapping[str, float] = field(default_factory=dict)
 
 
 def choose_settings(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -87,7 +87,7 @@ def resonance_curve(
         top = _resonance(family, used, points)
         if used.error is not None and used.error > FAR_BEYOND * accuracy:
             # the flanks of a peak that is far from right need no look of their own
-            return Checked(used, points, {top.omega: used.error}, tuple(notes))
+            return Checked(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
         found = _checked_flanks(family, used, points, top, errors)
         significant = _checked_significant(family, used, points, top, accuracy)
@@ -96,7 +96,12 @@ def resonance_curve(
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
         used = missed or used
-    return Checked(used, points, found, tuple(notes))
+    return Checked(used, points, found, tuple(notes), _parts(errors))
+
+
+def _parts(errors: PeakErrors | None) -> Mapping[str, float]:
+    """Relative changes of the height of a peak, by respect; none where it was not judged."""
+    return {} if errors is None else errors.height
 
 
 def _suited_to_lift_off(family: Family, settings: Settings, top: Solution) -> Settings:

@@ -100,7 +100,7 @@ def kept_of_family(models: Family, settings: Settings, point: Solution) -> KeptB
     """
     fewer = settings
     while fewer.points is not None and fewer.points > FEWEST_POINTS:
-        if _affordable(model_in_time(models, fewer)):
+        if affordable_march(model_in_time(models, fewer)):
             break
         fewer = replace(fewer, points=max(FEWEST_POINTS, fewer.points // 2))
     model = model_in_time(models, fewer)
@@ -116,7 +116,7 @@ def kept_of_family(models: Family, settings: Settings, point: Solution) -> KeptB
     )
 
 
-def _affordable(model: ReducedModel) -> bool:
+def affordable_march(model: ReducedModel) -> bool:
     """A march by steps is not too long, or not possible at all."""
     try:
         return march_operations(model, LEFT_BY_STEPS + KEPT_BY_STEPS) <= MAX_MARCH
@@ -129,7 +129,7 @@ def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
     try:
         system = time_system(in_one_body(model), point.harmonics)
     except InputError:
-        return _band_by_steps(model, point)
+        return band_by_steps(model, point)
     periods = LEFT_PERIODS + KEPT_PERIODS
     steps = periods * max(SAMPLES_PER_PERIOD, 2 * np.pi * system.fastest / point.omega)
     if steps > MAX_STEPS:
@@ -144,7 +144,7 @@ def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
     return _band_of(point, motion, periods)
 
 
-def _band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
+def band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
     """The same with two tangents, and for travelling waves."""
     band = _unknown_band(point, "nothing was marched")
     lengths = ((LEFT_BY_STEPS, KEPT_BY_STEPS), REFINED_PERIODS)

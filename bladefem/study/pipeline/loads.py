@@ -5,7 +5,7 @@ load.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -30,6 +30,7 @@ from ..adaptive.settings import Settings, restarted_settings
 from ..adaptive.stiff_layer import stiff_layer_change
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
+from .error_in_time import error_in_time
 from .kept_band import KeptBand, kept_of_family
 from .liftoff import naming_the_load
 from .linear_limits import Limit
@@ -101,6 +102,9 @@ class Curve:
     unstable_peak: Solution | None = None
     # what the blade does at that one in time; None where it is stable
     kept: KeptBand | None = None
+    # a march from the resonance that its estimated error was taken from; None where richer balances
+    # tell it
+    in_time: KeptBand | None = None
     # range of the resonance over loading histories; None where it was not asked for
     interval: LoadInterval | None = None
     # contacts lift off and the balance is too large for following its motions round folds: a
@@ -246,6 +250,13 @@ def curve_of(
         richer = richer_models(models, curve.settings)
         marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
     top, kept = _resonance(models, curve, marks, scene.accuracy)
+    estimated = estimated_errors(curve)
+    judged = None
+    if scene.study.stability:
+        judged = error_in_time(models, curve, top, kept, scene.accuracy)
+    if judged is not None:
+        curve = replace(curve, settings=replace(curve.settings, error=judged.error))
+        estimated[[p is top for p in curve.points]] = judged.error
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -260,7 +271,7 @@ def curve_of(
         mass=case.mass,
         settings=curve.settings,
         **columns,
-        estimated=estimated_errors(curve),
+        estimated=estimated,
         tolerated=tolerated,
         checked=checked_points(curve),
         stability=marks.verdict,
@@ -269,6 +280,7 @@ def curve_of(
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         unstable_peak=None if kept is None else peak_of(curve.points),
         kept=kept,
+        in_time=None if judged is None else judged.band,
         interval=interval,
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,

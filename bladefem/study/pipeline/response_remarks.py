@@ -134,6 +134,9 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
             f"under {', '.join(next_to_unsolved)} the highest point that was solved lies next to "
             "one that was not; the resonance may be higher"
         )
+    for c in curves:
+        if c.in_time is not None:
+            yield in_time_sentence(c)
     unknown = [load_of(c) for c in curves if c.error == np.inf]
     if unknown:
         yield (
@@ -147,6 +150,19 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
             "estimated error of the resonance amplitude above the wanted "
             f"{100 * accuracy:.2g} %: {each}{_largest_parts(above)}"
         )
+
+
+def in_time_sentence(c: Curve) -> str:
+    """What the estimated error of a resonance was taken from, where that is a march."""
+    band = c.in_time
+    assert band is not None
+    more = "" if band.points is None else f" with {band.points} contact points a seat"
+    return (
+        f"under {load_of(c)} contacts lift off and balances with more harmonics do not tell the "
+        f"error of the resonance amplitude, {1e6 * c.peak_amplitude:.4g} um; it is estimated from "
+        f"a march in time from there{more}, which keeps between {1e6 * band.lowest:.4g} and "
+        f"{1e6 * band.highest:.4g} um"
+    )
 
 
 def _largest_parts(curves: list[Curve]) -> str:

@@ -1,0 +1,126 @@
+"""The error of a resonance with lift-off from a march in time, where richer balances disagree.
+
+Where contacts lift off, balances with more harmonics are often not solved, or end on another motion
+of several: their difference says little of the one that is given. A march in time has no harmonics
+left out, and begins at the very motion that is judged (`bladefem.study.pipeline.kept_band`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...hbm.linear.condensation import condense
+from ...hbm.model import ReducedModel
+from ...hbm.solution import Solution, size
+from ...hbm.solve import as_solution
+from ...hbm.solver.fallback import Attempt
+from ...hbm.solver.newton import Newton
+from ...hbm.solver.residual import Balance, evaluate_balance
+from ...hbm.time_model import time_system
+from ..adaptive.choice import Checked
+from ..adaptive.family import Family, Member, carried_displacements, family_member
+from ..adaptive.settings import Settings
+from .kept_band import KeptBand, affordable_march, band_by_steps
+from .stability import in_one_body, model_in_time
+
+# respects that a march leaves nothing of
+COVERED_IN_TIME = ("harmonics", "samples")
+
+
+@dataclass(frozen=True)
+class ErrorInTime:
+    """Of the amplitude of a resonance."""
+
+    # relative
+    error: float
+    # of the march; its points are those of a model with more of them than the resonance's, None
+    # where it has the same
+    band: KeptBand
+
+
+def error_in_time(
+    models: Family,
+    curve: Checked,
+    top: Solution,
+    kept: KeptBand | None,
+    accuracy: float,
+) -> ErrorInTime | None:
+    """The error of a resonance by a march from it; None where that does not apply, is not possible,
+    or tells more than the balances do.
+
+    It replaces what richer balances say of harmonics and samples. Where they say nothing of contact
+    points, twice as many are marched.
+
+    Args:
+        top: the resonance, a point of the curve.
+        kept: what a march from the highest point has found.
+    """
+    told = curve.settings.error
+    if told is None or told <= accuracy or not top.states["lift"]:
+        return None
+    left = sum(change for name, change in curve.parts.items() if name not in COVERED_IN_TIME)
+    known = bool(curve.parts) and np.isfinite(left)
+    settings = curve.settings if known else _finer_settings(models, curve.settings)
+    if settings is None or not _marched_by_steps(model_in_time(models, settings), top):
+        return None
+    if known and kept is not None and kept.points is None and kept.frequency == top.frequency:
+        band = kept
+    else:
+        start = top if known else carried_motion(models, curve.settings, top, settings)
+        band = band_by_steps(model_in_time(models, settings), start)
+    if band.reason:
+        return None
+    error = max(abs(size(top) / end - 1) for end in (band.lowest, band.highest))
+    error += left if known else 0.0
+    if error >= told:
+        return None
+    return ErrorInTime(error, band if known else replace(band, points=settings.points))
+
+
+def _finer_settings(models: Family, settings: Settings) -> Settings | None:
+    """Twice the contact points; None where there are no more."""
+    if settings.points is None:
+        return None
+    finer = replace(settings, points=2 * settings.points)
+    before, after = (len(family_member(models, s).model.springs) for s in (settings, finer))
+    return finer if after > before else None
+
+
+def _marched_by_steps(model: ReducedModel, top: Solution) -> bool:
+    """A march by steps is affordable, and no exact one is possible, which would take far longer."""
+    try:
+        time_system(in_one_body(model), top.harmonics)
+    except InputError:
+        return affordable_march(model)
+    return False
+
+
+def carried_motion(
+    models: Family,
+    settings: Settings,
+    point: Solution,
+    other: Settings,
+) -> Solution:
+    """The motion of a point on the contact points of other settings, with the forces that belong to
+    it; no solution of that balance, but a start of a march.
+
+    Solving it there mostly ends on another motion, or nowhere.
+    """
+    old, new = (family_member(models, some) for some in (settings, other))
+    H = point.harmonics
+    w = carried_displacements(point.w, old, new, H)
+    walk = None if point.walk is None else _carried_motions(point.walk, old, new)
+    linear = condense(new.model, point.omega, H)
+    balance = Balance(new.model, linear, point.samples, walk=walk)
+    reason = "carried over from other contact points"
+    start = Newton(evaluate_balance(balance, w), 0, False, reason, walk=walk)
+    return as_solution(balance, Attempt("", start), 0, reason)
+
+
+def _carried_motions(walk: np.ndarray, old: Member, new: Member) -> np.ndarray:
+    """(m', z) motions along which a damper walks, from those of another member (m, z)."""
+    parts = walk.T.reshape(walk.shape[1], -1, old.model.directions, 1)
+    return np.stack([carried_displacements(w, old, new, 0).ravel() for w in parts], axis=1)

@@ -1,0 +1,82 @@
+"""The error of a resonance with lift-off from a march, against balances with many harmonics."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import bouncing
+
+from bladefem.data import Elements
+from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.solve import solve
+from bladefem.hbm.sweep import size
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.study.adaptive.choice import Checked
+from bladefem.study.adaptive.family import Family, Member, family_member, family_of
+from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline.error_in_time import carried_motion, error_in_time
+
+OMEGA = 0.9
+# of the excitation of `bouncing`: three harmonics are 3.1 % off there
+STRONGER = 4.0
+PARTS = {"harmonics": 0.3, "samples": 0.1, "points": 0.01, "modes": 0.002}
+
+
+def hopping():
+    """`bouncing` under a force that lifts it off."""
+    model = bouncing()
+    return replace(model, excitation={1: STRONGER * model.excitation[1]})
+
+
+def in_halves():
+    """`hopping` with its contact in two halves at one place."""
+    K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
+    ports = {"contact": [0, 1, 2, 0, 1, 2], "load": [0, 1], "probe": [0]}
+    body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
+    halves = Elements(*(np.full(2, x) for x in (0.5, 1.0, 0.4, 0.075)), tangents=2)
+    return ReducedModel((body,), halves, {1: STRONGER * np.array([0.1, 0.08j])})
+
+
+def settings_of(error, **given):
+    return replace(first_for(3), harmonics=3, samples=64, error=error, **given)
+
+
+def test_a_march_tells_what_harmonics_leave_out():
+    model = hopping()
+    family = Family(lambda s: Member(model, np.arange(1)), 3)
+    top = solve(model, OMEGA, 3, 64)
+    truth = abs(size(top) / size(solve(model, OMEGA, 31, 512)) - 1)
+    assert top.states["lift"] == 1
+    found = error_in_time(family, Checked(settings_of(0.412), [], {}, parts=PARTS), top, None, 0.05)
+    assert found.error == pytest.approx(0.012 + truth, abs=2e-3)
+    assert found.band.points is None
+    # a march from this very point that was done before is not done again
+    wider = replace(found.band, lowest=0.9 * size(top))
+    curve = Checked(settings_of(0.412), [], {}, parts=PARTS)
+    again = error_in_time(family, curve, top, wider, 0.05)
+    assert again.error == pytest.approx(0.012 + 1 / 0.9 - 1)
+
+
+@pytest.mark.parametrize("error", [None, 0.01, 0.013])
+def test_an_error_that_balances_tell_as_well_is_left(error):
+    model = hopping()
+    family = Family(lambda s: Member(model, np.arange(1)), 3)
+    top = solve(model, OMEGA, 3, 64)
+    parts = PARTS | {"points": 0.02}
+    curve = Checked(settings_of(error), [], {}, parts=parts)
+    assert error_in_time(family, curve, top, None, 0.012) is None
+
+
+def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points():
+    family = family_of(in_halves(), [2])
+    coarse = settings_of(np.inf, points=1)
+    top = solve(family_member(family, coarse).model, OMEGA, 3, 64)
+    truth = abs(size(top) / size(solve(hopping(), OMEGA, 31, 512)) - 1)
+    moved = carried_motion(family, coarse, top, replace(coarse, points=2))
+    assert size(moved) == pytest.approx(size(top), rel=1e-6)
+    assert moved.f.shape[0] == 2 and not moved.converged
+    found = error_in_time(family, Checked(coarse, [], {}), top, None, 0.05)
+    assert found.band.points == 2
+    assert found.error == pytest.approx(truth, abs=2e-3)
+    every = replace(coarse, points=2)
+    assert error_in_time(family, Checked(every, [], {}), moved, None, 0.05) is None
