@@ -91,9 +91,11 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
 )
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
     band = module.KeptBand(380.0, lowest, highest, 200, reason)
-    curve = SimpleNamespace(kept=band, peak_amplitude=1.0)
+    curve = SimpleNamespace(kept=band, peak_amplitude=1.0, in_time=None)
     assert Curve.kept_above.fget(curve) == pytest.approx(share)
     assert Curve.kept_above.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0
+    marched = SimpleNamespace(kept=band, peak_amplitude=1.0, in_time=band, keeps_unstable=True)
+    assert Curve.kept_above.fget(marched) == 0.0
 
 
 def marches_that_grow(point, instants_that_hold):
@@ -115,6 +117,6 @@ def test_growth_where_contacts_lift_off_is_marched_with_more_instants(monkeypatc
     assert point.states["lift"] > 0
     monkeypatch.setattr(module, "march_operations", lambda *_: 1.0)
     monkeypatch.setattr(module, "march_ring", marches_that_grow(point, holds))
-    found = module._band_by_steps(model, point)
+    found = module.band_by_steps(model, point)
     assert found.highest == pytest.approx(ratio * size(point))
     assert found.periods == (200 if holds == 256 else 100)

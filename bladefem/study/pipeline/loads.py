@@ -135,9 +135,11 @@ class Curve:
     @property
     def kept_above(self) -> float:
         """How far the blade was marched to above the resonance given, where the highest motion is
-        unstable; relative to that resonance.
+        unstable; relative to that resonance. Nothing where a march from there is its error anyway.
         """
         if self.kept is None or self.kept.reason:
+            return 0.0
+        if self.in_time is not None and self.keeps_unstable:
             return 0.0
         return max(0.0, self.kept.highest / self.peak_amplitude - 1)
 
@@ -250,13 +252,7 @@ def curve_of(
         richer = richer_models(models, curve.settings)
         marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
     top, kept = _resonance(models, curve, marks, scene.accuracy)
-    estimated = estimated_errors(curve)
-    judged = None
-    if scene.study.stability:
-        judged = error_in_time(models, curve, top, kept, scene.accuracy)
-    if judged is not None:
-        curve = replace(curve, settings=replace(curve.settings, error=judged.error))
-        estimated[[p is top for p in curve.points]] = judged.error
+    curve, estimated, in_time = _judged_in_time(scene, models, curve, top, kept)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -280,7 +276,7 @@ def curve_of(
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         unstable_peak=None if kept is None else peak_of(curve.points),
         kept=kept,
-        in_time=None if judged is None else judged.band,
+        in_time=in_time,
         interval=interval,
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,
@@ -288,6 +284,27 @@ def curve_of(
         body_mesh=unseen.body_mesh,
         layer_law=unseen.layer_law,
     )
+
+
+def _judged_in_time(
+    scene: Scene,
+    models: Family,
+    curve: Checked,
+    top: Solution,
+    kept: KeptBand | None,
+) -> tuple[Checked, RealArray, KeptBand | None]:
+    """The curve with the error of its resonance by a march where that tells it, the estimated error
+    of each point, and the march.
+    """
+    estimated = estimated_errors(curve)
+    if not scene.study.stability:
+        return curve, estimated, None
+    judged = error_in_time(models, curve, top, kept, scene.accuracy)
+    if judged is None:
+        return curve, estimated, None
+    estimated[[p is top for p in curve.points]] = judged.error
+    settings = replace(curve.settings, error=judged.error)
+    return replace(curve, settings=settings), estimated, judged.band
 
 
 def _unseen_errors(
