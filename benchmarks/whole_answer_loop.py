@@ -52,8 +52,11 @@ def paper_loop(model: ReducedModel, omega: float) -> complex:
     forces = np.zeros(len(free), dtype=complex)
 
     def image(w: np.ndarray) -> np.ndarray:
-        motion = to_real(np.stack([0 * w, w], axis=1)).reshape(n, -1, 3)
-        forces[:] = to_complex(evaluate(e, motion, 512, jacobian=False).f).reshape(-1, 2)[:, 1]
+        # the normal direction, the first one, is missing where its load is prescribed
+        motion = np.zeros((n, 1 + e.tangents, 3))
+        motion[:, -model.directions :] = to_real(np.stack([0 * w, w], axis=1)).reshape(n, -1, 3)
+        found = evaluate(e, motion, 512, jacobian=False).f[:, -model.directions :]
+        forces[:] = to_complex(found).reshape(-1, 2)[:, 1]
         stiffness = np.where(abs(w) > 0, forces / np.where(abs(w) > 0, w, 1.0), 0.0)
         return np.linalg.solve(np.eye(len(w)) + G * stiffness, free)
 
