@@ -5,15 +5,20 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from bladefem.fem.body import assemble
 from bladefem.fem.stiffness_error import stiffness_error
+from bladefem.hbm.reference_blade import reference_model
 from bladefem.scene.tables import Material
 from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import body_mesh, pipeline
+from bladefem.study.pipeline.body_mesh import softened_change
 from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes, reduce_sector
 from bladefem.study.pipeline.validate_mesh import found_patches
 
@@ -84,3 +89,17 @@ def test_reported_error_is_not_below_half_of_the_true_one():
     assert true > 0.01
     assert 0.5 * true < curves[0].error < 5 * true
     assert curves[0].body_mesh > 3 * curves[1].body_mesh
+
+
+@pytest.mark.parametrize("lifting", [0, 4])
+def test_a_softened_peak_that_is_not_solved(monkeypatch, lifting):
+    """A damper that comes off leaves the free blade, whose amplitude falls as 1 / omega^2."""
+    as_meshed = reference_model(load=3.0, points=4, modes=20)
+    side = replace(as_meshed.sides[0], omega=0.99 * as_meshed.sides[0].omega)
+    family = family_of(replace(as_meshed, sides=(side, *as_meshed.sides[1:])))
+    softer = SimpleNamespace(family=lambda case: family, ratio=0.99)
+    top = SimpleNamespace(omega=1.0, states={"lift": lifting}, w=np.zeros((8, 1, 2)))
+    monkeypatch.setattr(body_mesh, "changed_peak", lambda *_: None)
+    settings = Settings(20, 1, 0, "mass")
+    found = softened_change(softer, family_of(as_meshed), None, settings, top, 1)
+    assert found == (pytest.approx(0.99**-2 - 1, rel=0.05) if lifting else np.inf)

@@ -14,7 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...data import ModeSet, Patch, PortModel
+from ...hbm.linear_resonances import free_resonances
+from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution
+from ...hbm.solve import free_response
 from ...hbm.sweep import size
 from ..adaptive.changed_peak import changed_peak
 from ..adaptive.family import Family, family_member
@@ -127,17 +130,31 @@ def frequency_ratio(
 
 def softened_change(
     softer: SofterBody,
+    models: Family,
     case: LoadCase,
     settings: Settings,
     top: Solution,
+    mode: int,
 ) -> float:
-    """Relative change of a resonance amplitude on the softened body; inf where that was not solved.
+    """Relative change of a resonance amplitude on the softened body. Where that was not solved and
+    contacts lift off, that of the blade without damper; else inf.
 
     Args:
+        models: of the body as meshed.
         settings, top: of the resonance, and its highest point.
+        mode: that is excited (1 = lowest).
     """
     model = family_member(softer.family(case), settings).model
     peak = changed_peak(model, settings, top, top.omega * softer.ratio, PEAK_TOLERANCE)
-    if peak is None:
+    if peak is not None:
+        return abs(peak.height / size(top) - 1)
+    if not top.states["lift"]:
         return np.inf
-    return abs(peak.height / size(top) - 1)
+    # a damper that comes off holds little: the motion is nearly that of the free blade
+    meshed = family_member(models, settings).model
+    return abs(_free_height(model, mode) / _free_height(meshed, mode) - 1)
+
+
+def _free_height(model: ReducedModel, mode: int) -> float:
+    """Amplitude of the blade without damper at its natural frequency [m]."""
+    return float(abs(free_response(model, free_resonances(model)[mode - 1])[1, 0]))

@@ -325,7 +325,9 @@ def _unseen_errors(
         return UnseenErrors()
     return UnseenErrors(
         np.nan if scene.contact.points else halved_change(models, settings, top),
-        np.nan if softer is None else softened_change(softer, case, settings, top),
+        np.nan
+        if softer is None
+        else softened_change(softer, models, case, settings, top, scene.excitation.mode),
         stiff_layer_change(models, settings, top, scene.accuracy)
         if settings.softened
         else layer_change(models, settings, top, case.decay),
