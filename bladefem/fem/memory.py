@@ -5,9 +5,9 @@ Peak of the modes of one complex nodal diameter [GB], wedge sector, proven by th
 inertia, measured and (modelled); benchmarks/fem_cost.py remakes the first row, million.py there
 single points of the first two:
 
-    dofs                      49 632         148 482        472 299
+    dofs                      49 632         148 482        472 299        1 032 705
     in memory                 0.557 (0.557)  1.68 (1.68)
-    factors on disk           0.454 (0.464)  1.28 (1.24)    4.05 (4.10)
+    factors on disk           0.454 (0.457)  1.28 (1.25)    4.05 (4.28)    10.4 (10.4)
     two ranks, both together  0.773 (0.772)  2.13 (2.26)
 
 Factors on disk take 0.57 GB at 148 482 degrees of freedom, and a twentieth more processor time
@@ -35,7 +35,7 @@ BYTES_PER_RANK = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
 ONE_RANK = (5.0e3, 103.5)
 SEVERAL_RANKS = (4.29e3, 175.0)
-ON_DISK = (5.59e3, 36.5)
+ON_DISK = (5.0e3, 49.0)
 # on disk: bytes b dofs^(4/3)
 FACTOR_BYTES = 100.0
 

@@ -30,6 +30,7 @@ from bladefem.study.pipeline.stages import Bodies
         (49_632, 1, True, 0.454e9),
         (148_482, 1, True, 1.280e9),
         (472_299, 1, True, 4.046e9),
+        (1_032_705, 1, True, 10.398e9),
         (49_632, 2, False, 0.773e9),
         (148_482, 2, False, 2.133e9),
     ],
