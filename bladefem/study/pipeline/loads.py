@@ -219,8 +219,8 @@ def longest_first(loads: Sequence[float], best: float = 0.0) -> list[int]:
     """Numbers of the loads [N] in the order in which they are solved: those below the best one,
     whose contacts slip and lift most, from there down, then the others upwards.
 
-    Of the shipped wedge 36 N, half of the best load, take 60 s of CPU, 18 and 9 N 30 s each, all
-    heavier ones together 35 s.
+    Of the shipped wedge 36 N, half of the best load, take 55 s of CPU, 18 and 9 N 40 and 46 s, all
+    heavier ones together 27 s.
     """
     below = sorted((i for i, load in enumerate(loads) if load < best), key=lambda i: -loads[i])
     above = sorted((i for i, load in enumerate(loads) if load >= best), key=lambda i: loads[i])
