@@ -1,4 +1,4 @@
-"""Where error indicators and sweeps are blind (F19 to F26, F28), and what the automatic choice does
+"""Where error indicators and sweeps are blind (F19 to F26, F28, F37), and what the automatic choice does
 there.
 """
 
@@ -15,6 +15,8 @@ from bladefem.hbm.full_stick import sticks_safely
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.parameters import vary
+from bladefem.hbm.peak import find_peak, with_slope
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import Solution
 from bladefem.hbm.solve import as_solution, solve
@@ -36,6 +38,7 @@ from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.frequency_list import adapt_frequency_list
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
 from bladefem.study.adaptive.settings import DIRECTIONS, Settings, first_for
+from bladefem.study.influences import WIDE_STEP
 
 HZ = 2 * np.pi
 STIFFNESS = 0.3 * (100 * HZ) ** 2  # of the contact, beside a modal stiffness of (100 Hz)^2
@@ -262,3 +265,32 @@ def test_F28_internal_resonances_between_the_checks(monkeypatch):
     assert worst() < 1e-3  # measured 8e-5 in the spikes, 7e-4 elsewhere
     monkeypatch.setattr(watched, "MAX_CHECKED_PEAKS", 0)
     assert worst() > 4e-3
+
+
+def bends(step: float, samples: int) -> np.ndarray:
+    """Second derivative of ln(height) by ln(load) at four loads near the best one, as differences
+    of exact first ones.
+    """
+    blade = reference_model(1e6, 0.06, 1.0, harmonics=1)
+    found = []
+    for best in (1.40, 1.45, 1.50, 1.59):
+        slopes = []
+        for load in best * np.exp([-step, step]):
+            model = vary(blade, "load", load)
+            peak = find_peak(model, 1326 * HZ, 1, samples, tolerance=1e-7)
+            slopes.append(with_slope(model, peak, "load", load).slope / peak.height)
+        found.append((slopes[1] - slopes[0]) / (2 * step))
+    return np.array(found)
+
+
+def test_F37_differences_of_derivatives_over_small_steps():
+    """Each derivative is exact, of a response that ripples with the instants of sampled friction:
+    the lowest height of a design chart looks like a highest one.
+    """
+    exact = bends(2e-2, 0)
+    assert (exact > 1.5).all()
+    ripple = np.concatenate(
+        [bends(step, samples) for step in (2e-3, 2e-2) for samples in (64, 128)]
+    )
+    assert (ripple < 0).sum() >= 2 and ripple.max() > 10 * exact.max()
+    np.testing.assert_allclose(bends(WIDE_STEP, 128), exact, rtol=0.15)
