@@ -140,8 +140,9 @@ def test_a_count_that_fails_on_one_rank_ends_all(both, monkeypatch):
         return plain(*args)
 
     monkeypatch.setattr(wheel, "_count_below", fails)
+    # one for each of up to four ranks
     with pytest.raises(NotSolvedError, match="the shift is an eigenvalue"):
-        all_diameters(both[0], 4, [0, 1, 2])
+        all_diameters(both[0], 4, [0, 1, 2, 3])
 
 
 def _ports(t):
