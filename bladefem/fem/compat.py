@@ -8,6 +8,7 @@ from doing so here.
 
 from __future__ import annotations
 
+import ctypes
 import logging
 import sys
 import time
@@ -266,3 +267,12 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     vector = dolfinx.fem.petsc.assemble_vector(compile_form(form))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def option_used(name: str) -> bool:
+    """Whether something asked PETSc's database for an option, given without its dash; petsc4py has
+    no call for that.
+    """
+    used = ctypes.c_int(0)
+    ctypes.CDLL(PETSc.__file__).PetscOptionsUsed(None, name.encode(), ctypes.byref(used))
+    return bool(used.value)

@@ -20,13 +20,17 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import NotSolvedError
-from .compat import PETSc, SLEPc
+from ..errors import InputError, NotSolvedError, suggestion
+from .compat import PETSc, SLEPc, option_used
 from .constraint import Constrained
 from .lanczos import lowest_eigenpairs, orthonormal
 from .linalg import apply_block, inner_products, linear_combinations, subtract_product
 from .memory import give_back
 
+# options that belong to SLEPc's solver and its spectral transformation
+OWN_PREFIXES = ("-eps_", "-st_")
+# some of them, for the sentence that refuses another
+KNOWN_OPTIONS = ("-eps_monitor", "-eps_ncv", "-eps_tol", "-eps_type", "-eps_view", "-st_type")
 # iterations (restarts) until SLEPc gives up
 MAX_RESTARTS = 100
 # basis vectors beyond twice the pairs wanted: fewer restart once more, more are not needed
@@ -286,13 +290,16 @@ def krylov_schur(
 
     Raises:
         NotSolvedError: no convergence, with SLEPc's reason.
+        InputError: an option for SLEPc's solver that it does not know.
     """
     pencil = _Pencil(con, inverse, kept=guard > 0)
-    eps = _make_solver(pencil, start, count, tolerance, settings or Eigensolver())
+    settings = settings or Eigensolver()
+    eps = _make_solver(pencil, start, count, tolerance, settings)
     try:
         eps.solve()
         if pencil.failure is not None:
             raise pencil.failure
+        _refuse_unknown(settings.options)
         reason = int(eps.getConvergedReason())
         # memory of no more use, before the vectors come
         if not pencil.kept:
@@ -391,6 +398,23 @@ def _make_solver(
         PETSc.Options().insertString(settings.options)
     eps.setFromOptions()
     return eps
+
+
+def _refuse_unknown(options: str) -> None:
+    """Refuse options with the solver's own prefixes that it did not ask for: misspelt ones.
+
+    After a solve, since some are asked for at its end.
+
+    Raises:
+        InputError: the first of them.
+    """
+    for word in options.split():
+        name = word.lstrip("-")
+        if word.startswith(OWN_PREFIXES) and not option_used(name):
+            raise InputError(
+                f"PETSc option {word}: SLEPc's solver knows none of that name, expected one of its "
+                f"manual{suggestion(word, KNOWN_OPTIONS)}"
+            )
 
 
 def _converged_vectors(pencil: _Pencil, eps: SLEPc.EPS) -> np.ndarray:

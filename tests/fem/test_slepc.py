@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from structured import box, sector
 
-from bladefem.errors import NotSolvedError
+from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.all_diameters import _counting_shift as common_shift
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
@@ -108,6 +108,21 @@ def test_options_of_petsc_reach_the_solver(monkeypatch):
             modes(con, 10, solver=Eigensolver(options="-eps_max_it 1 -eps_ncv 12 -eps_tol 1e-13"))
     finally:
         for name in ("eps_max_it", "eps_ncv", "eps_tol"):
+            PETSc.Options().delValue(name)
+
+
+def test_a_misspelt_option_is_refused():
+    """PETSc keeps it in silence."""
+    from bladefem.fem.compat import PETSc
+
+    con = constrain(assemble(box((12, 2, 2), (0.3, 0.02, 0.03), "tetra10"), "blade", Material()))
+    try:
+        with pytest.raises(InputError, match=r"-eps_monitr: .* did you mean .-eps_monitor"):
+            modes(con, 4, solver=Eigensolver(options="-eps_tol 1e-9 -eps_monitr"))
+        PETSc.Options().delValue("eps_monitr")
+        modes(con, 4, solver=Eigensolver(options="-eps_tol 1e-9 -mat_mumps_icntl_14 40"))
+    finally:
+        for name in ("eps_tol", "eps_monitr", "mat_mumps_icntl_14"):
             PETSc.Options().delValue(name)
 
 
