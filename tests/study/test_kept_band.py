@@ -12,6 +12,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size
 from bladefem.hbm.time_model import time_system
 from bladefem.study.pipeline import kept_band as module
+from bladefem.study.pipeline import loads
 from bladefem.study.pipeline.kept_band import kept_band
 from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import in_one_body
@@ -91,11 +92,35 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
 )
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
     band = module.KeptBand(380.0, lowest, highest, 200, reason)
-    curve = SimpleNamespace(kept=band, peak_amplitude=1.0, in_time=None)
-    assert Curve.kept_above.fget(curve) == pytest.approx(share)
-    assert Curve.kept_above.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0
-    marched = SimpleNamespace(kept=band, peak_amplitude=1.0, in_time=band, keeps_unstable=True)
-    assert Curve.kept_above.fget(marched) == 0.0
+    elsewhere = SimpleNamespace(kept=band, peak_amplitude=1.0, in_time=None, keeps_unstable=False)
+    assert Curve.marched.fget(elsewhere) == pytest.approx(share)
+    assert Curve.marched.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0
+    here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True})
+    beside = 0.0 if reason else max(abs(lowest - 1), abs(highest - 1))
+    assert Curve.marched.fget(here) == pytest.approx(beside)
+    judged = SimpleNamespace(**vars(here) | {"in_time": band})
+    assert Curve.marched.fget(judged) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("kept_to", "given"), [(0.7, 0.9), (0.95, 1.2), (1.19, 1.2), (1.3, 1.2), (np.nan, 1.2)]
+)
+def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypatch, kept_to, given):
+    """Else it moves most there: 224.9 um that a march brings to 212.8 are not 204 um elsewhere."""
+    points = [
+        SimpleNamespace(omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]))
+        for k, a in enumerate((0.5, 0.9, 1.2))
+    ]
+    for point in points:
+        point.converged = True
+    marks = SimpleNamespace(verdict=np.array(["stable", "stable", "unstable"]))
+    reason = "too long" if np.isnan(kept_to) else ""
+    band = module.KeptBand(2.0, kept_to, kept_to, 200, reason)
+    monkeypatch.setattr(loads, "kept_of_family", lambda *_: band)
+    top, kept = loads._resonance(
+        None, SimpleNamespace(points=points, settings=None), marks, accuracy=0.05
+    )
+    assert size(top) == pytest.approx(given) and kept is band
 
 
 def marches_that_grow(point, instants_that_hold):

@@ -122,25 +122,33 @@ class Curve:
     @property
     def error(self) -> float | None:
         """Estimated relative error of the resonance amplitude: that of the balance, what half as
-        many contact points change (the contact mesh), the body's mesh, the tangent of a layer that
-        stiffens, and what the blade was marched to above it; None where it was not asked for.
+        many contact points change (the contact mesh), the body's mesh, and the tangent of a layer
+        that stiffens; None where it was not asked for.
+
+        A march from an unstable resonance tells the error of its balance as well, one that ends
+        above a resonance elsewhere adds to it.
         """
         if self.settings.error is None:
             return None
+        balance = self.settings.error
+        balance = max(balance, self.marched) if self.keeps_unstable else balance + self.marched
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
         layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
-        return self.settings.error + contact_mesh + body_mesh + layer_law + self.kept_above
+        return balance + contact_mesh + body_mesh + layer_law
 
     @property
-    def kept_above(self) -> float:
-        """How far the blade was marched to above the resonance given, where the highest motion is
-        unstable; relative to that resonance. Nothing where a march from there is its error anyway.
+    def marched(self) -> float:
+        """How far from the resonance given the blade was marched where the highest motion is
+        unstable, relative to that resonance: to either side of it where it is that motion, above
+        it where it is another. Nothing where a march from there is its error anyway.
         """
         if self.kept is None or self.kept.reason:
             return 0.0
-        if self.in_time is not None and self.keeps_unstable:
-            return 0.0
+        if self.keeps_unstable:
+            ends = (self.kept.lowest, self.kept.highest)
+            beside = max(abs(end / self.peak_amplitude - 1) for end in ends)
+            return 0.0 if self.in_time is not None else beside
         return max(0.0, self.kept.highest / self.peak_amplitude - 1)
 
     @property
@@ -343,7 +351,8 @@ def _resonance(
     """The point that is given as the resonance, and what the blade does at the highest one where
     that is unstable.
 
-    An unstable one gives way to the highest that is not where the blade is known to keep to less.
+    An unstable one gives way to the highest that is not where the blade is known to keep to less
+    than that: else the blade moves most next to the unstable one.
     """
     highest = peak_of(curve.points)
     unstable = {id(p) for p, v in zip(curve.points, marks.verdict, strict=True) if v == UNSTABLE}
@@ -352,9 +361,8 @@ def _resonance(
     kept = kept_of_family(models, curve.settings, highest)
     lasting = [p for p in curve.points if p.converged and id(p) not in unstable]
     known = not (kept.reason or kept.holds(size(highest), accuracy))
-    if lasting and known and kept.highest < size(highest):
-        return max(lasting, key=size), kept
-    return highest, kept
+    lower = max(lasting, key=size, default=highest)
+    return (lower if known and kept.highest < size(lower) else highest), kept
 
 
 def _record(p: Solution) -> dict[str, Any]:
