@@ -10,7 +10,8 @@ meet, which is exact when two peaks exchange their order.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -184,6 +185,7 @@ def lowest_peak(
     samples: int = 128,
     *,
     start: float | None = None,
+    near: Peak | None = None,
     tolerance: float = 1e-3,
     rise: float = 0.0,
     options: Options = DEFAULT_OPTIONS,
@@ -193,6 +195,7 @@ def lowest_peak(
 
     Args:
         start: value where the search begins; the middle of the bounds when left out.
+        near: the highest peak there where that is known, of these models or similar ones.
         rise: relative; values are tried on both sides until the height has grown by it, or a bound
             is reached, or a peak is not solved.
 
@@ -210,7 +213,7 @@ def lowest_peak(
     )
     if start is not None:
         middle = float(np.clip(start, *bounds))
-    first, points = _first_level(search, middle)
+    first, points = _first_level(search, middle, near)
     levels = {middle: first}
     # paths know the peaks that they started from: only a look over the band shows others
     for _ in range(MOST_LEVELS):
@@ -233,12 +236,21 @@ def lowest_peak(
     )
 
 
-def _first_level(search: _Search, value: float) -> tuple[list[Peak], int]:
-    """Peaks uphill of the resonances of both limits at the first value, and the points spent."""
+def _first_level(
+    search: _Search,
+    value: float,
+    near: Peak | None,
+) -> tuple[list[Peak], int]:
+    """The peak next to a known one, else those uphill of the resonances of both limits at the first
+    value, and the points spent.
+    """
     model = search.along.model_at(value)
     known: list[Peak] = []
     points = 0
     reason = "the climb leaves it"
+    if near is not None:
+        with suppress(NotSolvedError):
+            return _solve_level(search, value, [replace(near, value=value)])
     guesses = np.concatenate(
         [resonances(model) for resonances in (stuck_resonances, free_resonances)]
     )

@@ -9,7 +9,7 @@ import pytest
 
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import optimum as optimum_module
-from bladefem.hbm.optimum import optimum
+from bladefem.hbm.optimum import lowest_peak, optimum
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.report.best_load import best_load_table, reasons_against
@@ -17,6 +17,7 @@ from bladefem.report.statements import response_answer
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline import best_load as best_load_module
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import (
     CHART_LOAD_FACTORS,
@@ -109,6 +110,45 @@ def test_the_slope_of_a_peak_with_the_load_is_the_difference_of_two_peaks():
     )
     found = along.with_slope(along.model_at(1.4), middle, 1.4).slope
     assert found == pytest.approx((high.height - low.height) / np.log(1.402 / 1.398), rel=0.02)
+
+
+@pytest.mark.parametrize("solved", [True, False])
+def test_a_search_begins_with_few_harmonics_and_ends_with_those_that_are_needed(
+    best, monkeypatch, solved
+):
+    """Settings of another load may be far richer; where few harmonics are not solved, the search
+    begins with these.
+    """
+    search = best_load_module._search
+    used = []
+
+    def watched(scene, case_at, family_of, settings, *others):
+        used.append(settings)
+        if settings.harmonics <= 3 and not solved:
+            raise NotSolvedError("no peak")
+        return search(scene, case_at, family_of, settings, *others)
+
+    monkeypatch.setattr(best_load_module, "_search", watched)
+    rich = replace(SETTINGS, harmonics=7, samples=256, chosen=("harmonics", "samples"))
+    found = find_best_load(scene(), case_at, family, rich, None)
+    assert used[0].harmonics == 3 and used[0].samples == 64
+    assert any(s.harmonics == 7 for s in used) is not solved
+    assert found.reason == "" and found.settings.error < 0.01
+    within = 2 * found.settings.error + 3 * best.tolerance
+    assert found.amplitude == pytest.approx(best.amplitude, rel=within)
+
+
+def test_a_repeated_search_begins_at_the_resonance_that_is_known(best):
+    """Where a peak next to it is not solved, those of the linear limits are sought as before."""
+    along = load_variation(case_at, family, SETTINGS)
+    known = find_peak(along.model_at(best.load), HZ * best.frequency, 3, 0)
+    band = (HZ * 1150, HZ * 1450)
+    points = [
+        lowest_peak(along, band, (0.5, 5.0), 3, 0, start=best.load, near=near, rise=0.01)
+        for near in (None, known)
+    ]
+    assert points[1].points < points[0].points
+    assert points[1].peak.height == pytest.approx(points[0].peak.height, rel=2e-3)
 
 
 def test_a_chart_reaches_from_an_eighth_of_the_best_to_thirty_times_it(best):

@@ -211,6 +211,28 @@ def test_many_harmonics_are_judged_by_half_as_many_again_where_contacts_lift(har
     """Twice as many cost a minute a peak there."""
     family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=63))
     settings = replace(first_for(family.modes), harmonics=harmonics, samples=128)
-    point = SimpleNamespace(states={"lift": 1})
+    point = SimpleNamespace(states={"lift": 4}, w=np.zeros((16, 3, 1)))
     judge = resonance_choice.judge_settings(family, settings, "harmonics", point)
     assert judge.harmonics == more and judge.samples >= 8 * more
+
+
+@pytest.mark.parametrize(("most", "height"), [(31, 0.1), (7, 0.01)])
+def test_few_contacts_that_lift_leave_the_judge_four_times_the_harmonics(monkeypatch, most, height):
+    """An internal resonance of the ninth harmonic, which seven do not know of; where fifteen are
+    not solved, seven judge.
+    """
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    settings = replace(first_for(family.modes), harmonics=3, samples=128, points=4)
+    states = {"stick": 0, "slip": 7, "lift": 1, "open": 0}
+    point = SimpleNamespace(states=states, w=np.zeros((8, 3, 1)))
+
+    def known(family, old, start, new, accuracy, fallbacks=True):
+        if new.harmonics > most:
+            raise NotSolvedError("too rich")
+        lower = {3: 0.0, 7: 0.01}.get(new.harmonics, 0.1)
+        return KnownPeak(1.0 - lower, 100.0, point)
+
+    monkeypatch.setattr(resonance_choice, "peak_from", known)
+    peak = KnownPeak(1.0, 100.0, point)
+    errors = resonance_choice.peak_errors(family, settings, peak, 0.05)
+    assert errors.height["harmonics"] == pytest.approx(1 / (1 - height) - 1)
