@@ -90,6 +90,7 @@ def march_ring(
     E, G0, G1 = linear_steps(system, 2 * np.pi / point.omega / S)
     e = model.elements
     w = free[0] + system.contact @ y[:M] - system.residual @ (forces - preload)
+    F = system.residual + system.contact @ G1[:M] @ system.contact.T
     probes = len(system.probe) // r
     motion = np.empty((periods, S, r))
     settled = _march(
@@ -98,7 +99,7 @@ def march_ring(
         w,
         tuple(map(_sparse_rows, (E, -G0, -G1))),
         (np.ascontiguousarray(system.contact), np.ascontiguousarray(system.contact.T)),
-        system.residual + system.contact @ G1[:M] @ system.contact.T,
+        (np.ascontiguousarray(F), np.ascontiguousarray(F.T), F @ preload),
         np.tile(np.column_stack([e.kt, e.kn, e.mu]), (r, 1)),
         _normal_loads(model, r, S),
         preload,
@@ -190,7 +191,7 @@ def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motio
         w: (m,) relative displacements, changed.
         steps: of `linear_steps`, by rows; the last two for contact forces in the modes.
         readings: U (m, M), and its transpose.
-        F: (m, m) flexibility for the forces after a step.
+        F: (m, m) flexibility for the forces after a step, its transpose, and F preload (m,).
         table: (n, 3) kt, kn, mu; load: (S, n) normal load at zero displacement.
         preload: (m,) forces under which nothing moves; free: (S, m) motion without contact forces.
         probe: readings (r, M), flexibility (r, m) and free motion (S, r).

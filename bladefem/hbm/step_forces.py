@@ -30,7 +30,7 @@ DECREASE = 1e-4
 
 
 @njit(**KERNEL)
-def contact_forces(c, F, w, f, change, extra, table, load0, load1, preload):
+def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, preload):
     """Forces at the end of a step, of w = c - F extra: f, extra and w are those before, and then
     those after. False where they were not found.
 
@@ -38,7 +38,8 @@ def contact_forces(c, F, w, f, change, extra, table, load0, load1, preload):
     that of this one.
 
     Args:
-        c: (m,) displacements without extra forces; F: (m, m) flexibility.
+        c: (m,) displacements without extra forces.
+        flexibility: F (m, m), its transpose, and F preload (m,).
         w: (m,) relative displacements; f: (n, 3) contact forces; extra: (m,) those less preload.
         table: (n, 3) kt, kn, mu; load0, load1: (n,) normal loads at zero displacement before and
             after the step.
@@ -53,13 +54,15 @@ def contact_forces(c, F, w, f, change, extra, table, load0, load1, preload):
         for a in range(d):
             f[i, a] += change[i, a]
             extra[i * d + a] += change[i, a]
-    found = _in_turn(c, F, w, f, extra, table, load0, load1, preload, old, largest)
+    found = _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest)
     if not found:
         # from the forces before the step: sweeps that do not settle lead away
         for i in range(len(f)):
             for a in range(d):
                 f[i, a] = old[0][i, a]
-        found = _together(c, F, w, f, extra, table, load0, load1, preload, old, largest)
+        found = _together(
+            c, flexibility[0], w, f, extra, table, load0, load1, preload, old, largest
+        )
     for i in range(len(f)):
         for a in range(d):
             change[i, a] = f[i, a] - old[0][i, a]
@@ -67,19 +70,29 @@ def contact_forces(c, F, w, f, change, extra, table, load0, load1, preload):
 
 
 @njit(**INNER_KERNEL)
-def _in_turn(c, F, w, f, extra, table, load0, load1, preload, old, largest):
-    """Sweeps over the nodes, each with a Newton step of its own; False where they do not settle."""
+def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest):
+    """Sweeps over the nodes, each with a Newton step of its own; False where they do not settle.
+
+    Displacements follow each force that changes: nodes that are open, most of them where a damper
+    comes off, cost nothing but their displacement.
+    """
+    F, columns, pressed = flexibility
     n = len(f)
     d = len(c) // n
     B = np.zeros((3, 3))
     gap = np.zeros(3)
     tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
+    w[:] = c + pressed
+    for i in range(n):
+        for a in range(d):
+            if f[i, a] != 0.0:
+                _subtract(columns[i * d + a], f[i, a], w)
     for _ in range(SWEEPS):
         change = 0.0
         for i in range(n):
             first = i * d
-            for a in range(first, first + d):
-                w[a] = c[a] - _product(F[a], extra)
+            if _stays_open(f[i], load1[i] + table[i, 1] * w[first]):
+                continue
             loads = (load0[i] + table[i, 1] * old[1][first], load1[i])
             _violation(w, f[i], first, d, old[1], old[0][i], (table[i], loads), B, gap, tangents)
             _own_step(F, first, d, B, gap)
@@ -87,9 +100,23 @@ def _in_turn(c, F, w, f, extra, table, load0, load1, preload, old, largest):
                 f[i, a] += gap[a]
                 extra[first + a] = f[i, a] - preload[first + a]
                 change = max(change, abs(gap[a]))
+                _subtract(columns[first + a], gap[a], w)
         if change <= SETTLED * largest:
             return True
     return False
+
+
+@njit(**INNER_KERNEL)
+def _stays_open(f, load):
+    """A node without force whose normal load is none either."""
+    return load <= 0.0 and f[0] == 0.0 and f[1] == 0.0 and f[2] == 0.0
+
+
+@njit(**INNER_KERNEL)
+def _subtract(column, factor, target):
+    """target (m,) becomes target less the factor times the column (m,)."""
+    for k in range(len(target)):
+        target[k] -= factor * column[k]
 
 
 @njit(**INNER_KERNEL)

@@ -45,10 +45,39 @@ def test_forces_are_those_of_the_motion_that_they_make(seed, stiffness):
     np.testing.assert_allclose(extra, f.ravel())
 
 
+def test_nodes_that_open_or_close_in_a_step_are_found_from_the_rest():
+    """Under a preload, with a flexibility that is not symmetric, as coupled damping makes it."""
+    generator = np.random.default_rng(3)
+    m = 3 * NODES
+    F = 1e-9 * (generator.standard_normal((m, m)) + 8 * np.eye(m))
+    table = np.tile([4e7, 5e7, MU], (NODES, 1))
+    preload = generator.uniform(0.0, 5.0, m)
+    w = np.zeros(m)
+    # half of them open before, a quarter and another after
+    w[::3] = np.tile([1e-7, -1e-6], NODES // 2)
+    after = np.tile([1e-7, -1e-6, -1e-6, 2e-7], NODES // 4)
+    load = np.zeros(NODES)
+    f = np.zeros((NODES, 3))
+    f[:, 0] = np.maximum(5e7 * w[::3], 0.0)
+    start = {"f": f.copy(), "w": w.copy()}
+    c = 1e-8 * generator.standard_normal(m)
+    c[::3] = after
+    extra = f.ravel() - preload
+    flexibility = F, np.ascontiguousarray(F.T), F @ preload
+    assert contact_forces(c, flexibility, w, f, np.zeros_like(f), extra, table, load, load, preload)
+    law = {"c": c + F @ preload, "F": F, "table": table, "load": load}
+    np.testing.assert_allclose(f, wanted(f, start, law), atol=1e-5 * f.max())
+    np.testing.assert_allclose(w, c - F @ extra, atol=1e-12)
+    np.testing.assert_allclose(extra, f.ravel() - preload)
+    assert list(f[:, 0] > 0) == [True, False, False, True] * (NODES // 4)
+
+
 def contact_forces_of(case, w, f, extra):
     load = case["load"]
     zero = np.zeros(len(extra))
     change = np.zeros_like(f)
+    F = case["F"]
+    flexibility = F, np.ascontiguousarray(F.T), F @ zero
     return contact_forces(
-        case["c"], case["F"], w, f, change, extra, case["table"], load, load, zero
+        case["c"], flexibility, w, f, change, extra, case["table"], load, load, zero
     )
