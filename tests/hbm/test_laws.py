@@ -176,3 +176,18 @@ def test_the_page_writes_the_laws_of_the_table(page):
     for name, law in (("dahl", page["Dahl"]()), ("bouc-wen", page["BoucWen"]())):
         ours = solve(mass_on_law(name), 0.9, 5, 128)
         np.testing.assert_allclose(solve(mass_on_law(law), 0.9, 5, 128).w, ours.w, atol=1e-12)
+
+
+def test_the_step_as_merit_comes_after_the_residual_from_every_start():
+    """Where the loop is not compiled; a point for which nothing else is tried is left without."""
+    starts = [np.zeros(1), np.ones(1)]
+
+    def order(compiled, fallbacks):
+        runs = fallback._merits_in_order(starts, compiled, fallbacks)
+        return [(int(w[0]), merit) for w, _, merit in runs]
+
+    residual_first = [(0, "residual"), (1, "residual")]
+    assert order(False, True) == [*residual_first, (0, "step"), (1, "step")]
+    assert order(False, False) == residual_first
+    by_start = [(0, "step"), (0, "residual"), (1, "step"), (1, "residual")]
+    assert order(True, True) == order(True, False) == by_start
