@@ -14,7 +14,7 @@ from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.choice import Checked
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline.error_in_time import carried_motion, error_in_time
+from bladefem.study.pipeline.error_in_time import Marches, carried_motion, error_in_time
 
 OMEGA = 0.9
 # of the excitation of `bouncing`: three harmonics are 3.1 % off there
@@ -47,13 +47,15 @@ def test_a_march_tells_what_harmonics_leave_out():
     top = solve(model, OMEGA, 3, 64)
     truth = abs(size(top) / size(solve(model, OMEGA, 31, 512)) - 1)
     assert top.states["lift"] == 1
-    found = error_in_time(family, Checked(settings_of(0.412), [], {}, parts=PARTS), top, None, 0.05)
+    curve = Checked(settings_of(0.412), [], {}, parts=PARTS)
+    marches = Marches(family)
+    found = error_in_time(marches, curve, top, 0.05)
     assert found.error == pytest.approx(0.012 + truth, abs=2e-3)
     assert found.band.points is None
     # a march from this very point that was done before is not done again
-    wider = replace(found.band, lowest=0.9 * size(top))
-    curve = Checked(settings_of(0.412), [], {}, parts=PARTS)
-    again = error_in_time(family, curve, top, wider, 0.05)
+    (motion,) = marches.done
+    marches.done[motion] = replace(found.band, lowest=0.9 * size(top))
+    again = error_in_time(marches, curve, top, 0.05)
     assert again.error == pytest.approx(0.012 + 1 / 0.9 - 1)
 
 
@@ -64,7 +66,7 @@ def test_an_error_that_balances_tell_as_well_is_left(error):
     top = solve(model, OMEGA, 3, 64)
     parts = PARTS | {"points": 0.02}
     curve = Checked(settings_of(error), [], {}, parts=parts)
-    assert error_in_time(family, curve, top, None, 0.012) is None
+    assert error_in_time(Marches(family), curve, top, 0.012) is None
 
 
 def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points():
@@ -75,8 +77,8 @@ def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points():
     moved = carried_motion(family, coarse, top, replace(coarse, points=2))
     assert size(moved) == pytest.approx(size(top), rel=1e-6)
     assert moved.f.shape[0] == 2 and not moved.converged
-    found = error_in_time(family, Checked(coarse, [], {}), top, None, 0.05)
+    found = error_in_time(Marches(family), Checked(coarse, [], {}), top, 0.05)
     assert found.band.points == 2
     assert found.error == pytest.approx(truth, abs=2e-3)
     every = replace(coarse, points=2)
-    assert error_in_time(family, Checked(every, [], {}), moved, None, 0.05) is None
+    assert error_in_time(Marches(family), Checked(every, [], {}), moved, 0.05) is None

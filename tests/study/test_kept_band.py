@@ -116,10 +116,14 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
     marks = SimpleNamespace(verdict=np.array(["stable", "stable", "unstable"]))
     reason = "too long" if np.isnan(kept_to) else ""
     band = module.KeptBand(2.0, kept_to, kept_to, 200, reason)
+    curve = SimpleNamespace(points=points, settings=None)
+    done = SimpleNamespace(models=None, band=lambda *_: band)
+    top, kept = loads._resonance(done, curve, marks, accuracy=0.05)
+    assert size(top) == pytest.approx(given) and kept is band
+    # where that is not marched by steps at this size
     monkeypatch.setattr(loads, "kept_of_family", lambda *_: band)
-    top, kept = loads._resonance(
-        None, SimpleNamespace(points=points, settings=None), marks, accuracy=0.05
-    )
+    none = SimpleNamespace(models=None, band=lambda *_: None)
+    top, kept = loads._resonance(none, curve, marks, accuracy=0.05)
     assert size(top) == pytest.approx(given) and kept is band
 
 

@@ -4,6 +4,8 @@ its height is an estimate of an error.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ...errors import NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.peak import Peak, find_peak
@@ -21,6 +23,7 @@ def changed_peak(
     near: Solution,
     omega: float,
     tolerance: float,
+    fallbacks: bool = True,
 ) -> Peak | None:
     """The resonance of a model with the settings of another one; None where it was not solved.
 
@@ -28,6 +31,7 @@ def changed_peak(
         near: motion at the other's resonance, on the contacts of this model.
         omega: where the search begins [rad/s].
         tolerance: relative, of the height.
+        fallbacks: whether more is tried where Newton's method fails.
     """
     try:
         return find_peak(
@@ -37,7 +41,7 @@ def changed_peak(
             settings.samples,
             near=near,
             tolerance=tolerance,
-            options=CHANGED_OPTIONS,
+            options=replace(CHANGED_OPTIONS, fallbacks=fallbacks),
         )
     except NotSolvedError:
         return None

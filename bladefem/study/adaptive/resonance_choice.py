@@ -87,6 +87,8 @@ class PeakErrors:
     # relative fall of the height beside the peak by that change of frequency; left out where it is
     # not known
     fall: Mapping[str, float] = field(default_factory=dict, repr=False)
+    # those of harmonics and samples are what a march in time leaves (`choice_in_time`)
+    in_time: bool = False
 
     @property
     def total(self) -> float:
@@ -182,11 +184,13 @@ def peak_errors(
     better = {}
     fall = {}
     for name in DIRECTIONS:
-        other = None if name in exact else judge_settings(family, settings, name, point)
-        if other is None:
+        if name in exact:
             continue
         if name in known:
             heights[name], shifts[name] = known[name]
+            continue
+        other = judge_settings(family, settings, name, point)
+        if other is None:
             continue
         heights[name] = np.inf
         shifts[name] = np.inf
@@ -331,7 +335,7 @@ def choose_at_peak(
             break
         hard = far or 2 * peak.solution.states["lift"] >= len(peak.solution.w)
         first = _harmonics_first(errors, accuracy) if hard else ""
-        better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
+        better = next_settings_at_peak(family, settings, peak, errors, accuracy, fixed, first)
         if better is None:
             break
         base, point = _solution_ahead(family, settings, peak, errors, better)
@@ -470,7 +474,7 @@ def lifts_off_widely(settings: Settings, top: Solution) -> bool:
     return lifts and settings.harmonics == 1 and "harmonics" in settings.chosen
 
 
-def _next_settings(
+def next_settings_at_peak(
     family: Family,
     settings: Settings,
     peak: Peak,
@@ -498,7 +502,7 @@ def _next_settings(
             need = need**2
         for step in (need, 1.0):
             better = enriched_settings(settings, name, step)
-            if better is not None and not _too_large(
+            if better is not None and not too_large(
                 family, better, peak.solution, MAX_LIFTING_UNKNOWNS, LARGEST_BALANCE
             ):
                 return better
@@ -522,11 +526,11 @@ def compared_settings(
     4.1 % with 7.
     """
     limit = LIFTING_POINTS_JUDGE if name == "points" else LIFTING_JUDGE
-    if not _too_large(family, other, point, limit):
+    if not too_large(family, other, point, limit):
         return settings, other, 1.0
     if name == "points" and settings.points is not None:
         twice = replace(settings, points=2 * settings.points)
-        if not _too_large(family, twice, point, limit):
+        if not too_large(family, twice, point, limit):
             return settings, twice, 2.0
     respect = "points" if name == "harmonics" else "harmonics"
     here = getattr(settings, respect)
@@ -535,12 +539,12 @@ def compared_settings(
             continue
         reduced: dict[str, Any] = {respect: fewer}
         richer_one = replace(other, **reduced)
-        if not _too_large(family, richer_one, point, limit):
+        if not too_large(family, richer_one, point, limit):
             return replace(settings, **reduced), richer_one, 1.0
     return None
 
 
-def _too_large(
+def too_large(
     family: Family,
     settings: Settings,
     point: Solution,

@@ -23,6 +23,7 @@ from .check_points import (
     peak_of,
 )
 from .choice import Checked, covered_band, solver_options
+from .choice_in_time import March, choose_in_time, marched_widely
 from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
 from .resonance_choice import (
@@ -51,6 +52,7 @@ def resonance_curve(
     band: tuple[float, float] | None,
     mode: int,
     accuracy: float,
+    march: March | None = None,
 ) -> Checked:
     """A swept curve with settings that hold the height of its peak to half the accuracy.
 
@@ -63,6 +65,8 @@ def resonance_curve(
     Args:
         settings: where the choice begins, for example those of a neighbouring load.
         band: [Hz]; round the resonances when None.
+        march: what the blade keeps to after a motion, by which harmonics are chosen where most
+            contacts lift off; richer balances tell them when None.
 
     Raises:
         NotSolvedError: no point converged.
@@ -77,8 +81,9 @@ def resonance_curve(
     swept = settings, 1.0
     notes: list[str] = []
     for number in range(MAX_SWEEPS):
-        used, peak, errors = _chosen(family, used, top, accuracy, number == 0)
-        if number == 0 and _same_settings(used, settings):
+        used, peak, errors = _chosen(family, used, top, accuracy, number == 0, march)
+        in_time = marched_widely(march, used, top) if errors is None else errors.in_time
+        if number == 0 and not in_time and _same_settings(used, settings):
             used, peak, errors = _with_missed(family, used, points, top, accuracy, peak, errors)
         if swept[1] != accuracy or not _same_settings(swept[0], used):
             points = _swept(family, used, points, swept, band, mode, accuracy, notes)
@@ -90,7 +95,8 @@ def resonance_curve(
             return Checked(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
         found = _checked_flanks(family, used, points, top, errors)
-        significant = _checked_significant(family, used, points, top, accuracy)
+        # what harmonics leave out a march has told
+        significant = {} if in_time else _checked_significant(family, used, points, top, accuracy)
         found = significant | found
         missed = _harmonics_missed(used, points, top, significant, accuracy)
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
@@ -221,6 +227,7 @@ def _chosen(
     top: Solution,
     accuracy: float,
     lower: bool,
+    march: March | None = None,
 ) -> tuple[Settings, Peak | None, PeakErrors | None]:
     """Settings that hold at the peak next to a point; the same with an unknown error where that
     peak was not closed in.
@@ -230,6 +237,10 @@ def _chosen(
     """
     try:
         peak = peak_from(family, settings, top, settings, accuracy)
+        if march is not None and marched_widely(march, settings, peak.solution):
+            told = choose_in_time(family, settings, peak, accuracy, march, fixed=("modes",))
+            if told is not None:
+                return told
         enough = choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
         return cheaper_settings(family, *enough, accuracy) if lower else enough
     except NotSolvedError:

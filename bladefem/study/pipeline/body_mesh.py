@@ -145,7 +145,9 @@ def softened_change(
         mode: that is excited (1 = lowest).
     """
     model = family_member(softer.family(case), settings).model
-    peak = changed_peak(model, settings, top, top.omega * softer.ratio, PEAK_TOLERANCE)
+    # fallbacks for a damper that comes off take longer than the whole curve, mostly in vain
+    firm = 2 * top.states["lift"] < len(top.w)
+    peak = changed_peak(model, settings, top, top.omega * softer.ratio, PEAK_TOLERANCE, firm)
     if peak is not None:
         return abs(peak.height / size(top) - 1)
     if not top.states["lift"]:

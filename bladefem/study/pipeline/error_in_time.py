@@ -7,7 +7,7 @@ left out, and begins at the very motion that is judged (`bladefem.study.pipeline
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,13 +21,40 @@ from ...hbm.solver.newton import Newton
 from ...hbm.solver.residual import Balance, evaluate_balance
 from ...hbm.time_model import time_system
 from ..adaptive.choice import Checked
+from ..adaptive.choice_in_time import COVERED_IN_TIME, MarchedBand
 from ..adaptive.family import Family, Member, carried_displacements, family_member
 from ..adaptive.settings import Settings
 from .kept_band import KeptBand, affordable_march, band_by_steps
 from .stability import in_one_body, model_in_time
 
-# respects that a march leaves nothing of
-COVERED_IN_TIME = ("harmonics", "samples")
+# relative, of an error that was summed twice
+ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Marches:
+    """Marches by steps from motions of the models of one load case, each done once."""
+
+    models: Family
+    # settings less their error, circular frequency and amplitude of the motion to what was found
+    done: dict[tuple[Settings, float, float], KeptBand] = field(default_factory=dict)
+
+    def band(self, settings: Settings, point: Solution) -> KeptBand | None:
+        """What the blade keeps to after a motion; None where a march by steps is not affordable, or
+        an exact one is possible, which takes far longer.
+        """
+        key = replace(settings, error=None), point.omega, size(point)
+        if key not in self.done:
+            model = model_in_time(self.models, settings)
+            if not _marched_by_steps(model, point):
+                return None
+            self.done[key] = band_by_steps(model, point)
+        return self.done[key]
+
+    def __call__(self, settings: Settings, point: Solution) -> MarchedBand | None:
+        """The same for the choice of harmonics; None as well where the march came to no end."""
+        band = self.band(settings, point)
+        return None if band is None or band.reason else MarchedBand(band.lowest, band.highest)
 
 
 @dataclass(frozen=True)
@@ -42,10 +69,9 @@ class ErrorInTime:
 
 
 def error_in_time(
-    models: Family,
+    marches: Marches,
     curve: Checked,
     top: Solution,
-    kept: KeptBand | None,
     accuracy: float,
 ) -> ErrorInTime | None:
     """The error of a resonance by a march from it; None where that does not apply, is not possible,
@@ -56,26 +82,24 @@ def error_in_time(
 
     Args:
         top: the resonance, a point of the curve.
-        kept: what a march from the highest point has found.
     """
+    models = marches.models
     told = curve.settings.error
     if told is None or told <= accuracy or not top.states["lift"]:
         return None
     left = sum(change for name, change in curve.parts.items() if name not in COVERED_IN_TIME)
     known = bool(curve.parts) and np.isfinite(left)
     settings = curve.settings if known else _finer_settings(models, curve.settings)
-    if settings is None or not _marched_by_steps(model_in_time(models, settings), top):
+    if settings is None:
         return None
-    if known and kept is not None and kept.points is None and kept.frequency == top.frequency:
-        band = kept
-    else:
-        start = top if known else carried_motion(models, curve.settings, top, settings)
-        band = band_by_steps(model_in_time(models, settings), start)
-    if band.reason:
+    start = top if known else carried_motion(models, curve.settings, top, settings)
+    band = marches.band(settings, start)
+    if band is None or band.reason:
         return None
-    error = max(abs(size(top) / end - 1) for end in (band.lowest, band.highest))
+    error = MarchedBand(band.lowest, band.highest).farthest(size(top))
     error += left if known else 0.0
-    if error >= told:
+    # a march that the harmonics were chosen by tells the same
+    if error > told * (1 + ROUNDING):
         return None
     return ErrorInTime(error, band if known else replace(band, points=settings.points))
 

@@ -30,7 +30,7 @@ from ..adaptive.settings import Settings, restarted_settings
 from ..adaptive.stiff_layer import stiff_layer_change
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
-from .error_in_time import error_in_time
+from .error_in_time import Marches, error_in_time
 from .kept_band import KeptBand, kept_of_family
 from .liftoff import naming_the_load
 from .linear_limits import Limit
@@ -252,15 +252,17 @@ def curve_of(
     mode = scene.excitation.mode
     with naming_the_load(case, family_member(models, settings).model, mode, scene.excitation.force):
         start = restarted_settings(settings)
-        curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy)
+        marches = Marches(models)
+        march = marches if scene.study.stability else None
+        curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy, march)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
     marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
     if scene.study.stability:
         richer = richer_models(models, curve.settings)
         marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
-    top, kept = _resonance(models, curve, marks, scene.accuracy)
-    curve, estimated, in_time = _judged_in_time(scene, models, curve, top, kept)
+    top, kept = _resonance(marches, curve, marks, scene.accuracy)
+    curve, estimated, in_time = _judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -296,10 +298,9 @@ def curve_of(
 
 def _judged_in_time(
     scene: Scene,
-    models: Family,
+    marches: Marches,
     curve: Checked,
     top: Solution,
-    kept: KeptBand | None,
 ) -> tuple[Checked, RealArray, KeptBand | None]:
     """The curve with the error of its resonance by a march where that tells it, the estimated error
     of each point, and the march.
@@ -307,7 +308,7 @@ def _judged_in_time(
     estimated = estimated_errors(curve)
     if not scene.study.stability:
         return curve, estimated, None
-    judged = error_in_time(models, curve, top, kept, scene.accuracy)
+    judged = error_in_time(marches, curve, top, scene.accuracy)
     if judged is None:
         return curve, estimated, None
     estimated[[p is top for p in curve.points]] = judged.error
@@ -343,7 +344,7 @@ def _unseen_errors(
 
 
 def _resonance(
-    models: Family,
+    marches: Marches,
     curve: Checked,
     marks: Stability,
     accuracy: float,
@@ -358,7 +359,9 @@ def _resonance(
     unstable = {id(p) for p, v in zip(curve.points, marks.verdict, strict=True) if v == UNSTABLE}
     if id(highest) not in unstable:
         return highest, None
-    kept = kept_of_family(models, curve.settings, highest)
+    kept = marches.band(curve.settings, highest)
+    if kept is None:
+        kept = kept_of_family(marches.models, curve.settings, highest)
     lasting = [p for p in curve.points if p.converged and id(p) not in unstable]
     known = not (kept.reason or kept.holds(size(highest), accuracy))
     lower = max(lasting, key=size, default=highest)

@@ -1,0 +1,157 @@
+"""Harmonics chosen by a march in time, where most contacts lift off.
+
+Balances with more harmonics are often not solved there, or end on another motion of several, so
+that which of them is taken would hang on the last digit of a start: on the shipped wedge under 36 N
+564, 656 or 685 um. A march has no harmonics left out, and begins at the very motion that is judged:
+harmonics are enough once the blade, marched from the resonance of a balance, keeps its amplitude.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from ...errors import NotSolvedError
+from ...hbm.peak import Peak
+from ...hbm.solution import Solution, size
+from .family import Family
+from .resonance_choice import (
+    LARGEST_BALANCE,
+    MAX_ENRICHMENTS,
+    MAX_LIFTING_UNKNOWNS,
+    PeakErrors,
+    next_settings_at_peak,
+    peak_errors,
+    peak_from,
+    too_large,
+)
+from .settings import Settings, enriched_settings
+
+# respects that a march leaves nothing of
+COVERED_IN_TIME = ("harmonics", "samples")
+
+
+@dataclass(frozen=True)
+class MarchedBand:
+    """Amplitudes of single periods [m] between which a blade keeps."""
+
+    lowest: float
+    highest: float
+
+    def beyond(self, amplitude: float) -> float:
+        """How far an amplitude lies outside of the band, over its nearer end: what another balance
+        could better. None does inside, where the motion is no periodic one.
+        """
+        return max(amplitude / self.highest - 1, 1 - amplitude / self.lowest, 0.0)
+
+    def farthest(self, amplitude: float) -> float:
+        """How far an amplitude lies from the end that is farther from it, over that end."""
+        return max(abs(amplitude / end - 1) for end in (self.lowest, self.highest))
+
+
+# what the blade keeps to after a motion of some settings; None where that is not marched
+March: TypeAlias = Callable[[Settings, Solution], MarchedBand | None]
+
+
+def marched_widely(march: March | None, settings: Settings, top: Solution) -> bool:
+    """At least half of the contacts lift off at the resonance, and a march may judge that."""
+    lifts = 2 * top.states["lift"] >= len(top.w)
+    return march is not None and lifts and not settings.softened
+
+
+def choose_in_time(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+    march: March,
+    fixed: tuple[str, ...] = (),
+) -> tuple[Settings, Peak, PeakErrors] | None:
+    """Settings at whose peak the blade keeps the amplitude of the balance, or the nearest to it;
+    the peak with them, and its errors. None where a march is not possible.
+
+    Richer models judge the other respects; one is made richer where they change the peak by more
+    than the accuracy together.
+
+    Args:
+        peak: found with `settings`.
+        fixed: names that may not be changed here although they are not the user's.
+    """
+    found: tuple[Settings, Peak, PeakErrors] | None = None
+    for _ in range(MAX_ENRICHMENTS):
+        climbed = _with_enough_harmonics(family, settings, peak, accuracy, march)
+        if climbed is None:
+            break
+        settings, peak, left_out = climbed
+        errors = _with_left_out(family, settings, peak, accuracy, left_out)
+        found = replace(settings, error=errors.total), peak, errors
+        needs = {n: need for n, need in errors.needs.items() if n not in COVERED_IN_TIME}
+        if sum(needs.values()) <= accuracy:
+            break
+        held = (*fixed, *COVERED_IN_TIME)
+        better = next_settings_at_peak(family, settings, peak, errors, accuracy, held)
+        if better is None:
+            break
+        try:
+            peak = peak_from(family, settings, peak.solution, better, accuracy, fallbacks=False)
+        except NotSolvedError:
+            break
+        settings = better
+    return found
+
+
+def _with_left_out(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+    left_out: float,
+) -> PeakErrors:
+    """The errors of a peak by richer models, and what harmonics and samples leave out."""
+    known = {name: (0.0, 0.0) for name in COVERED_IN_TIME} | {"harmonics": (left_out, 0.0)}
+    return replace(peak_errors(family, settings, peak, accuracy, known), in_time=True)
+
+
+def _with_enough_harmonics(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+    march: March,
+) -> tuple[Settings, Peak, float] | None:
+    """More and more harmonics, until the blade keeps within the accuracy of the peak, or the next
+    ones lead no nearer; what is left out then. None where the first peak is not marched.
+    """
+    band = march(settings, peak.solution)
+    if band is None:
+        return None
+    best = settings, peak, band
+    while band.beyond(size(peak.solution)) > accuracy:
+        richer = _more_harmonics(family, settings, peak)
+        if richer is None:
+            break
+        try:
+            peak = peak_from(family, settings, peak.solution, richer, accuracy, fallbacks=False)
+        except NotSolvedError:
+            break
+        settings = richer
+        further = march(settings, peak.solution)
+        known = best[2].beyond(size(best[1].solution))
+        if further is None or further.beyond(size(peak.solution)) >= known:
+            break
+        band = further
+        best = settings, peak, band
+    settings, peak, band = best
+    return settings, peak, band.farthest(size(peak.solution))
+
+
+def _more_harmonics(family: Family, settings: Settings, peak: Peak) -> Settings | None:
+    """One step more; None where they are the user's, or the balance would be too large."""
+    if "harmonics" not in settings.chosen:
+        return None
+    richer = enriched_settings(settings, "harmonics")
+    if richer is None:
+        return None
+    limits = MAX_LIFTING_UNKNOWNS, LARGEST_BALANCE
+    return None if too_large(family, richer, peak.solution, *limits) else richer

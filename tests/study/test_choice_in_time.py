@@ -1,0 +1,128 @@
+"""Harmonics chosen by a march in time: enough once the blade keeps the amplitude of the balance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_error_in_time import hopping
+
+from bladefem.errors import NotSolvedError
+from bladefem.hbm.peak import find_peak
+from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solve import solve
+from bladefem.study.adaptive import choice_in_time
+from bladefem.study.adaptive.choice_in_time import MarchedBand, choose_in_time, marched_widely
+from bladefem.study.adaptive.family import Family, Member, family_of
+from bladefem.study.adaptive.resonance_choice import PeakErrors
+from bladefem.study.adaptive.resonance_curve import resonance_curve
+from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline.error_in_time import Marches
+
+ACCURACY = 0.05
+
+
+@dataclass(frozen=True)
+class KnownPeak:
+    """A peak whose height is known, without a solve."""
+
+    height: float
+
+    @property
+    def solution(self):
+        """With a height that `bladefem.hbm.solution.size` reads."""
+        lines = np.zeros((4, 1), complex)
+        lines[1] = self.height
+        states = {"stick": 0, "slip": 0, "lift": 16, "open": 0}
+        return SimpleNamespace(probe=lines, states=states, w=np.zeros((16, 3, 7)))
+
+
+@pytest.fixture
+def chosen(monkeypatch):
+    """The choice among peaks with known heights by harmonics, and what was asked for."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    start = replace(first_for(family.modes), harmonics=3, points=8)
+    asked = []
+
+    def choice(heights, band, points=0.0):
+        def known(family, old, point, new, accuracy, fallbacks=True):
+            asked.append(new)
+            if new.harmonics not in heights:
+                raise NotSolvedError("too rich")
+            return KnownPeak(heights[new.harmonics])
+
+        def errors(family, settings, peak, accuracy, known):
+            changes = {name: change for name, (change, _) in known.items()}
+            changes["points"] = points if settings.points == 8 else 0.0
+            return PeakErrors(changes, dict.fromkeys(changes, 0.0))
+
+        monkeypatch.setattr(choice_in_time, "peak_from", known)
+        monkeypatch.setattr(choice_in_time, "peak_errors", errors)
+        march = lambda settings, point: band
+        return choose_in_time(family, start, KnownPeak(heights[3]), ACCURACY, march), asked
+
+    return choice
+
+
+def test_harmonics_are_added_until_the_blade_keeps_the_amplitude(chosen):
+    """36 N on the shipped wedge: with three harmonics 564 um, marched 619; with seven 655, 661."""
+    (settings, peak, errors), _ = chosen({3: 0.56, 7: 0.65, 15: 0.66}, MarchedBand(0.66, 0.67))
+    assert settings.harmonics == 7 and peak.height == 0.65
+    assert errors.in_time and errors.height["harmonics"] == pytest.approx(1 - 0.65 / 0.67)
+    assert settings.error == pytest.approx(1 - 0.65 / 0.67)
+
+
+def test_no_balance_betters_an_amplitude_inside_the_band(chosen):
+    (settings, _, errors), asked = chosen({3: 1.38, 7: 1.3}, MarchedBand(1.24, 1.43))
+    assert settings.harmonics == 3 and not asked
+    assert errors.height["harmonics"] == pytest.approx(1.38 / 1.24 - 1)
+
+
+@pytest.mark.parametrize("heights", [{3: 0.56}, {3: 0.56, 7: 0.5}])
+def test_the_nearest_peak_is_kept_where_more_harmonics_fail_or_lead_away(heights, chosen):
+    (settings, peak, errors), _ = chosen(heights, MarchedBand(0.66, 0.67))
+    assert settings.harmonics == 3 and peak.height == 0.56
+    assert errors.height["harmonics"] == pytest.approx(1 - 0.56 / 0.67)
+
+
+@pytest.mark.parametrize(("change", "points"), [(0.04, 8), (0.06, 16)])
+def test_contact_points_are_added_beyond_the_accuracy(change, points, chosen):
+    heights = {3: 0.66}
+    (settings, _, _), _ = chosen(heights, MarchedBand(0.66, 0.67), change)
+    assert settings.points == points and settings.harmonics == 3
+
+
+def test_without_a_march_others_choose(chosen):
+    assert chosen({3: 0.56}, None)[0] is None
+
+
+def test_where_less_than_half_lifts_off_no_march_is_asked_for():
+    settings = replace(first_for(4), harmonics=3)
+    top = KnownPeak(1.0).solution
+    march = lambda settings, point: None
+    assert marched_widely(march, settings, top)
+    assert not marched_widely(None, settings, top)
+    assert not marched_widely(march, replace(settings, softened=True), top)
+    top.states["lift"] = 7
+    assert not marched_widely(march, settings, top)
+
+
+def test_a_curve_of_a_mass_that_hops_has_the_error_of_its_march():
+    """Against a balance of 31 harmonics at the frequency of its peak."""
+    model = hopping()
+    family = Family(lambda s: Member(model, np.arange(1)), 3)
+    chosen = ("harmonics", "samples")
+    start = replace(first_for(3), harmonics=1, points=None, chosen=chosen)
+    band = 0.8 / (2 * np.pi), 1.4 / (2 * np.pi)
+    marches = Marches(family)
+    found = resonance_curve(family, start, band, 1, ACCURACY, marches)
+    top = max((p for p in found.points if p.converged), key=lambda p: abs(p.probe[1, 0]))
+    assert top.states["lift"] == 1 and marches.done
+    truth = solve(model, top.omega, 31, 512, start=top)
+    off = abs(abs(top.probe[1, 0]) / abs(truth.probe[1, 0]) - 1)
+    assert found.parts["samples"] == 0.0
+    assert off - 2e-3 <= found.settings.error <= ACCURACY
+    best = find_peak(model, top.omega, 31, 512, near=truth)
+    assert abs(best.height / abs(top.probe[1, 0]) - 1) <= ACCURACY
