@@ -12,6 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+import numpy as np
+
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution, size
@@ -21,7 +23,6 @@ from .resonance_choice import (
     MAX_ENRICHMENTS,
     MAX_LIFTING_UNKNOWNS,
     PeakErrors,
-    next_settings_at_peak,
     peak_errors,
     peak_from,
     too_large,
@@ -90,7 +91,7 @@ def choose_in_time(
         if sum(needs.values()) <= accuracy:
             break
         held = (*fixed, *COVERED_IN_TIME)
-        better = next_settings_at_peak(family, settings, peak, errors, accuracy, held)
+        better = _richer_in_the_worst(family, settings, peak, errors, held)
         if better is None:
             break
         try:
@@ -128,7 +129,7 @@ def _with_enough_harmonics(
         return None
     best = settings, peak, band
     while band.beyond(size(peak.solution)) > accuracy:
-        richer = _more_harmonics(family, settings, peak)
+        richer = _one_step_richer(family, settings, peak, "harmonics")
         if richer is None:
             break
         try:
@@ -146,11 +147,33 @@ def _with_enough_harmonics(
     return settings, peak, band.farthest(size(peak.solution))
 
 
-def _more_harmonics(family: Family, settings: Settings, peak: Peak) -> Settings | None:
-    """One step more; None where they are the user's, or the balance would be too large."""
-    if "harmonics" not in settings.chosen:
-        return None
-    richer = enriched_settings(settings, "harmonics")
+def _richer_in_the_worst(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    errors: PeakErrors,
+    held: tuple[str, ...],
+) -> Settings | None:
+    """One step richer in the respect that is worst of those that are not held, since a march with
+    several steps more contact points takes too long; None where nothing helps.
+    """
+    needs = errors.needs
+    names = [name for name in needs if name not in held and np.isfinite(needs[name])]
+    for name in sorted(names, key=lambda name: -needs[name]):
+        richer = _one_step_richer(family, settings, peak, name)
+        if richer is not None and needs[name] > 0:
+            return richer
+    return None
+
+
+def _one_step_richer(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    name: str,
+) -> Settings | None:
+    """None where that is the user's, or the balance would be too large."""
+    richer = enriched_settings(settings, name, 1.0) if name in settings.chosen else None
     if richer is None:
         return None
     limits = MAX_LIFTING_UNKNOWNS, LARGEST_BALANCE

@@ -335,7 +335,7 @@ def choose_at_peak(
             break
         hard = far or 2 * peak.solution.states["lift"] >= len(peak.solution.w)
         first = _harmonics_first(errors, accuracy) if hard else ""
-        better = next_settings_at_peak(family, settings, peak, errors, accuracy, fixed, first)
+        better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
         if better is None:
             break
         base, point = _solution_ahead(family, settings, peak, errors, better)
@@ -474,7 +474,7 @@ def lifts_off_widely(settings: Settings, top: Solution) -> bool:
     return lifts and settings.harmonics == 1 and "harmonics" in settings.chosen
 
 
-def next_settings_at_peak(
+def _next_settings(
     family: Family,
     settings: Settings,
     peak: Peak,

@@ -35,7 +35,7 @@ SAMPLES_PER_PERIOD = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
 # the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
-# 200 periods, take 11 s
+# 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N
 MAX_MARCH = 1e11
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
