@@ -189,5 +189,7 @@ def test_the_step_as_merit_comes_after_the_residual_from_every_start():
     residual_first = [(0, "residual"), (1, "residual")]
     assert order(False, True) == [*residual_first, (0, "step"), (1, "step")]
     assert order(False, False) == residual_first
+    alone = [merit for _, _, merit in fallback._merits_in_order(starts[:1], False, False)]
+    assert alone == ["residual", "step"]
     by_start = [(0, "step"), (0, "residual"), (1, "step"), (1, "residual")]
     assert order(True, True) == order(True, False) == by_start

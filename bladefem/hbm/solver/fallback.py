@@ -4,7 +4,7 @@
    residual. Small models of 1-D elements, which have a compiled loop for it, take both from each
    start, the step first; elsewhere the residual is cheaper, and on 3-D patches that lift off it
    converges where the step stalls (wedge of 96 nodes at 60 and 90 N: half the time): it is tried
-   from all starts first, alone where no fallbacks are wanted;
+   from all starts first, alone where one is given and no fallbacks are wanted;
 2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at
    the limit of stick, and there may be no exact zero; the solution then says how many samples it
    has;
@@ -86,8 +86,8 @@ def _newton_attempts(
     """Newton from the given start and from full stick, with each merit function.
 
     Where the loop is not compiled the residual comes first from all starts, and the step only
-    where fallbacks are wanted at all: on the shipped wedge under 18 and 36 N it solved 12 of 300
-    points after the residual, and took a third of the time.
+    where there is no start but full stick, or fallbacks are wanted: on the shipped wedge under 18
+    and 36 N it solved 12 of 300 points after the residual, and took a third of the time.
     """
     starts = [w for w in (start, start_in_stick(balance)) if w is not None]
     for w, method, merit in _merits_in_order(starts, runs_compiled(balance), options.fallbacks):
@@ -104,7 +104,7 @@ def _merits_in_order(
         for w in starts:
             yield from ((w, method, merit) for method, merit in NEWTON_MERITS)
         return
-    merits = NEWTON_MERITS[::-1] if fallbacks else NEWTON_MERITS[1:]
+    merits = NEWTON_MERITS[::-1] if fallbacks or len(starts) == 1 else NEWTON_MERITS[1:]
     for method, merit in merits:
         yield from ((w, method, merit) for w in starts)
 
