@@ -22,8 +22,14 @@ from ..errors import InputError, NotSolvedError
 from ..util.progress import Progress, without_progress
 from . import cyclic_schur as core
 from .body import Body
-from .compat import MPI
-from .constraint import Constrained, Transformation, at_diameter, high_part, transformation
+from .constraint import (
+    Constrained,
+    Transformation,
+    at_diameter,
+    checked_diameter,
+    high_part,
+    transformation,
+)
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
 from .linalg import (
@@ -82,13 +88,23 @@ class _Space:
 class Eigenpairs:
     """Modes of one nodal diameter as this rank's unknowns."""
 
-    con: Constrained
+    t: Transformation
+    nodal_diameter: int
     # (m,) [rad^2/s^2], ascending
     lam: np.ndarray
     # (n_own, m) M-orthonormal
     X: np.ndarray
     # the factorisation that they came from; None where nobody needs it again
     flex: Flexibility | None = None
+
+    @property
+    def con(self) -> Constrained:
+        """The body in this nodal diameter, made anew where the factorisation is gone: the maps of
+        all nodal diameters would fill a twentieth of the memory.
+        """
+        if self.flex is not None:
+            return self.flex.con
+        return at_diameter(self.t, self.nodal_diameter)
 
 
 @dataclass(frozen=True)
@@ -140,7 +156,7 @@ def all_diameters(
     steps = progress(
         eigenpairs(t, solved, wanted, direct, tolerance, solver), "nodal diameters", len(wanted)
     )
-    found = {p.con.nodal_diameter: p if kept is not None else _bare(p, count) for p in steps}
+    found = {p.nodal_diameter: p if kept is not None else _bare(p, count) for p in steps}
     if prove:
         if isinstance(body, Body) and kept is None and t.opened is not None:
             # nobody else has them: the count takes their memory
@@ -167,15 +183,14 @@ def eigenpairs(
     """``count`` pairs and some guards in each nodal diameter, in the order in which they are
     solved.
     """
-    cons = {n: at_diameter(t, n) for n in diameters}
-    order = _diameter_order(sorted(cons))
+    order = _diameter_order(sorted(checked_diameter(n, t.sectors) for n in set(diameters)))
     guessed = len(order) > SOLVED_DIAMETERS_BY_LEVEL[0] and not direct
     scratch = order[: SOLVED_DIAMETERS_BY_LEVEL[0]] if guessed else order
     blocks: list[np.ndarray] = []
     guard = EXTRA_ROUGH_MODES if guessed else GUARD_MODES
     for first in range(0, len(scratch), DIAMETERS_AT_A_TIME):
-        some = [cons[n] for n in scratch[first : first + DIAMETERS_AT_A_TIME]]
-        together = _solve_together(some, count, tolerance, guard, solver)
+        some = scratch[first : first + DIAMETERS_AT_A_TIME]
+        together = _solve_together(t, some, count, tolerance, guard, solver)
         while together:
             found = together.pop(0)
             if guessed:
@@ -183,25 +198,44 @@ def eigenpairs(
             yield _first_pairs(found, count, guessed)
             # its factor and vectors are not kept while others are solved
             del found
+    yield from _guessed_pairs(t, count, order[len(scratch) :], blocks, tolerance, solver)
+
+
+def _guessed_pairs(
+    t: Transformation,
+    count: int,
+    diameters: list[int],
+    blocks: list[np.ndarray],
+    tolerance: float,
+    solver: Eigensolver,
+) -> Iterator[Eigenpairs]:
+    """Nodal diameters from the space that the vectors of those before them span.
+
+    Args:
+        blocks: (n_own, k) vectors of the nodal diameters solved from scratch, which are taken out.
+    """
     space = None
     # real and imaginary part of each vector
     room = 2 * SOLVED_DIAMETERS_BY_LEVEL[-1] * (count + EXTRA_ROUGH_MODES)
-    for i, n in enumerate(order[len(scratch) :], len(scratch)):
+    starts: dict[int, np.ndarray] = {}
+    for i, n in enumerate(diameters, SOLVED_DIAMETERS_BY_LEVEL[0]):
+        helps = i < SOLVED_DIAMETERS_BY_LEVEL[-1]
         if i in SOLVED_DIAMETERS_BY_LEVEL:
             give_back()
             space = _extend_space(t, blocks, space, room)
+            some = [n] if helps else diameters[i - SOLVED_DIAMETERS_BY_LEVEL[0] :]
+            # the last ones need a step or two: guards would not pay
+            guess = count + (GUARD_MODES if helps else 0)
+            starts = {m: _initial_vectors(space, t, m, guess) for m in some}
+            # no more guesses: they are smaller than the space
+            space = space if helps else None
         # what the last one took would stay with it, in pieces that do not fit
         give_back()
-        # always so: the first of the levels comes first
-        assert space is not None
-        helps = i < SOLVED_DIAMETERS_BY_LEVEL[-1]
-        # the last ones need a step or two: guards would not pay
-        guess = count + (GUARD_MODES if helps else 0)
-        start = _initial_vectors(space, cons[n], 2 * np.pi * n / t.sectors, guess)
         found = _solve_pairs(
-            flexible(cons[n]),
+            t,
+            n,
             count,
-            start,
+            starts.pop(n),
             solver,
             tolerance,
             EXTRA_ROUGH_MODES if helps else GUARD_MODES,
@@ -209,20 +243,24 @@ def eigenpairs(
         if helps:
             blocks.append(found.X)
         yield _first_pairs(found, count, helps)
-        del found, start
+        del found
 
 
 def _solve_together(
-    cons: list[Constrained],
+    t: Transformation,
+    diameters: list[int],
     count: int,
     tolerance: float,
     guard: int,
     solver: Eigensolver,
 ) -> list[Eigenpairs]:
     """A few nodal diameters from scratch."""
-    some = [flexible(con) for con in cons]
+    some = [flexible(at_diameter(t, n)) for n in diameters]
     solved = pairs_together(some, count, tolerance, guard, solver)
-    return [Eigenpairs(flex.con, lam, X, flex) for flex, (lam, X) in zip(some, solved, strict=True)]
+    return [
+        Eigenpairs(t, n, lam, X, flex)
+        for n, flex, (lam, X) in zip(diameters, some, solved, strict=True)
+    ]
 
 
 def _bare(found: Eigenpairs, count: int) -> Eigenpairs:
@@ -271,16 +309,18 @@ def _diameter_order(order: list[int]) -> list[int]:
 
 
 def _solve_pairs(
-    flex: Flexibility,
+    t: Transformation,
+    nodal_diameter: int,
     count: int,
     start: np.ndarray | None,
     solver: Eigensolver,
     tolerance: float = VECTOR_TOLERANCE,
     guard: int = GUARD_MODES,
 ) -> Eigenpairs:
+    flex = flexible(at_diameter(t, nodal_diameter))
     guard = min(guard, flex.con.T.shape[1] - count)
     lam, X = lowest_pairs(flex, count, tolerance, start, guard, solver)
-    return Eigenpairs(flex.con, lam, X, flex)
+    return Eigenpairs(t, nodal_diameter, lam, X, flex)
 
 
 def _extend_space(
@@ -330,15 +370,17 @@ def _append_columns(
 
 def _initial_vectors(
     space: _Space,
-    con: Constrained,
-    angle: float,
+    t: Transformation,
+    nodal_diameter: int,
     count: int,
 ) -> np.ndarray:
-    """(n_own, count) lowest vectors of the projected pencil."""
-    Z = _projected_modes(space.K, space.M, angle, count)
-    if con.dtype is not complex:
-        return linear_combinations(space.W, Z.real)
-    out = np.empty((len(space.W), count), complex, order="F")
+    """(n_own, count) lowest vectors of the projected pencil, in single precision: the space is
+    wrong by more, and those of all nodal diameters wait side by side.
+    """
+    Z = _projected_modes(space.K, space.M, 2 * np.pi * nodal_diameter / t.sectors, count)
+    if 2 * nodal_diameter % t.sectors == 0:
+        return np.asarray(linear_combinations(space.W, Z.real), np.float32)
+    out = np.empty((len(space.W), count), np.complex64, order="F")
     out.real, out.imag = linear_combinations(space.W, Z.real), linear_combinations(space.W, Z.imag)
     return out
 
@@ -444,9 +486,9 @@ def _check_inertia(
     """Compare counts with inertia at one shift; a diameter that lost a mode is solved from
     scratch.
     """
-    lost = lost_modes(t, {n: p.con for n, p in found.items()}, _list_eigenvalues(found), count)
+    lost = lost_modes(t, _list_eigenvalues(found), count)
     for n in lost:
-        found[n] = found_again(flexible(found[n].con), count, lost[n], tolerance)
+        found[n] = found_again(t, n, count, lost[n], tolerance)
     return found
 
 
@@ -466,7 +508,6 @@ class Count:
 
 def lost_modes(
     t: Transformation,
-    cons: dict[int, Constrained],
     lam: dict[int, np.ndarray],
     count: int,
 ) -> dict[int, Count]:
@@ -479,19 +520,20 @@ def lost_modes(
         # rigid motions alone, which geometry counts
         return {}
     shared = _shifted_core(t, shift)
-    exact = _counts_below(cons, shift, shared, t.body.comm)
+    exact = _counts_below(t, list(lam), shift, shared)
     del shared
     give_back()
     # guards beyond the count have not converged, and may be anywhere
     return {
         n: Count(shift, exact[n])
-        for n in cons
+        for n in lam
         if exact[n] != np.count_nonzero(lam[n][:count] < shift)
     }
 
 
 def found_again(
-    flex: Flexibility,
+    t: Transformation,
+    nodal_diameter: int,
     count: int,
     truth: Count,
     tolerance: float = VECTOR_TOLERANCE,
@@ -502,11 +544,11 @@ def found_again(
         NotSolvedError: the numbers differ even so.
     """
     enough = max(count, truth.exact + 1)
-    p = _solve_pairs(flex, enough, None, BLOCKS, tolerance)
+    p = _solve_pairs(t, nodal_diameter, enough, None, BLOCKS, tolerance)
     found = np.count_nonzero(p.lam[:enough] < truth.shift)
     if found != truth.exact:
         raise NotSolvedError(
-            f"nodal diameter {flex.con.nodal_diameter}: {found} modes were found below "
+            f"nodal diameter {nodal_diameter}: {found} modes were found below "
             f"{np.sqrt(truth.shift) / (2 * np.pi):.6g} Hz, the inertia counts {truth.exact}"
         )
     return p
@@ -521,24 +563,25 @@ def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
 
 
 def _counts_below(
-    cons: dict[int, Constrained],
+    t: Transformation,
+    diameters: list[int],
     shift: float,
     shared: core.Core | None,
-    comm: MPI.Comm,
 ) -> dict[int, int]:
     """Eigenvalues below the shift in each nodal diameter (collective).
 
     Raises:
         NotSolvedError: the shift is an eigenvalue, on all ranks where it is on one.
     """
+    comm = t.body.comm
     if shared is None:
-        return {n: _count_below(con, shift, None) for n, con in cons.items()}
+        return {n: _count_below(at_diameter(t, n), shift, None) for n in diameters}
     # all ranks have the whole cut faces: each counts some of the nodal diameters
     found: dict[int, int] = {}
     error = None
     try:
-        for n in list(cons)[comm.rank :: comm.size]:
-            found[n] = _count_below(cons[n], shift, shared)
+        for n in diameters[comm.rank :: comm.size]:
+            found[n] = _count_below(at_diameter(t, n), shift, shared)
     except NotSolvedError as problem:
         error = problem
     counts: dict[int, int] = {}

@@ -51,6 +51,30 @@ except (ImportError, AttributeError, RuntimeError) as error:
 
 sys.setdlopenflags = _setdlopenflags
 
+# from this size on a block of memory goes back to the system when it is freed [bytes]: smaller ones
+# come and go so often that new pages would cost more than they spare
+LARGE_BLOCK = 12_000_000
+# options of GNU's mallopt
+TRIM_THRESHOLD, MMAP_THRESHOLD, MMAP_MAX = -1, -3, -4
+MOST_BLOCKS = 65_536
+
+
+def return_large_blocks() -> None:
+    """Have the C library return large blocks that are freed to the system.
+
+    MPI turns that off as it starts. What is freed would then stay in pieces between other blocks,
+    into which nothing large fits.
+    """
+    # GNU only
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
+    if mallopt is not None:
+        mallopt(MMAP_MAX, MOST_BLOCKS)
+        mallopt(MMAP_THRESHOLD, LARGE_BLOCK)
+        mallopt(TRIM_THRESHOLD, LARGE_BLOCK)
+
+
+return_large_blocks()
+
 # meshio's word: dolfinx's cell, degree
 CELLS = {
     "triangle": ("triangle", 1),

@@ -160,7 +160,7 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
         if t.high is not None:
             raise InputError("nodal_diameter is None, expected a number: the body has cyclic faces")
         return Constrained(t.body, t.low, own, t.K[0], lambda: t.M[0], None)
-    n = _checked_diameter(nodal_diameter, t.sectors)
+    n = checked_diameter(nodal_diameter, t.sectors)
     angle = 2 * np.pi * n / t.sectors
     real = 2 * n % t.sectors == 0
     phase = np.exp(1j * angle) if not real else 1.0 if n == 0 else -1.0
@@ -245,7 +245,12 @@ def expand_to_mesh(con: Constrained, x: np.ndarray) -> np.ndarray:
     return (con.T @ unknowns(con, x)).reshape(len(con.body.mesh.points), con.body.dim, -1)
 
 
-def _checked_diameter(n: int, sectors: int) -> int:
+def checked_diameter(n: int, sectors: int) -> int:
+    """The nodal diameter as a whole number.
+
+    Raises:
+        InputError: the wheel does not have it.
+    """
     if sectors < 1:
         raise InputError("nodal_diameter is set, expected None: the mesh has no cyclic faces")
     if n != int(n) or not 0 <= n <= sectors // 2:

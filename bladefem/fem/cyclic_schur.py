@@ -32,8 +32,9 @@ from .separators import (
 )
 from .subdomains import SharedBoundary, back_to_ranks, own_part
 
-# complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products
-COLUMNS_PER_SOLVE = 32
+# complex columns a solve: from 32 real ones on MUMPS runs at the speed of matrix products, and each
+# takes five times its memory
+COLUMNS_PER_SOLVE = 16
 
 
 @dataclass(frozen=True)

@@ -76,7 +76,7 @@ def lowest_eigenpairs(
         NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
     """
     space = _Space()
-    block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
+    block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype, copy=False))
     for _ in range(MAX_STEPS):
         _extend_basis(con, space, block, Mblock, inverse(Mblock))
         theta, S = eigh(space.H)

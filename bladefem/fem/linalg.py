@@ -66,6 +66,10 @@ class Folded:
         return np.arange(len(self.shared.inside), self.A.shape[0])
 
 
+# of a product with a folded matrix at a time: whole, the blocks on its way would be the peak of
+# memory
+COLUMNS_AT_A_TIME = 8
+
 Matrix: TypeAlias = PETSc.Mat | Doubled | Folded
 Block: TypeAlias = np.ndarray | list[np.ndarray]
 
@@ -159,17 +163,29 @@ def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]
 def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
     """A X for a block of vectors (n_own, k)."""
     if isinstance(A, Folded):
-        open_values = A.C @ (X if A.shared is None else whole_part(A.shared, X))
-        if A.nodal is None:
-            image = interior.real_times_complex(A.A, open_values)
-        else:
-            by_node = open_values.reshape(A.nodal.shape[0], -1)
-            image = interior.real_times_complex(A.nodal, by_node).reshape(open_values.shape)
-        product = np.asfortranarray(A.C.conj().T @ image)
-        return product if A.shared is None else sum_of_parts(A.shared, product)
+        if A.shared is not None:
+            return sum_of_parts(A.shared, _folded_product(A, whole_part(A.shared, X)))
+        if X.shape[1] <= COLUMNS_AT_A_TIME:
+            return _folded_product(A, X)
+        out = np.empty(X.shape, np.result_type(X, A.C.dtype), order="F")
+        for first in range(0, X.shape[1], COLUMNS_AT_A_TIME):
+            part = slice(first, first + COLUMNS_AT_A_TIME)
+            out[:, part] = _folded_product(A, X[:, part])
+        return out
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
     return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)
+
+
+def _folded_product(A: Folded, X: np.ndarray) -> np.ndarray:
+    """C^H A C X for unknowns (n_free, k) of one rank's part."""
+    open_values = A.C @ X
+    if A.nodal is None:
+        image = interior.real_times_complex(A.A, open_values)
+    else:
+        by_node = open_values.reshape(A.nodal.shape[0], -1)
+        image = interior.real_times_complex(A.nodal, by_node).reshape(open_values.shape)
+    return np.asfortranarray(A.C.conj().T @ image)
 
 
 def combined(

@@ -125,20 +125,12 @@ def port_models(
         for n in diameters:
             yield n, _port_model(model, kept.pairs.pop(n))
         return
-    cons = {}
     lam = {}
     for p in eigenpairs(t, count, diameters, tolerance=DIRECTION_TOLERANCE, solver=solver):
-        diameter = p.con.nodal_diameter
-        # None is for bodies without cyclic faces only
-        assert diameter is not None
-        cons[diameter] = p.con
-        lam[diameter] = p.lam
-        yield diameter, _port_model(model, p)
-    for n, truth in lost_modes(t, cons, lam, count).items():
-        yield (
-            n,
-            _port_model(model, found_again(flexible(cons[n]), count, truth, DIRECTION_TOLERANCE)),
-        )
+        lam[p.nodal_diameter] = p.lam
+        yield p.nodal_diameter, _port_model(model, p)
+    for n, truth in lost_modes(t, lam, count).items():
+        yield n, _port_model(model, found_again(t, n, count, truth, DIRECTION_TOLERANCE))
 
 
 @dataclass(frozen=True)

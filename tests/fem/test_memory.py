@@ -1,5 +1,9 @@
 """The estimate of memory and its refusal."""
 
+import ctypes
+import resource
+from pathlib import Path
+
 import numpy as np
 import pytest
 from structured import box, sector
@@ -8,7 +12,7 @@ from bladefem.errors import InputError
 from bladefem.fem import memory
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
-from bladefem.fem.compat import MPI
+from bladefem.fem.compat import LARGE_BLOCK, MPI
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.memory import (
@@ -107,3 +111,25 @@ def test_a_run_says_that_factors_are_on_disk(monkeypatch, tmp_path):
     assert not bodies.storage_remarks
     assert bodies.still_blade.plan.on_disk
     assert str(tmp_path) in bodies.storage_remarks[0]
+
+
+def resident() -> int:
+    """Memory of this process in the machine [bytes]."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no /proc")
+def test_large_blocks_go_back_to_the_system():
+    """Those below another one that is still there, too, which MPI's settings keep."""
+    library = ctypes.CDLL(None)
+    library.malloc.restype = ctypes.c_void_p
+    library.malloc.argtypes = [ctypes.c_size_t]
+    library.free.argtypes = [ctypes.c_void_p]
+    before = resident()
+    large = library.malloc(4 * LARGE_BLOCK)
+    ctypes.memset(large, 1, 4 * LARGE_BLOCK)
+    above = library.malloc(1000)
+    assert resident() - before > 3.9 * LARGE_BLOCK
+    library.free(large)
+    assert resident() - before < LARGE_BLOCK
+    library.free(above)

@@ -10,7 +10,8 @@ from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem import all_diameters as wheel
 from bladefem.fem.all_diameters import all_diameters, eigenpairs
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import transformation
+from bladefem.fem.constraint import at_diameter, transformation
+from bladefem.fem.linalg import COLUMNS_AT_A_TIME, apply_block
 from bladefem.fem.modes import count_below
 from bladefem.scene.tables import Material
 
@@ -79,6 +80,38 @@ def test_factors_of_cut_faces_go_with_their_diameter(monkeypatch):
     assert all(counted[0]) and not any(counted[1])
     for one, other in zip(a, b, strict=True):
         np.testing.assert_allclose(one.frequencies, other.frequencies, rtol=1e-9)
+
+
+def test_products_a_few_columns_at_a_time():
+    """Of real and complex pencils, also of real vectors."""
+    t = transformation(assemble(sector(8, (2, 2, 1), bump=0.2), "blade", Material()), "clamp", True)
+    random = np.random.default_rng(3)
+    for n in (0, 3):
+        con = at_diameter(t, n)
+        X = np.asfortranarray(random.standard_normal((con.T.shape[1], 2 * COLUMNS_AT_A_TIME + 1)))
+        for A in (con.K, con.M):
+            apart = np.hstack([apply_block(A, X[:, [i]]) for i in range(X.shape[1])])
+            whole = apply_block(A, X)
+            assert whole.dtype == con.dtype
+            np.testing.assert_allclose(whole, apart, rtol=1e-12, atol=1e-12 * abs(apart).max())
+
+
+def test_guesses_wait_in_half_the_memory(monkeypatch):
+    """In single precision, and no space beside them once no more guesses are made."""
+    body = assemble(sector(16, (3, 2, 1), bump=0.2), "blade", Material())
+    given = {}
+    plain = wheel.lowest_pairs
+
+    def look(flex, count, tolerance, start, *rest):
+        given[flex.con.nodal_diameter] = None if start is None else start.dtype
+        return plain(flex, count, tolerance, start, *rest)
+
+    monkeypatch.setattr(wheel, "lowest_pairs", look)
+    all_diameters(body, 4)
+    assert {n: np.dtype(d).itemsize for n, d in given.items() if d is not None} == dict.fromkeys(
+        given, 8
+    )
+    assert len(given) == 9 - wheel.SOLVED_DIAMETERS_BY_LEVEL[0]
 
 
 def test_inertia_counts_like_the_spectrum():

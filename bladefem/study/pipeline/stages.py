@@ -583,7 +583,7 @@ def _reduced_diameters(
     blocks: dict[int, np.ndarray] = {}
 
     def keep_vectors(pairs: Eigenpairs) -> None:
-        blocks[pairs.con.nodal_diameter or 0] = pairs.X[:, :modes].copy(order="F")
+        blocks[pairs.nodal_diameter] = pairs.X[:, :modes].copy(order="F")
 
     seen = keep_vectors if spanned else None
 
