@@ -181,15 +181,15 @@ def test_the_page_writes_the_laws_of_the_table(page):
 def test_the_step_as_merit_comes_after_the_residual_from_every_start():
     """Where the loop is not compiled; a point for which nothing else is tried is left without."""
     starts = [np.zeros(1), np.ones(1)]
+    merits = fallback.NEWTON_MERITS[::-1]
 
-    def order(compiled, fallbacks):
-        runs = fallback._merits_in_order(starts, compiled, fallbacks)
-        return [(int(w[0]), merit) for w, _, merit in runs]
+    def order(starts, by_start, fallbacks):
+        runs = fallback._runs_in_order(starts, merits, by_start, fallbacks)
+        return [(int(w[0]), merit) for w, (_, merit) in runs]
 
     residual_first = [(0, "residual"), (1, "residual")]
-    assert order(False, True) == [*residual_first, (0, "step"), (1, "step")]
-    assert order(False, False) == residual_first
-    alone = [merit for _, _, merit in fallback._merits_in_order(starts[:1], False, False)]
-    assert alone == ["residual", "step"]
-    by_start = [(0, "step"), (0, "residual"), (1, "step"), (1, "residual")]
-    assert order(True, True) == order(True, False) == by_start
+    assert order(starts, False, True) == [*residual_first, (0, "step"), (1, "step")]
+    assert order(starts, False, False) == residual_first
+    assert order(starts[:1], False, False) == [(0, "residual"), (0, "step")]
+    by_start = [(0, "residual"), (0, "step"), (1, "residual"), (1, "step")]
+    assert order(starts, True, True) == order(starts, True, False) == by_start

@@ -4,7 +4,8 @@
    residual. Small models of 1-D elements, which have a compiled loop for it, take both from each
    start, the step first; elsewhere the residual is cheaper, and on 3-D patches that lift off it
    converges where the step stalls (wedge of 96 nodes at 60 and 90 N: half the time): it is tried
-   from all starts first, alone where one is given and no fallbacks are wanted;
+   from all starts first, alone where one is given and no fallbacks are wanted (but on stiff layers
+   that are split);
 2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at
    the limit of stick, and there may be no exact zero; the solution then says how many samples it
    has;
@@ -21,6 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -87,26 +89,30 @@ def _newton_attempts(
 
     Where the loop is not compiled the residual comes first from all starts, and the step only
     where there is no start but full stick, or fallbacks are wanted: on the shipped wedge under 18
-    and 36 N it solved 12 of 300 points after the residual, and took a third of the time.
+    and 36 N it solved 12 of 300 points after the residual, and took a third of the time. Stiff
+    layers that are split need it from each start: their residual is badly scaled.
     """
     starts = [w for w in (start, start_in_stick(balance)) if w is not None]
-    for w, method, merit in _merits_in_order(starts, runs_compiled(balance), options.fallbacks):
+    compiled = runs_compiled(balance)
+    merits = NEWTON_MERITS if compiled else NEWTON_MERITS[::-1]
+    by_start = compiled or balance.model.series is not None
+    for w, (method, merit) in _runs_in_order(starts, merits, by_start, options.fallbacks):
         yield Attempt(method, newton(balance, w, options, merit))
 
 
-def _merits_in_order(
+def _runs_in_order(
     starts: Sequence[np.ndarray],
-    compiled: bool,
+    merits: Sequence[tuple[str, str]],
+    by_start: bool,
     fallbacks: bool,
-) -> Iterator[tuple[np.ndarray, str, str]]:
-    """Start, method and merit of each run of Newton alone."""
-    if compiled:
-        for w in starts:
-            yield from ((w, method, merit) for method, merit in NEWTON_MERITS)
-        return
-    merits = NEWTON_MERITS[::-1] if fallbacks or len(starts) == 1 else NEWTON_MERITS[1:]
-    for method, merit in merits:
-        yield from ((w, method, merit) for w in starts)
+) -> Iterator[tuple[np.ndarray, tuple[str, str]]]:
+    """Start, and method and merit, of each run of Newton alone; without fallbacks and not by start,
+    the first merit only where there are several starts.
+    """
+    if by_start:
+        return product(starts, merits)
+    wanted = merits if fallbacks or len(starts) == 1 else merits[:1]
+    return ((w, merit) for merit, w in product(wanted, starts))
 
 
 def _attempts_in_order(
