@@ -16,7 +16,7 @@ from numba import njit
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .closed_contacts import OpenContacts
 from .linear.array_copy import copy_matrix
-from .linearised_flow import group_steps
+from .linearised_flow import group_steps, longest_linear_step
 
 # modes of a group up to which plain loops are faster than a product of matrices
 SMALL_GROUP = 3
@@ -65,7 +65,7 @@ def flow_map(contacts: OpenContacts, nodes: NodeSteps, dt: float, steps: int) ->
         nodes: of the nodes of the contacts.
         dt: of a step [s]; steps: at most those of a period.
     """
-    bodies, order = _bodies(contacts, dt)
+    bodies, order = _bodies(contacts, dt, dt > _longest_step(contacts, nodes))
     found = _carry(bodies, NodeSteps(*map(np.ascontiguousarray, nodes)), steps)
     M = len(contacts.stiffness)
     state = np.concatenate([order, np.arange(2 * M, len(found))])
@@ -74,8 +74,25 @@ def flow_map(contacts: OpenContacts, nodes: NodeSteps, dt: float, steps: int) ->
     return mapped
 
 
-def _bodies(contacts: OpenContacts, dt: float) -> tuple[_Bodies, np.ndarray]:
-    """Bodies for `_carry`, and which of the states (q, v) each of theirs is."""
+def _longest_step(contacts: OpenContacts, nodes: NodeSteps) -> float:
+    """Step [s] up to which forces may be linear in between: with the springs that the nodes have
+    where they stick or press.
+    """
+    rows = np.flatnonzero(contacts.force >= 0)
+    most = np.diagonal(nodes.after_motion, axis1=2, axis2=3).max(axis=0).ravel()
+    springs = np.zeros(contacts.push.shape[1])
+    flexibility = np.zeros((len(springs), len(springs)))
+    springs[contacts.force[rows]] = most[rows]
+    flexibility[contacts.force[rows]] = contacts.flexibility[rows]
+    return longest_linear_step(contacts.stiffness, contacts.push, flexibility, springs)
+
+
+def _bodies(contacts: OpenContacts, dt: float, mean: bool) -> tuple[_Bodies, np.ndarray]:
+    """Bodies for `_carry`, and which of the states (q, v) each of theirs is.
+
+    Args:
+        mean: forces are constant between two instants, not linear.
+    """
     M = len(contacts.stiffness)
     starts = [0]
     flows = []
@@ -83,7 +100,7 @@ def _bodies(contacts: OpenContacts, dt: float) -> tuple[_Bodies, np.ndarray]:
     modes = []
     order = []
     for group, (E, G0, G1) in group_steps(
-        contacts.stiffness, contacts.damping, contacts.groups, dt
+        contacts.stiffness, contacts.damping, contacts.groups, dt, mean
     ):
         starts.append(starts[-1] + len(group))
         flows.append(E.ravel())

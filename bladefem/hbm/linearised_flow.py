@@ -3,9 +3,12 @@
 The motion of the contacts is known from the balance; each node's state (stick, slip, open) at the
 instants of a period, and how a step's force depends on the force before and on the displacements at
 both ends, follow from the return map. The bodies are integrated exactly for forces that are linear
-between two instants, and the contact forces implicitly, so that no step is too long for stability;
-what is left is the error of sampled friction, which falls with the square of the instants
-(`bladefem.hbm.flow_map` puts the two together).
+between two instants, and the contact forces implicitly. A motion of more than half a period of the
+bodies on their contacts in one step gains energy by that; where steps are so long, forces are taken
+constant at the mean of both instants, which no step is too long for (the average acceleration of
+Newmark, J. Eng. Mech. Div. ASCE 85 (1959) 67, where the bodies are free). What is left is the error
+of sampled friction, which falls with the square of the instants (`bladefem.hbm.flow_map` puts the
+two together).
 """
 
 from __future__ import annotations
@@ -27,8 +30,36 @@ MAX_PERIODS = 60
 REPEAT_TOLERANCE = 1e-9
 
 
-def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def longest_linear_step(
+    stiffness: np.ndarray,
+    push: np.ndarray,
+    flexibility: np.ndarray,
+    springs: np.ndarray,
+) -> float:
+    """Step [s] up to which contact forces may be linear in between: half the shortest period of the
+    bodies with all contacts closed.
+
+    Args:
+        stiffness: (M, M) K of the modes [1/s^2]; push: (M, m) of the forces [kg^-1/2].
+        flexibility: (m, m) of the bodies besides the modes [m/N]; springs: (m,) of the contacts
+            [N/m], those of zero left out.
+    """
+    held = np.flatnonzero(springs > 0)
+    joint = np.diag(1 / springs[held]) + flexibility[np.ix_(held, held)]
+    closed = stiffness + push[:, held] @ np.linalg.solve(joint, push[:, held].T)
+    highest = linalg.eigvalsh((closed + closed.T) / 2)[-1] if len(closed) else 0.0
+    return float(np.pi / np.sqrt(highest)) if highest > 0 else np.inf
+
+
+def linear_steps(
+    system: SectorModes,
+    dt: float,
+    mean: bool = False,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Exact step of the bodies without contact.
+
+    Args:
+        mean: forces are constant in between, the mean of those before and after.
 
     Returns:
         E (2M, 2M) from (q, v) before; G0 and G1 (2M, M) from the modal forces before and after,
@@ -39,7 +70,7 @@ def linear_steps(system: SectorModes, dt: float) -> tuple[np.ndarray, np.ndarray
     E = np.zeros((2 * M, 2 * M))
     G0 = np.zeros((2 * M, M))
     G1 = np.zeros((2 * M, M))
-    for modes, step in group_steps(K, system.damping, coupled_groups(K, system.damping), dt):
+    for modes, step in group_steps(K, system.damping, coupled_groups(K, system.damping), dt, mean):
         rows = np.concatenate([modes, M + modes])
         for target, part in zip((E, G0, G1), step, strict=True):
             target[np.ix_(rows, rows if target is E else modes)] = part
@@ -51,6 +82,7 @@ def group_steps(
     D: np.ndarray,
     groups: Sequence[np.ndarray],
     dt: float,
+    mean: bool = False,
 ) -> Iterator[tuple[np.ndarray, tuple[np.ndarray, np.ndarray, np.ndarray]]]:
     """Modes of each group, and E (2b, 2b), G0 and G1 (2b, b) of its b modes, as `linear_steps`."""
     for b in sorted({len(group) for group in groups}):
@@ -69,7 +101,8 @@ def group_steps(
         flow[:, :b, 2 * b :] *= dt**2
         flow[:, b:, 2 * b :] *= dt
         for own, group in zip(flow, alike, strict=True):
-            constant, rising = own[:, 2 * b : 3 * b], own[:, 3 * b :]
+            constant = own[:, 2 * b : 3 * b]
+            rising = constant / 2 if mean else own[:, 3 * b :]
             yield group, (own[:, : 2 * b], constant - rising, rising)
 
 

@@ -2,9 +2,9 @@
 free to move as they like.
 
 The steady motion without contact forces is known; what is marched is the motion that the contact
-forces add to it. The bodies are integrated exactly for forces that are linear between two instants
-(`bladefem.hbm.linearised_flow`); the forces at the end of a step follow from the friction law
-(`bladefem.hbm.step_forces`).
+forces add to it. The bodies are integrated exactly for forces that are linear between two instants,
+or constant where steps are too long for that (`bladefem.hbm.linearised_flow`); the forces at the
+end of a step follow from the friction law (`bladefem.hbm.step_forces`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .linear.condensation import condense
-from .linearised_flow import linear_steps
+from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
@@ -87,7 +87,10 @@ def march_ring(
     q = _modal_start(model, system, point)
     noise = np.random.default_rng(0).standard_normal(M)
     y = np.concatenate([q[0] * (1 + disturbance * noise), q[1]])
-    E, G0, G1 = linear_steps(system, 2 * np.pi / point.omega / S)
+    dt = 2 * np.pi / point.omega / S
+    springs = np.tile(model.springs.ravel(), r)
+    bodies = (system.stiffness_matrix, system.contact.T, system.residual)
+    E, G0, G1 = linear_steps(system, dt, mean=dt > longest_linear_step(*bodies, springs))
     e = model.elements
     w = free[0] + system.contact @ y[:M] - system.residual @ (forces - preload)
     F = system.residual + system.contact @ G1[:M] @ system.contact.T

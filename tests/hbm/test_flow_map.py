@@ -8,8 +8,8 @@ from models import bouncing
 from scipy import linalg
 
 from bladefem.hbm.closed_contacts import coupled_groups
-from bladefem.hbm.linearised_flow import linear_steps
-from bladefem.hbm.sector_modes import sector_modes
+from bladefem.hbm.linearised_flow import linear_steps, longest_linear_step
+from bladefem.hbm.sector_modes import SectorModes, sector_modes
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import _leading
 
@@ -57,3 +57,42 @@ def test_stiff_normal_springs_that_stay_closed_need_no_short_steps():
     system = sector_modes(model)
     coarse, fine = (abs(_leading(model, point, system, S, np.inf)) for S in (128, 4096))
     assert coarse == pytest.approx(fine, rel=2e-3)
+
+
+@pytest.mark.parametrize("own", [0.0, 1.0, 25.0])
+@pytest.mark.parametrize(("share", "mean", "grows"), [(0.98, 0, 0), (1.2, 0, 1), (1.2, 1, 0)])
+def test_a_contact_gains_no_energy_in_steps_longer_than_half_its_period(own, share, mean, grows):
+    """Of a mass of 1 kg on a spring of its own and one of a contact, beside a flexibility. A force
+    that is linear in between feeds it in longer steps, the mean force in none.
+    """
+    contact, flexibility = 400.0, 1e-3
+    joint = 1 / (1 / contact + flexibility)
+    one = np.ones((1, 1))
+    longest = longest_linear_step(own * one, one, flexibility * one, contact * np.ones(1))
+    assert longest == pytest.approx(np.pi / np.sqrt(own + joint))
+    system = SectorModes(1, np.array([own]), 0 * one, one, 0 * one, one, one, 0 * one)
+    E, G0, G1 = linear_steps(system, share * longest, bool(mean))
+    spring = np.array([[joint, 0.0]])
+    step = np.linalg.solve(np.eye(2) + G1 @ spring, E - G0 @ spring)
+    growth = abs(np.linalg.eigvals(step)).max()
+    assert (growth > 1.001) == bool(grows)
+
+
+def test_contacts_without_springs_ask_for_no_short_steps():
+    one = np.ones((1, 1))
+    assert longest_linear_step(0 * one, one, 0 * one, np.zeros(1)) == np.inf
+
+
+def test_a_stiff_contact_that_slips_is_no_instability_of_its_steps():
+    """Its frequency, 100 rad/s, is 1.3 times that of half a period in a step: linear forces said
+    that a disturbance grows 3e29 times a period, which falls by a sixth.
+    """
+    model = bouncing()
+    one = np.ones(1)
+    stiff = replace(model.elements, kt=1e4 * one, n0=0.2 * one)
+    model = replace(model, elements=stiff)
+    point = solve(model, 0.7, 7, 512)
+    assert point.converged and point.states["slip"] == 1
+    system = sector_modes(model)
+    assert abs(_leading(model, point, system, 128, np.inf)) < 10
+    assert abs(_leading(model, point, system, 512, np.inf)) == pytest.approx(0.83, rel=0.01)
