@@ -9,6 +9,7 @@ end of a step follow from the friction law (`bladefem.hbm.step_forces`).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -29,13 +30,15 @@ from .step_forces import contact_forces
 
 # of the instants of a period
 INSTANTS_PER_PERIOD = 256
+# periods after which a march may end
+PERIODS_AT_ONCE = 25
 
 
 @dataclass(frozen=True)
 class RingMarch:
     """Motion of the first probe of each blade."""
 
-    # (periods, r, instants) [m]
+    # (periods, r, instants) [m], those that were marched
     motion: np.ndarray
     # the forces of each step were found
     settled: bool
@@ -54,18 +57,26 @@ def march_operations(
     return 2.0 * periods * instants * (4 * M**2 + 4 * M * m + 5 * m**2)
 
 
+def _never(motion: np.ndarray) -> bool:
+    """No motion is enough."""
+    return False
+
+
 def march_ring(
     model: ReducedModel,
     point: Solution,
     disturbance: float,
     periods: int,
     instants: int = INSTANTS_PER_PERIOD,
+    enough: Callable[[np.ndarray], bool] = _never,
 ) -> RingMarch:
     """March from a solution whose modal amplitudes are disturbed.
 
     Args:
         disturbance: relative, of another size and sign for each mode.
-        periods: of the excitation.
+        periods: of the excitation, at most.
+        enough: whether the motion (periods, r, instants) so far will do; asked every
+            PERIODS_AT_ONCE.
 
     Raises:
         InputError: normal loads are prescribed, a friction law is not Coulomb's, or the wave does
@@ -96,7 +107,7 @@ def march_ring(
     F = system.residual + system.contact @ G1[:M] @ system.contact.T
     probes = len(system.probe) // r
     motion = np.empty((periods, S, r))
-    settled = _march(
+    whole = (
         y,
         _three(forces, e.tangents),
         w,
@@ -113,9 +124,14 @@ def march_ring(
                 (system.probe[::probes], system.probe_residual[::probes], free_probe),
             )
         ),
-        motion,
     )
-    return RingMarch(motion.transpose(0, 2, 1), bool(settled))
+    settled, done = True, 0
+    while settled and done < periods:
+        settled = bool(_march(*whole, motion[done : done + PERIODS_AT_ONCE]))
+        done = min(done + PERIODS_AT_ONCE, periods)
+        if enough(motion[:done].transpose(0, 2, 1)):
+            break
+    return RingMarch(motion[:done].transpose(0, 2, 1), settled)
 
 
 class _SparseRows(NamedTuple):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from models import rebounding
 
+from bladefem.hbm.ring_march import PERIODS_AT_ONCE
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import size
 from bladefem.hbm.time_model import time_system
@@ -130,12 +131,53 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
 def marches_that_grow(point, instants_that_hold):
     """A march whose motion grows fivefold unless it has so many instants."""
 
-    def march(model, point, disturbance, periods, instants):
+    def march(model, point, disturbance, periods, instants, enough):
         growth = 1.0 if instants >= instants_that_hold else 5.0
-        wave = growth * size(point) * np.cos(2 * np.pi * np.arange(instants) / instants)
-        return SimpleNamespace(motion=np.tile(wave, (periods, 1, 1)), settled=True)
+        return marched(np.full(periods, growth * size(point)), instants, enough)
 
     return march
+
+
+def marched(heights, instants, enough):
+    """Periods of these heights [m], as far as a march with so many instants goes."""
+    wave = np.cos(2 * np.pi * np.arange(instants) / instants)
+    motion = heights[:, None, None] * wave
+    for done in range(PERIODS_AT_ONCE, len(heights) + 1, PERIODS_AT_ONCE):
+        if enough(motion[:done]):
+            break
+    return SimpleNamespace(motion=motion[:done], settled=True)
+
+
+PERIODS = np.arange(200)
+
+
+@pytest.mark.parametrize(
+    ("heights", "periods"),
+    [
+        # falls to another motion, and stays there
+        (0.9 + 0.1 * np.exp(-PERIODS / 12), 125),
+        # leaves the unstable motion slowly: a hundred thousandth first, more with each period
+        (1.0 - 1e-5 * np.exp(PERIODS / 23), 200),
+        # goes on falling by a thousandth a period
+        (1.0 - 1e-3 * PERIODS, 200),
+    ],
+)
+def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, periods):
+    model = rebounding(10.0, 0.1, 0.04)
+    point = solve(model, 3.0, 15, 1024)
+    monkeypatch.setattr(module, "march_operations", lambda *_: 1.0)
+    monkeypatch.setattr(
+        module,
+        "march_ring",
+        lambda model, point, disturbance, periods, instants, enough: marched(
+            size(point) * heights[:periods], instants, enough
+        ),
+    )
+    found = module.band_by_steps(model, point)
+    assert found.periods == periods
+    kept = size(point) * heights[-module.KEPT_BY_STEPS :]
+    assert found.highest == pytest.approx(kept.max(), rel=2e-3)
+    assert found.lowest == pytest.approx(kept.min(), rel=2e-3)
 
 
 @pytest.mark.parametrize(("holds", "ratio"), [(256, 1.0), (512, 1.0), (1024, 5.0)])
@@ -148,4 +190,5 @@ def test_growth_where_contacts_lift_off_is_marched_with_more_instants(monkeypatc
     monkeypatch.setattr(module, "march_ring", marches_that_grow(point, holds))
     found = module.band_by_steps(model, point)
     assert found.highest == pytest.approx(ratio * size(point))
-    assert found.periods == (200 if holds == 256 else 100)
+    # where the motion stays as it is three parts will do
+    assert found.periods == 75

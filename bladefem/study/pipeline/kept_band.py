@@ -10,13 +10,14 @@ it repeats.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from ...damper.branch import state_of
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
-from ...hbm.ring_march import march_operations, march_ring
+from ...hbm.ring_march import PERIODS_AT_ONCE, march_operations, march_ring
 from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
 from ...time.event_integrator import State, integrate_periods
@@ -49,6 +50,9 @@ REFINED_PERIODS = (50, 50)
 # Steps that are too long for impacts feed them energy: on the shipped wedge with 8e3 N/mm^3 under
 # 80 N, 58 um, 256 instants end between 120 and 550 um, 512 and 1024 on 58.0 +- 0.4 um
 GROWN_RATIO = 1.2
+# relative change of the ends of a band, from one PERIODS_AT_ONCE to the next, that is none: an
+# imported wedge's first unstable resonances settle after 75 to 150 of 200 periods
+SETTLED_BAND = 1e-3
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
 
@@ -154,21 +158,45 @@ def band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
             if operations > MAX_MARCH:
                 reason = f"a march takes {operations:.1g} operations, at most {MAX_MARCH:.0e}"
                 return _unknown_band(point, reason)
-            march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants)
+            enough = partial(_known_enough, point, instants)
+            march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants, enough)
         except (InputError, NotSolvedError) as error:
             return _unknown_band(point, str(error))
         if not (march.settled and np.isfinite(march.motion).all()):
             return _unknown_band(point, "the contact forces of a step of the march were not found")
-        band = _band_of(point, march.motion[left:], left + kept)
+        marched = len(march.motion)
+        known = left if marched == left + kept else marched - PERIODS_AT_ONCE
+        band = _band_of(point, march.motion[known:], marched)
         if band.highest <= GROWN_RATIO * size(point) or not point.states["lift"]:
             break
     return band
 
 
+def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
+    """A march by steps may end: its last parts keep to one band that they drift to no faster than
+    before, or it has grown so far that it is repeated with more instants.
+    """
+    amplitudes = _amplitudes(point, motion)
+    again = instants < INSTANTS_BY_STEPS[-1] and bool(point.states["lift"])
+    if again and amplitudes.max() > GROWN_RATIO * size(point):
+        return True
+    parts = amplitudes.reshape(-1, PERIODS_AT_ONCE * amplitudes.shape[-1])
+    if len(parts) < 3 or not np.isfinite(amplitudes).all():
+        return False
+    ends = np.column_stack([parts.min(axis=1), parts.max(axis=1)])[-3:]
+    before, now = abs(np.diff(ends, axis=0)).max(axis=1)
+    return bool(now <= min(before, SETTLED_BAND * ends.max()))
+
+
+def _amplitudes(point: Solution, motion: np.ndarray) -> np.ndarray:
+    """Of the harmonics of a point, from motion (..., samples of a period) at the probe [m]."""
+    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1 : point.harmonics + 1]
+    return np.asarray(np.linalg.norm(lines, axis=-1))
+
+
 def _band_of(point: Solution, motion: np.ndarray, periods: int) -> KeptBand:
     """From motion (..., samples of a period) at the probe."""
-    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1 : point.harmonics + 1]
-    amplitudes = np.linalg.norm(lines, axis=-1)
+    amplitudes = _amplitudes(point, motion)
     return KeptBand(point.frequency, float(amplitudes.min()), float(amplitudes.max()), periods)
 
 
