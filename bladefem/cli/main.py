@@ -247,8 +247,9 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
         "--pictures",
         metavar="N",
         type=int,
-        default=4,
-        help="modes that are drawn (4); 0: tables only",
+        default=1,
+        help="first modes that are drawn large, next to that of excitation.mode (1); 0: tables "
+        "only",
     )
 
 

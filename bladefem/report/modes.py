@@ -35,8 +35,11 @@ from .run import mode_table
 from .tables import write_tables
 from .write import Page, write_report
 
-# modes that are drawn
-MAX_DRAWN_MODES = 4
+# first modes that are drawn large, next to the sheet of the first eight and the one of the
+# excitation: each takes as long as the sheet
+DRAWN_MODES = 1
+# modes whose stresses are computed
+MAX_STRESSED_MODES = 4
 # frequencies on the first screen
 MAX_HEADLINES = 6
 # sections of tables and pictures; the others are among the modes
@@ -62,14 +65,15 @@ def report_survey(
     scene: Scene,
     folder: str | Path,
     wanted: Wanted,
-    pictures: int = MAX_DRAWN_MODES,
+    pictures: int = DRAWN_MODES,
     comm: Communicator | None = None,
     progress: Progress = without_progress,
 ) -> Survey:
     """Survey the modes and write the folder.
 
     Args:
-        pictures: number of modes drawn on the sector and on the wheel; 0 for tables only.
+        pictures: number of first modes drawn large, on the sector and on the wheel, next to the
+            one of the excitation; 0 for tables only.
 
     Raises:
         InputError, NotSolvedError: see :func:`bladefem.study.modes.survey.survey_modes`.
@@ -268,7 +272,9 @@ def _stresses(result: Survey) -> tuple[pd.DataFrame, Fields, Fields]:
     """Table of extremes and fields at nodes or in cells: displacement and stress under the
     rotation, of the first modes and of the resonances; collective.
     """
-    states = stress_states(result.bodies, excited_set(result.run), MAX_DRAWN_MODES, result.answer)
+    states = stress_states(
+        result.bodies, excited_set(result.run), MAX_STRESSED_MODES, result.answer
+    )
     table, nodes, cells = stress_table(result.bodies, states)
     fields, inside = (
         {
@@ -303,7 +309,8 @@ def _drawings(
     excited = excited_set(result.run)
     wheel = len(result.run.modes) > 1
     names = list(tables["excited_modes"]["family"])
-    shown = range(min(pictures, len(excited.frequencies)))
+    turning = min(run.scene.excitation.mode, len(excited.frequencies)) - 1
+    shown = sorted({turning, *range(min(pictures, len(excited.frequencies)))})
     out: dict[str, Callable[[Path], object]] = {
         "modes.png": lambda file: modes.draw_mode_sheet(run.mesh, excited, file, families=names)
     }
@@ -313,7 +320,6 @@ def _drawings(
         if wheel:
             turned = partial(modes.draw_wheel_mode, run.mesh, excited, i, family=names[i])
             out[f"mode_{i + 1}_wheel.png"] = turned
-    turning = min(run.scene.excitation.mode, len(excited.frequencies)) - 1
     out["wave.gif"] = lambda file: modes.animate_wave(
         run.mesh, excited, turning, file, family=names[turning]
     )

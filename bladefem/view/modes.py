@@ -33,12 +33,14 @@ from .style import (
     aim_camera,
     canvas,
     enlarged,
+    enlarged_lines,
     headline,
     open_plotter,
     photograph,
     reduced,
     show_photograph,
     size_for,
+    trim_border,
 )
 
 if TYPE_CHECKING:
@@ -50,6 +52,12 @@ COMPONENTS = ("radial", "circumferential", "axial")
 NEGLIGIBLE_DISPLACEMENT_SHARE = 1e-5
 # largest drawn displacement over the sector's height
 DRAWN_DISPLACEMENT_SHARE = 0.1
+# pictures before cropping (width, height): of one shape, of one among several, of a wheel
+SHAPE_PIXELS = (880, 960)
+TILE_PIXELS = (450, 520)
+WHEEL_PIXELS = (1130, 890)
+# in an animated wave
+WAVE_COLOURS = 224
 
 
 def best_phase(shape: np.ndarray) -> complex:
@@ -155,39 +163,64 @@ def photograph_shape(
     shape: np.ndarray,
     factor: float,
     direction: tuple[float, float, float],
-    size: tuple[int, int] = (1100, 1200),
     values: np.ndarray | None = None,
-    coarse: bool = False,
 ) -> np.ndarray:
     """Rendering of a deformed sector coloured by relative magnitude, with the undeformed edges in
     grey.
 
     Args:
         values: (n_points,) to be coloured by in place of the magnitude of the shape.
+    """
+    magnitude = np.linalg.norm(shape, axis=1) if values is None else values
+    [image] = photograph_shapes(mesh, [(shape, factor, magnitude)], direction, SHAPE_PIXELS)
+    return image
+
+
+def photograph_shapes(
+    mesh: Mesh,
+    shapes: Sequence[tuple[np.ndarray, float, np.ndarray]],
+    direction: tuple[float, float, float],
+    size: tuple[int, int],
+    coarse: bool = False,
+) -> Iterator[np.ndarray]:
+    """``photograph_shape`` of several shapes, in one window and with one search for the outer
+    faces.
+
+    Args:
+        shapes: displacements (n_points, dim), the factor they are drawn with, and values
+            (n_points,) to be coloured by.
+        size: width and height before cropping [pixels].
         coarse: element edges straight from corner to corner, for small pictures.
     """
-    surface = skin(moving_bodies(mesh, shape), coarse)
-    drawn = np.pad(shape, ((0, 0), (0, 3 - shape.shape[1])))
-    moved = surface.points + factor * drawn[surface.nodes]
-    magnitude = np.linalg.norm(shape, axis=1) if values is None else values
-    body = polydata(surface, moved)
-    body.point_data["magnitude"] = magnitude[surface.nodes] / max(magnitude.max(), 1e-300)
+    extent = np.sum([abs(shape) for shape, _, _ in shapes], axis=0)
+    surface = skin(moving_bodies(mesh, extent), coarse)
+    body = polydata(surface, surface.points.copy())
+    body.point_data["magnitude"] = np.zeros(len(surface.points))
+    lines = edge_lines(surface, surface.points, direction)
+    lift = lines.points - surface.points
     parts = [
         {"mesh": body, "scalars": "magnitude", "cmap": SEQUENTIAL_COLOURS, "clim": (0, 1)},
-        {
-            "mesh": edge_lines(surface, moved, direction),
-            "color": "black",
-            "line_width": 0.5,
-            "opacity": 0.25,
-            "lighting": False,
-        },
+        {"mesh": lines, "color": "black", "line_width": 0.5, "opacity": 0.25, "lighting": False},
     ]
     outline = polydata(surface).extract_feature_edges(
         30.0, boundary_edges=True, non_manifold_edges=False, manifold_edges=False
     )
     if outline.n_points:
         parts.append({"mesh": outline, "color": "#888888", "line_width": 1.2, "lighting": False})
-    return photograph(parts, direction, RADIAL_DIRECTION, size)
+    plotter = open_plotter(enlarged(size), smooth=False)
+    for part in parts:
+        plotter.add_mesh(**{**RENDER_OPTIONS, **enlarged_lines(part)})
+    for shape, factor, values in shapes:
+        drawn = np.pad(shape, ((0, 0), (0, 3 - shape.shape[1])))
+        body.points = surface.points + factor * drawn[surface.nodes]
+        body.point_data["magnitude"] = values[surface.nodes] / max(values.max(), 1e-300)
+        lines.points = body.points + lift
+        everything = np.concatenate([body.points, lines.points, outline.points])
+        aim_camera(plotter, direction, RADIAL_DIRECTION, everything)
+        plotter.render()
+        image = np.asarray(plotter.screenshot(return_img=True))
+        yield trim_border(reduced(image, size))
+    plotter.close()
 
 
 def draw_mode_sheet(
@@ -208,12 +241,11 @@ def draw_mode_sheet(
     ) as axes:
         for ax in axes.flat:
             ax.set_axis_off()
-        for number, ax in zip(range(count), axes.flat, strict=False):
-            shape = np.real(modes.shapes[number] * best_phase(modes.shapes[number]))
-            factor = scale_of(mesh, shape)
-            show_photograph(
-                ax, photograph_shape(mesh, shape, factor, direction, (560, 640), coarse=True)
-            )
+        real = [np.real(shape * best_phase(shape)) for shape in modes.shapes[:count]]
+        drawn = [(shape, scale_of(mesh, shape), np.linalg.norm(shape, axis=1)) for shape in real]
+        images = photograph_shapes(mesh, drawn, direction, TILE_PIXELS, coarse=True)
+        for number, (ax, image) in enumerate(zip(axes.flat, images, strict=False)):
+            show_photograph(ax, image)
             name = families[number] if number < len(families) else ""
             ax.set_title(f"{number + 1}  {modes.frequencies[number]:.5g} Hz\n{name}", fontsize=9)
         diameter = (
@@ -226,7 +258,20 @@ def draw_mode_sheet(
             fontsize=7.5,
             color="#555555",
         )
+        _place_tiles(axes[0, 0].figure)
         return axes[0, 0].figure
+
+
+def _place_tiles(figure: Any) -> None:
+    """Fixed places for the pictures of a sheet: to measure all titles takes as long as to draw half
+    of them.
+    """
+    figure.set_layout_engine(None)
+    height = figure.get_figheight()
+    top, bottom, title = np.array([0.72, 0.3, 0.45]) / height
+    rows = figure.axes[0].get_gridspec().nrows
+    tile = (1 - top - bottom - (rows - 1) * title) / rows
+    figure.subplots_adjust(0.01, bottom, 0.99, 1 - top, wspace=0.02, hspace=title / tile)
 
 
 def wheel_motion(
@@ -318,7 +363,7 @@ def draw_wheel_mode(
         lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
-    image = photograph(parts, direction, up, fine=True)
+    image = photograph(parts, direction, up, WHEEL_PIXELS, fine=True)
     with canvas(file, size=size_for(image, 5.2, margin=1.0)) as ax:
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
@@ -348,7 +393,7 @@ def animate_wave(
     file: str | Path,
     *,
     family: str = "",
-    frames: int = 24,
+    frames: int = 16,
     pixels: int = 480,
 ) -> Path:
     """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for
@@ -377,7 +422,11 @@ def animate_wave(
         ImageDraw.Draw(picture).text(
             (10, pixels - 2 * font.size), exaggeration(mesh), fill="#555555", font=small
         )
-        pictures.append(picture.quantize(96))
+        pictures.append(picture)
+    # at opposite phases all colours are seen
+    both = Image.fromarray(np.hstack([pictures[0], pictures[frames // 2]]))
+    palette = both.quantize(WAVE_COLOURS)
+    pictures = [each.quantize(palette=palette, dither=Image.Dither.NONE) for each in pictures]
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     pictures[0].save(
         file,

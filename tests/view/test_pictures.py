@@ -9,6 +9,7 @@ import synthetic
 from matplotlib.image import imread
 
 from bladefem.contact.resultants import resultant
+from bladefem.view import modes as modes_view
 from bladefem.view.accuracy import draw_accuracy, pareto_front
 from bladefem.view.contact import (
     draw_pressure,
@@ -33,7 +34,7 @@ from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
 from bladefem.view.optimum import draw_optimum
 from bladefem.view.response import draw_responses, smooth_curve
 from bladefem.view.skin import row_keys, skin, wheel_skin
-from bladefem.view.style import canvas
+from bladefem.view.style import SUPERSAMPLING, canvas, enlarged_lines
 
 
 def ink(file):
@@ -183,6 +184,34 @@ def test_wheel_picture_shows_six_nodal_radii(sector, wave, folder):
     figure = draw_wheel_mode(sector, wave, 0)
     assert any("axial" in ax.get_ylabel() for ax in figure.axes)
     assert "nodal diameter 3" in figure.get_suptitle()
+
+
+def test_a_sheet_is_drawn_in_one_window(sector, wave, folder, monkeypatch):
+    """Each shape as it is drawn alone, whatever was drawn before it."""
+    opened = []
+    plain = modes_view.open_plotter
+    monkeypatch.setattr(
+        modes_view, "open_plotter", lambda *a, **k: opened.append(a) or plain(*a, **k)
+    )
+    shape = np.real(wave.shapes[0] * best_phase(wave.shapes[0]))
+    values = np.linalg.norm(shape, axis=1)
+    factor = modes_view.scale_of(sector, shape)
+    drawn = [(shape, sign * factor, values) for sign in (1, -1, 1)]
+    images = list(modes_view.photograph_shapes(sector, drawn, (1.0, 0.5, 0.3), (200, 240)))
+    assert len(opened) == 1
+    alone = [
+        next(modes_view.photograph_shapes(sector, [one], (1.0, 0.5, 0.3), (200, 240)))
+        for one in drawn
+    ]
+    for image, other in zip(images, alone, strict=True):
+        assert image.shape == other.shape
+        assert abs(image.astype(int) - other).mean() < 0.5
+    assert images[0].shape != images[1].shape or abs(images[0].astype(int) - images[1]).mean() > 0.5
+
+
+def test_lines_are_as_wide_in_a_window_that_is_enlarged():
+    assert enlarged_lines({"line_width": 2.0})["line_width"] == 2.0 * SUPERSAMPLING
+    assert enlarged_lines({"color": "black"}) == {"color": "black"}
 
 
 def test_travelling_wave_turns(sector, wave, folder):
