@@ -2,9 +2,11 @@
 contact nodes on each damper.
 
     python benchmarks/wheel.py [sectors ...] [--nodes 8 32 126] [--harmonics 1 3]
+    mpirun -n 2 python benchmarks/wheel.py 36 --nodes 126 --harmonics 3    one wheel shared by ranks
 
 The sectors are random elastic bodies on a rigid damper of six motions, many of whose contacts slip;
-CPU times include the parts that are made once a wheel.
+CPU times include the parts that are made once a wheel. On several ranks time and memory are those
+of the rank with most; the time of exchanges, in which waiting ranks spin, is given apart.
 """
 
 from __future__ import annotations
@@ -12,8 +14,11 @@ from __future__ import annotations
 import argparse
 import resource
 import time
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from bladefem.data import Elements, RigidBody
 from bladefem.hbm.model import Damping
@@ -66,34 +71,63 @@ def random_wheel(count: int, nodes: int, seed: int = 0) -> Wheel:
     )
 
 
+class TimedExchange:
+    """The communicator of all ranks, with the CPU time that its exchanges take."""
+
+    def __init__(self) -> None:
+        self.comm = MPI.COMM_WORLD
+        self.rank = self.comm.rank
+        self.size = self.comm.size
+        self.seconds = 0.0
+
+    def allgather(self, sendobj: Any) -> list[Any]:
+        start = time.process_time()
+        found = self.comm.allgather(sendobj)
+        self.seconds += time.process_time() - start
+        return found
+
+
+def measure(wheel: Wheel, H: int, exchange: TimedExchange) -> None:
+    """One line of the table."""
+    omega = 1.001 * float(wheel.sectors[min(2, wheel.count // 2)].omega[0])
+    rng = np.random.default_rng(1)
+    change = 0.01 * rng.normal(size=(wheel.count, 1, 1)) * np.eye(2)
+    exchange.seconds = 0.0
+    start = time.process_time()
+    point = solve_wheel(wheel, omega, H, 64, pattern=Pattern(change))
+    seconds = time.process_time() - start - exchange.seconds
+    slipping = 100 * (point.shares[..., 1] > 0).mean()
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    of_ranks = exchange.allgather((seconds, exchange.seconds, memory))
+    seconds, waiting, memory = (max(column) for column in zip(*of_ranks, strict=True))
+    if exchange.rank == 0:
+        print(
+            f"{wheel.count:7d} {wheel.nodes:5d} {H:9d} {point.w.size:8d} {seconds:8.2f} "
+            f"{waiting:9.2f} {point.iterations:7d} {point.products:9d} {slipping:8.0f} % "
+            f"{point.converged!s:>9} {memory:12.0f}",
+            flush=True,
+        )
+
+
 def main() -> None:
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("sectors", nargs="*", type=int, default=[6, 12, 36])
     arguments.add_argument("--nodes", nargs="*", type=int, default=[8, 32, 126])
     arguments.add_argument("--harmonics", nargs="*", type=int, default=[1, 3])
     options = arguments.parse_args()
-    print(
-        "sectors nodes harmonics unknowns  CPU [s]  Newton  products  slipping  converged  memory "
-        "[MB]"
-    )
+    exchange = TimedExchange()
+    if exchange.rank == 0:
+        print(
+            "sectors nodes harmonics unknowns  CPU [s]  exchange  Newton  products  slipping  "
+            "converged  memory [MB]"
+        )
     for count in options.sectors:
         for nodes in options.nodes:
             wheel = random_wheel(count, nodes)
-            omega = 1.001 * float(wheel.sectors[min(2, count // 2)].omega[0])
-            rng = np.random.default_rng(1)
-            change = 0.01 * rng.normal(size=(count, 1, 1)) * np.eye(2)
+            if exchange.size > 1:
+                wheel = replace(wheel, comm=exchange)
             for H in options.harmonics:
-                start = time.process_time()
-                point = solve_wheel(wheel, omega, H, 64, pattern=Pattern(change))
-                seconds = time.process_time() - start
-                slipping = 100 * (point.shares[..., 1] > 0).mean()
-                memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-                print(
-                    f"{count:7d} {nodes:5d} {H:9d} {point.w.size:8d} {seconds:8.2f} "
-                    f"{point.iterations:7d} {point.products:9d} {slipping:8.0f} % "
-                    f"{point.converged!s:>9} {memory:12.0f}",
-                    flush=True,
-                )
+                measure(wheel, H, exchange)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from ..errors import NotSolvedError
 from ..hbm.linear.bodies import Damping
 from ..hbm.linear.woodbury import frequency_independent_parts
 from ..util.arrays import ComplexArray, RealArray, RealOrComplex
+from .deal import Deal
 from .model import Wheel
 
 # rigid motions that the contact springs resist less than this, relatively, are left out
@@ -28,12 +29,14 @@ NEGLIGIBLE_STIFFNESS_SHARE = 1e-12
 
 @dataclass(frozen=True)
 class DiameterParts:
-    """What stays at all frequencies; D = N/2 + 1 nodal diameters, P ports, k modes of both bodies.
+    """What stays at all frequencies; P ports, k modes of both bodies.
 
     Ports are in the order contact, blade, modes of the damper, load, probe.
     """
 
-    # (D, P, P) residual flexibility with contact springs [m/N]
+    deal: Deal
+    # (D, P, P) residual flexibility with contact springs, of the D nodal diameters among 0..N/2
+    # that this rank has [m/N]
     A: ComplexArray
     # (N, P, k) modes with contact springs [kg^-1/2]
     U: ComplexArray
@@ -66,8 +69,10 @@ def diameter_parts(wheel: Wheel) -> DiameterParts:
 
 
 def _made_parts(wheel: Wheel) -> DiameterParts:
-    diameters = [wheel.sectors[d] for d in range(wheel.count // 2 + 1)]
-    most = max(len(body.omega) for body in diameters)
+    deal = wheel.deal
+    own = range(deal.half.start, deal.half.stop)
+    diameters = [wheel.sectors[d] for d in own]
+    most = max(len(body.omega) for body in wheel.sectors.values())
     sizes = _port_sizes(wheel)
     ends = np.cumsum(sizes)
     R, L = _residual_and_modes(wheel, diameters, most, int(ends[-1]))
@@ -81,12 +86,14 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
     contact = slice(sizes[0])
     mean = np.array(
         [
-            _mean_flexibility(still[d], L[d, contact], springs[contact], N[d], wheel.hold)
-            for d in range(len(diameters))
+            _mean_flexibility(still[d], L[i, contact], springs[contact], N[i], wheel.hold)
+            for i, d in enumerate(own)
         ]
-    )
+    ).reshape(N.shape)
+    U, N, mean = (deal.join(part) for part in (U, N, mean))
     slices = [slice(int(e - s), int(e)) for s, e in zip(sizes, ends, strict=True)]
     return DiameterParts(
+        deal,
         A,
         _all_diameters(U, count),
         _all_diameters(N, count),
@@ -275,14 +282,44 @@ def ring_product(blocks: np.ndarray, x: np.ndarray) -> np.ndarray:
     return (blocks @ x.swapaxes(1, 2)[..., None])[..., 0].swapaxes(1, 2)
 
 
-def residual_product(A: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """(N, P, K) A_d f_d of all nodal diameters from A (D, P, P) of 0..N/2."""
-    half = len(A)
-    out = np.empty((len(f), A.shape[1], f.shape[2]), dtype=complex)
-    np.matmul(A, f[:half], out=out[:half])
-    mirrored = A[len(f) - half : 0 : -1]
-    out[half:] = (mirrored @ f[half:].conj()).conj()
-    return out
+def residual_product(
+    deal: Deal,
+    A: np.ndarray,
+    f: np.ndarray,
+) -> np.ndarray:
+    """(own, P, K) A_d f_d of this rank's nodal diameters from its A (D, P, P) and f (N, P, K)."""
+    forward, backward = deal.diameters
+    K = f.shape[2]
+    # both ways of a wave at once: each A is read from memory only once
+    both = np.zeros((len(A), f.shape[1], 2 * K), dtype=complex)
+    both[:, :, :K] = f[forward]
+    both[deal.paired, :, K:] = f[backward][::-1].conj()
+    moved = A @ both
+    return np.concatenate([moved[:, :, :K], moved[deal.paired, :, K:][::-1].conj()])
+
+
+def modal_forces(
+    parts: DiameterParts,
+    f: np.ndarray,
+    columns: slice,
+) -> np.ndarray:
+    """(own, k, H+1) forces on the modes by forces f (N, columns, H+1) at some ports."""
+    found = [
+        (parts.U[some, columns].swapaxes(1, 2) @ f[some].conj()).conj()
+        for some in parts.deal.diameters
+    ]
+    return np.concatenate(found)
+
+
+def modal_motion(
+    parts: DiameterParts,
+    q: np.ndarray,
+    rows: slice,
+) -> np.ndarray:
+    """(own, rows, H+1) motions at some ports by motions of the modes q (own, k, H+1)."""
+    forward, backward = parts.deal.diameters
+    first = forward.stop - forward.start
+    return np.concatenate([parts.U[forward, rows] @ q[:first], parts.U[backward, rows] @ q[first:]])
 
 
 def tuned_product(
@@ -292,10 +329,10 @@ def tuned_product(
     rows: slice,
     columns: slice,
 ) -> np.ndarray:
-    """(N, rows, H+1) motions of the tuned wheel by forces f (N, columns, H+1), both by
-    diameters.
+    """(own, rows, H+1) motions of the tuned wheel in this rank's nodal diameters, by forces f (N,
+    columns, H+1) in all.
     """
-    push = parts.U[:, columns].conj().swapaxes(1, 2) @ f
-    out = parts.U[:, rows] @ ring_product(T, push)
-    out += residual_product(parts.A[:, rows, columns], f)
+    modal = ring_product(parts.deal.own(T), modal_forces(parts, f, columns))
+    out = modal_motion(parts, modal, rows)
+    out += residual_product(parts.deal, parts.A[:, rows, columns], f)
     return out

@@ -9,6 +9,7 @@ import numpy as np
 from ..data import Elements
 from ..friction.aft import evaluate
 from ..friction.kernel_1d_exact import evaluate_exact
+from ..friction.law_table import select_elements
 from ..util.arrays import RealArray
 from .model import Wheel
 
@@ -21,7 +22,7 @@ class ContactForces:
     f: RealArray
     # (N, n, d, K) forces beyond preload and springs of full stick [N]
     p: RealArray
-    # (N n, dK, dK) derivative of p [N/m]
+    # (own n, dK, dK) derivative of p at the dampers of this rank's sectors [N/m]
     change: np.ndarray | None
     # (N, n, 3) shares of stick, slip, separation
     shares: RealArray
@@ -47,7 +48,8 @@ def contact_forces(
     samples: int,
     jacobian: bool = True,
 ) -> ContactForces:
-    """Forces for relative displacements w (N, n, d, K) [m].
+    """Forces for relative displacements w (N, n, d, K) [m], each damper's on the rank of its
+    sector.
 
     Args:
         elements: of all dampers.
@@ -55,30 +57,38 @@ def contact_forces(
         samples: a period; 0 locates transitions exactly, for elements of one tangent.
     """
     count, n, d, K = w.shape
+    deal = wheel.deal
     missing = 1 + elements.tangents - d
-    flat = w.reshape(count * n, d, K).copy()
-    flat[:, :, 0] += wheel.offset(elements, start).reshape(count * n, d)
+    flat = w.copy()
+    flat[..., 0] += wheel.offset(elements, start)
+    flat = flat[deal.sectors].reshape(-1, d, K)
     if missing:
-        flat = np.concatenate([np.zeros((count * n, missing, K)), flat], axis=1)
+        flat = np.concatenate([np.zeros((len(flat), missing, K)), flat], axis=1)
+    own = elements
+    if deal.ranks > 1:
+        rows = np.arange(count * n).reshape(count, n)[deal.sectors].ravel()
+        own = select_elements(elements, rows)
     if samples:
-        found = evaluate(elements, flat, samples, jacobian, precision="single")
+        found = evaluate(own, flat, samples, jacobian, precision="single")
     else:
-        found = evaluate_exact(elements, flat)
-    f = found.f[:, missing:].reshape(w.shape)
+        found = evaluate_exact(own, flat)
+    f = deal.join(found.f[:, missing:].reshape(-1, n, d, K))
     p = f - wheel.springs[:, :, None] * w
     p[..., 0] -= wheel.preload(elements)
     change = None
     if jacobian:
-        blocks = found.jacobian[:, missing:, :, missing:].reshape(count, n, d * K, d * K).copy()
+        blocks = found.jacobian[:, missing:, :, missing:].reshape(-1, n, d * K, d * K).copy()
         diagonal = np.arange(d * K)
         blocks[:, :, diagonal, diagonal] -= np.repeat(wheel.springs, K, axis=1)
-        change = blocks.reshape(count * n, d * K, d * K)
+        change = blocks.reshape(-1, d * K, d * K)
+    reasons = deal.gather("" if found.converged else found.reason)
+    failed = next(filter(None, reasons), "")
     return ContactForces(
         f,
         p,
         change,
-        found.shares.reshape(count, n, 3),
-        found.dissipated.reshape(count, n),
-        found.converged,
-        found.reason,
+        deal.join(found.shares.reshape(-1, n, 3)),
+        deal.join(found.dissipated.reshape(-1, n)),
+        not failed,
+        failed or found.reason,
     )

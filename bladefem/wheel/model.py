@@ -18,7 +18,9 @@ from ..hbm.linear.bodies import Damping
 from ..hbm.linear.mean_motion import REGULARISATION
 from ..reduction.assemble import pair_model
 from ..util.arrays import RealArray, RealOrComplex
+from ..util.communicator import Communicator
 from .aerodynamics import with_flow
+from .deal import Deal
 
 
 @dataclass(frozen=True)
@@ -110,9 +112,16 @@ class Wheel:
     # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None
     # [N]
     start: RealArray | None = None
+    # ranks that share each point of the wheel, collectively; None: one rank has all
+    comm: Communicator | None = None
 
     def __post_init__(self) -> None:
         _check_wheel(self)
+
+    @cached_property
+    def deal(self) -> Deal:
+        """The part of this rank."""
+        return Deal(self.count, self.comm)
 
     @cached_property
     def nodes(self) -> int:

@@ -173,12 +173,14 @@ class _Steps:
         shape = state.residual.shape
         flat = (shape[0], -1, shape[3])
         change = state.forces.jacobian
+        deal = self.balance.wheel.deal
         prepare = (self.preconditioner or self._renew(state)).apply
 
         def product(y: np.ndarray) -> np.ndarray:
             self.products += 1
             x = prepare(y.reshape(flat))
-            forces = (change @ x.reshape(len(change), -1, 1)).reshape(shape)
+            own = x[deal.sectors].reshape(*change.shape[:2], 1)
+            forces = deal.join((change @ own).reshape(-1, *shape[1:]))
             return (x.reshape(shape) + contact_motions(self.balance.flex, forces)).ravel()
 
         size = state.residual.size

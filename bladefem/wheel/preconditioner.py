@@ -15,6 +15,7 @@ import numpy as np
 from scipy import linalg
 
 from ..friction.fourier import to_complex, to_real
+from .by_diameter import modal_forces, modal_motion
 from .flexibility import WheelFlexibility, from_diameters, to_diameters
 
 # |T N| from which a harmonic is dynamically amplified, and couples all diameters; the mean does
@@ -42,14 +43,16 @@ class Preconditioner:
         """The approximate inverse times real coefficients r (N, m, K)."""
         parts = self.flex.parts
         amplitudes = to_complex(r)
-        U = parts.U[:, parts.contact]
-        push = U.conj().swapaxes(1, 2) @ to_diameters(self.forces(amplitudes))
+        deal = parts.deal
+        push = modal_forces(parts, to_diameters(self.forces(amplitudes)), parts.contact)
+        push = deal.join_diameters(push)
         modal = (self.by_diameter @ push.swapaxes(1, 2)[..., None])[..., 0].swapaxes(1, 2)
         for h, (kept, factors) in self.dense.items():
             found = linalg.lu_solve(factors, push[:, kept, h].ravel(), check_finite=False)
             modal[:, :, h] = 0.0
             modal[:, kept, h] = found.reshape(len(push), -1)
-        return r - to_real(from_diameters(U @ modal))
+        moved = modal_motion(parts, deal.own(modal), parts.contact)
+        return r - to_real(from_diameters(deal.join_diameters(moved)))
 
     def forces(self, amplitudes: np.ndarray) -> np.ndarray:
         """(N, m, H+1) forces of C by displacements (N, m, H+1)."""
@@ -61,12 +64,15 @@ class Preconditioner:
 
 
 def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Preconditioner:
-    """The preconditioner for derivatives change (N n, dK, dK) of the contact forces."""
+    """The preconditioner for derivatives change (own n, dK, dK) of the contact forces of this
+    rank's sectors.
+    """
     harmonics = flex.T.shape[1]
     count = len(flex.T)
-    C = _harmonic_part(change, harmonics)
     parts = flex.parts
-    U = parts.U[:, parts.contact]
+    deal = parts.deal
+    C = deal.join(_harmonic_part(change, harmonics), axis=1)
+    U = deal.own(parts.U[:, parts.contact])
     by_diameter = np.zeros_like(flex.T)
     dense = {}
     for h in range(harmonics):
@@ -77,10 +83,10 @@ def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Precondit
             dense[h] = (kept, _dense_factors(flex, C[h].reshape(count, -1, *C.shape[2:]), h, kept))
             continue
         mean = C[h].reshape(count, -1, *C.shape[2:]).mean(axis=0)
-        moved = (mean @ U.reshape(count, len(mean), -1, U.shape[2])).reshape(U.shape)
+        moved = (mean @ U.reshape(len(U), *mean.shape[:2], U.shape[2])).reshape(U.shape)
         stiff = U.conj().swapaxes(1, 2) @ moved
-        T = flex.T[:, h]
-        by_diameter[:, h] = T @ np.linalg.inv(np.eye(T.shape[1]) + stiff @ T)
+        T = deal.own(flex.T[:, h])
+        by_diameter[:, h] = deal.join_diameters(T @ np.linalg.inv(np.eye(T.shape[1]) + stiff @ T))
     return Preconditioner(flex, C, by_diameter, dense)
 
 
@@ -114,21 +120,25 @@ def _dense_factors(
     k = len(kept)
     U = parts.U[:, parts.contact][:, :, kept]
     turned = U.conj().swapaxes(1, 2)
+    shifts = range(count)[parts.deal.sectors]
     spectrum = np.fft.fft(C, axis=0) / count
     readings = parts.U[:, flex.deviating][:, :, kept]
     deviations = np.fft.fft(flex.E[h], axis=0) / count if len(flex.factors) else None
-    system = np.empty((count, k, count, k), dtype=complex)
+    blocks = np.empty((len(shifts), count, k, k), dtype=complex)
     diameters = np.arange(count)
-    own = np.linalg.pinv(flex.T[:, h][:, kept[:, None], kept])
-    for shift in range(count):
+    tuned = np.linalg.pinv(flex.T[:, h][:, kept[:, None], kept])
+    for i, shift in enumerate(shifts):
         moved = (spectrum[shift] @ U.reshape(count, -1, C.shape[2], k)).reshape(U.shape)
         to = (diameters + shift) % count
         block = turned[to] @ moved
         if deviations is not None:
             block += readings[to].conj().swapaxes(1, 2) @ deviations[shift] @ readings
         if shift == 0:
-            block += own
-        system[to, :, diameters] = block
+            block += tuned
+        blocks[i] = block
+    system = np.empty((count, k, count, k), dtype=complex)
+    for shift, block in enumerate(parts.deal.join(blocks)):
+        system[(diameters + shift) % count, :, diameters] = block
     return linalg.lu_factor(
         system.reshape(count * k, count * k), overwrite_a=True, check_finite=False
     )

@@ -76,7 +76,7 @@ def with_whole_wheel(
         run.folder,
         "whole_wheel",
         key,
-        lambda: on_root(comm, lambda: _best_response(run, sector, deviation, best, bodies, others)),
+        lambda: _best_response(run, sector, deviation, best, bodies, others),
         comm,
     )
     remarks.extend(other_remarks)
@@ -99,15 +99,19 @@ def _best_response(
     bodies: Bodies,
     others: OtherBlades | None,
 ) -> PatternResponse:
-    """The response of all blades under the load of a curve, with the stress of the highest one; on
-    one rank.
+    """The response of all blades under the load of a curve, whose sectors the ranks share, with the
+    stress of the highest one, on one rank.
     """
     from ...fem.compat import MPI
 
-    case = _cases(run)[curve.load, curve.mass]
-    (wheel,) = _wheels(run, sector, [curve])
+    comm = bodies.comm
+    # all ranks have to take the same decisions: from the same numbers to the last digit
+    wheel, deviation, curve, others = on_root(
+        comm, lambda: (_wheels(run, sector, [curve])[0], deviation, curve, others)
+    )
 
     def stress(pattern: Pattern, solution: WheelSolution, blade: int) -> DampedStress:
+        case = _cases(run)[curve.load, curve.mass]
         alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
         alone.kept.update(bodies.kept)
         _, readings = blade_readings(alone, run.clamped, len(sector.families), run.modes)
@@ -116,7 +120,15 @@ def _best_response(
         points = curve.settings.points
         return blade_stress(shapes, wheel, pattern, case, solution, blade, points)
 
-    return pattern_response(wheel, sector.families, deviation, curve, stress, others)
+    shared = replace(wheel, comm=comm)
+    return pattern_response(
+        shared,
+        sector.families,
+        deviation,
+        curve,
+        lambda *of_blade: on_root(comm, lambda: stress(*of_blade)),
+        others,
+    )
 
 
 def scatter_of_run(
