@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -86,10 +86,26 @@ def march_ring(
         raise InputError("normal loads are prescribed, expected ones that follow the motion")
     if model.elements.law is not None:
         raise InputError("a friction law of its own, expected Coulomb's")
-    system = model.once("ring", lambda: sector_modes(model))
-    r, M = system.blades, len(system.stiffness)
+    r = model.once("ring", lambda: sector_modes(model)).blades
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
+    start = _start(model, point, disturbance, S)
+    motion = np.empty((periods, S, r))
+    settled, done = True, 0
+    while settled and done < periods:
+        settled = bool(_march(*start, motion[done : done + PERIODS_AT_ONCE]))
+        done = min(done + PERIODS_AT_ONCE, periods)
+        if enough(motion[:done].transpose(0, 2, 1)):
+            break
+    return RingMarch(motion[:done].transpose(0, 2, 1), settled)
+
+
+def _start(model: ReducedModel, point: Solution, disturbance: float, S: int) -> tuple[Any, ...]:
+    """What `_march` takes before the motion: state and forces of a solution whose modal amplitudes
+    are disturbed, which it changes, and the steps of the bodies at S instants a period.
+    """
+    system = model.once("ring", lambda: sector_modes(model))
+    r, M = system.blades, len(system.stiffness)
     H = point.harmonics
     free = _of_blades(condense(model, point.omega, H).free, r, S)
     free_probe = _of_blades(free_response(model, point.omega, H)[:, :1], r, S)
@@ -106,8 +122,7 @@ def march_ring(
     w = free[0] + system.contact @ y[:M] - system.residual @ (forces - preload)
     F = system.residual + system.contact @ G1[:M] @ system.contact.T
     probes = len(system.probe) // r
-    motion = np.empty((periods, S, r))
-    whole = (
+    return (
         y,
         _three(forces, e.tangents),
         w,
@@ -125,13 +140,6 @@ def march_ring(
             )
         ),
     )
-    settled, done = True, 0
-    while settled and done < periods:
-        settled = bool(_march(*whole, motion[done : done + PERIODS_AT_ONCE]))
-        done = min(done + PERIODS_AT_ONCE, periods)
-        if enough(motion[:done].transpose(0, 2, 1)):
-            break
-    return RingMarch(motion[:done].transpose(0, 2, 1), settled)
 
 
 class _SparseRows(NamedTuple):
