@@ -17,8 +17,8 @@ import numpy as np
 from branch_models import Case, march, random_case, state_of
 
 from bladefem import balance as bf
+from bladefem.hbm.next_frequency import first_look
 from bladefem.hbm.stability import UNKNOWN, stability_verdict
-from bladefem.hbm.sweep import first_look
 from bladefem.study.pipeline.stability import CONFIRMING, RicherModel, stability_of
 
 # points of a model: its highest maxima, and others spread over the paths

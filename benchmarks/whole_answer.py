@@ -52,10 +52,9 @@ from whole_answer_picture import draw_answer, write_advice, write_section
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.ring_march import march_ring
-from bladefem.hbm.solution import Solution
+from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.sweep import size
 from bladefem.scene.tables import Mistuning, Scene
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.choice import covered_band, default_band, solver_options

@@ -24,8 +24,9 @@ import bladefem
 from bladefem.damper.accelerate import METHODS, Rules, iterate
 from bladefem.damper.paper import platform
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.sweep import sweep
 from bladefem.view.paper import draw_friction_loops, draw_peaks, draw_tip_responses
 from verification.paper.blades import judge, load_curve, optimum, peak, seat_loop
 from verification.paper.plane_row import paper_model, row_of_blades, whole_model

@@ -19,11 +19,12 @@ from ..errors import InputError, NotSolvedError
 from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
+from .next_frequency import first_look, local_maxima
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .peak import Peak, find_peak, with_slope
-from .solution import Solution
+from .solution import Solution, size
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .sweep import first_look, local_maxima, response, size
+from .sweep import response
 
 # values of the parameter tried before giving up
 MOST_LEVELS = 30

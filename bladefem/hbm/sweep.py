@@ -7,41 +7,28 @@ from __future__ import annotations
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from itertools import chain, islice
 
 import numpy as np
 
-from ..errors import InputError, NotSolvedError
-from ..util.curve_extremum import find_maxima, parabola_at_middle
+from ..errors import InputError
 from .branches import Branches, find_branches
-from .frequency_walk import all_stick, predicted_start, walk_in_frequency
-from .linear_resonances import free_resonances, stuck_resonances
+from .frequency_walk import all_stick, predicted_start
+from .from_neighbours import nearest_neighbours, solve_from, solve_off_resonance, walk_from
 from .model import ReducedModel
+from .next_frequency import Slope, first_look, next_frequency
 from .predictor import PREDICTOR_POINTS
 from .sensitivity import sensitivities
 from .solution import Solution, size
-from .solve import leading_stuck_solutions, solve, solve_near
+from .solve import leading_stuck_solutions
 from .solver.newton import DEFAULT_OPTIONS, Options
 from .solver.point_compiled import solve_along
 from .validate_model import check_point, check_probe
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
-# of the height with the frequency, at a solved one
-Slope = Callable[[float], float]
-# of a frequency: how far next to a resonance without damping a sweep solves, where it hits it
-# exactly
-OFF_RESONANCE = 1e-7
-# the same for the first look at a model without damping, whose flexibility stuck is all rounding
-# there
-OFF_RESONANCE_UNDAMPED = 1e-5
-# intervals of the first look at a band
-FIRST_LOOK_INTERVALS = 12
 # points that are solved at once
 POINTS_AT_ONCE = 16
 # points after which a sweep gives up refining
 BAND_LIMIT = 400
-# times the samples that are tried where walks end close to a point
-MORE_SAMPLES = (2, 4)
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
 MAX_PATH_UNKNOWNS = 700
@@ -82,7 +69,7 @@ def response(
         return (
             ready[i]
             if i in ready
-            else _solve_off_resonance(
+            else solve_off_resonance(
                 model, omegas[i], H, samples, predicted_start(last, omegas[i], H), options
             )
         )
@@ -135,14 +122,14 @@ def _close_in_maxima(
     """
     slope = _slope_of(model, solved, options.probe)
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
-        wanted = _next_frequency(solved, slope, accuracy, options.probe)
+        wanted = next_frequency(solved, slope, accuracy, options.probe)
         if wanted is None:
             return False
         if len(solved) >= BAND_LIMIT:
             notes.append(_limit_note())
             # only normal loads that follow the motion make folds
             return paths and _normal_loads_follow(model)
-        starts = _neighbours(solved.values(), wanted)
+        starts = nearest_neighbours(solved.values(), wanted)
         solved[wanted] = solve_from(model, wanted, H, samples, starts, options)
         yield solved[wanted]
     return True
@@ -268,7 +255,9 @@ def _solved_again(
     """Points that the first look lost, by walks from neighbours on both sides and by fallbacks."""
     solved = list(known)
     for omega in lost:
-        for solution in _walk_from(model, omega, H, samples, _neighbours(solved, omega), options):
+        for solution in walk_from(
+            model, omega, H, samples, nearest_neighbours(solved, omega), options
+        ):
             solved.append(solution)
             yield solution
 
@@ -317,190 +306,3 @@ def _needs_continuation(
     steps = np.diff([p.omega for p in good])
     near = steps < JUMP_WIDTH * (good[-1].omega - good[0].omega)
     return bool(np.any(near & (abs(np.diff(heights)) > JUMP_HEIGHT_SHARE * heights.max())))
-
-
-def solve_from(
-    model: ReducedModel,
-    omega: float,
-    H: int,
-    samples: int,
-    starts: Sequence[Solution],
-    options: Options = DEFAULT_OPTIONS,
-) -> Solution:
-    """The point from the first of several neighbours that leads to it, at once or in small steps,
-    before fallbacks, which take far longer.
-
-    Next to a fold of the curve only the neighbour on its other side does.
-    """
-    simply = replace(options, fallbacks=False)
-    tries = (
-        (_solve_off_resonance(model, omega, H, samples, start, simply) for start in starts)
-        if len(starts) > 1
-        else ()
-    )
-    found = next((point for point in tries if point.converged), None)
-    return found or _walk_from(model, omega, H, samples, starts, options)[-1]
-
-
-def _neighbours(points: Iterable[Solution], omega: float) -> list[Solution]:
-    """The converged point that is nearest to a frequency, and the nearest on its other side."""
-    near = sorted((p for p in points if p.converged), key=lambda p: abs(p.omega - omega))
-    beyond = (p for p in near if (p.omega > omega) != (near[0].omega > omega))
-    return [*near[:1], *islice(beyond, 1)]
-
-
-def _walk_from(
-    model: ReducedModel,
-    omega: float,
-    H: int,
-    samples: int,
-    starts: Sequence[Solution],
-    options: Options,
-) -> list[Solution]:
-    """Points on the way from one of several neighbours to a frequency, the last one at it; with
-    more samples where walks end close to it, by fallbacks where no neighbour leads there.
-    """
-    walked = []
-    for start in starts if options.fallbacks else ():
-        way = walk_in_frequency(model, omega, H, samples, start, options)
-        if way and way[-1].omega == omega:
-            return way
-        walked += way
-    # sampled friction jumps a little at the limit of stick: between two neighbours that are close
-    # to each other there may be no exact zero
-    if walked and samples:
-        nearest = min(walked, key=lambda p: abs(p.omega - omega))
-        for factor in MORE_SAMPLES:
-            point = solve_near(model, omega, H, factor * samples, nearest, options)
-            if point.converged:
-                return [*walked, replace(point, method="more samples")]
-    first = starts[0] if starts else None
-    return [*walked, _solve_off_resonance(model, omega, H, samples, first, options)]
-
-
-def _solve_off_resonance(
-    model: ReducedModel,
-    omega: float,
-    H: int,
-    samples: int,
-    start: Solution | None,
-    options: Options,
-) -> Solution:
-    """The point, or the one just next to it."""
-    try:
-        return solve(model, omega, H, samples, start=start, options=options)
-    except NotSolvedError:
-        return solve(model, omega * (1 + OFF_RESONANCE), H, samples, start=start, options=options)
-
-
-def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
-    """Those of the points, sorted by frequency, that are above both neighbours."""
-    heights = np.array([size(point, probe) for point in points])
-    return [points[i] for i in find_maxima(heights)]
-
-
-def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
-    """Circular frequencies of a coarse look at a band: even steps and the resonances of both linear
-    limits [rad/s].
-    """
-    guesses = np.concatenate(
-        [
-            resonances(model, h)
-            for resonances in (free_resonances, stuck_resonances)
-            for h in model.excitation
-            if h > 0
-        ]
-    )
-    inside = guesses[(guesses > band[0]) & (guesses < band[1])]
-    if not model.damped:
-        inside = inside * (1 + OFF_RESONANCE_UNDAMPED)
-    grid = np.linspace(*band, FIRST_LOOK_INTERVALS + 1)
-    keep = [x for x in grid[1:-1] if not np.any(abs(inside - x) < 0.2 * (grid[1] - grid[0]))]
-    return np.unique(np.concatenate([grid[[0, -1]], keep, inside]))
-
-
-def _next_frequency(
-    solved: dict[float, Solution],
-    slope: Slope,
-    accuracy: tuple[float, float],
-    probe: int,
-) -> float | None:
-    """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None
-    when done.
-    """
-    tried = np.array(sorted(solved))
-    curve = accuracy[1]
-    omegas = np.array([w for w in tried if solved[w].converged])
-    if len(omegas) < 3:
-        return None
-    finest = 1e-7 * (tried[-1] - tried[0])
-    heights = np.array([size(solved[w], probe) for w in omegas])
-    for target in chain(
-        _peak_targets(omegas, heights, slope, accuracy), _corner_targets(omegas, heights, curve)
-    ):
-        if abs(tried - target).min() > finest:
-            return float(target)
-    return None
-
-
-def _peak_targets(
-    omegas: np.ndarray,
-    heights: np.ndarray,
-    slope: Slope,
-    accuracy: tuple[float, float],
-) -> Iterator[float]:
-    peak, curve = accuracy
-    for i in find_maxima(heights):
-        if heights[i] > curve * heights.max():
-            target = _next_to_peak(
-                omegas[i - 1 : i + 2], heights[i - 1 : i + 2], slope(float(omegas[i])), peak
-            )
-            if target is not None:
-                yield target
-
-
-def _next_to_peak(
-    omegas: np.ndarray,
-    heights: np.ndarray,
-    slope: float,
-    tolerance: float,
-) -> float | None:
-    """Where to look next for the maximum enclosed by three points, the middle one with its slope;
-    None when known.
-    """
-    (left, _, right), (up, _, down) = (
-        abs(omegas**2 - omegas[1] ** 2),
-        (heights[1] / heights) ** 2 - 1,
-    )
-    # of 1/height^2 over that of the middle, with omega^2
-    exact = -slope / heights[1] / omegas[1]
-    through, _ = parabola_at_middle(left, right, up, down)
-    # sampled friction ripples: the three heights are asked as well
-    for tilt in (exact, through):
-        bends = (up + tilt * left) / left**2, (down - tilt * right) / right**2
-        # not negative; the flatter parabola promises the larger gain
-        uphill = bends[int(tilt < 0)]
-        if uphill > 0 and tilt**2 / 4 >= tolerance * min(b for b in bends if b > 0):
-            return float(np.sqrt(omegas[1] ** 2 - tilt / (2 * uphill)))
-    return None
-
-
-def _corner_targets(
-    omegas: np.ndarray,
-    heights: np.ndarray,
-    curve: float,
-) -> Iterator[float]:
-    """Middles of the wider neighbours of points that lie off the line through their neighbours,
-    worst first.
-    """
-    line = heights[:-2] + (heights[2:] - heights[:-2]) * (omegas[1:-1] - omegas[:-2]) / (
-        omegas[2:] - omegas[:-2]
-    )
-    off = abs(heights[1:-1] - line) / heights.max()
-    for i in np.argsort(-off):
-        if off[i] <= curve:
-            return
-        left = omegas[i + 1] - omegas[i]
-        right = omegas[i + 2] - omegas[i + 1]
-        if max(left, right) > 1e-5 * (omegas[-1] - omegas[0]):
-            yield omegas[i + 1] + (right / 2 if right > left else -left / 2)

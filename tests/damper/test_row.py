@@ -13,8 +13,9 @@ from bladefem.damper.branch import state_of
 from bladefem.damper.paper import platform
 from bladefem.errors import InputError
 from bladefem.hbm.linear_resonances import free_resonances
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response, size
+from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stability import in_one_body

@@ -11,18 +11,18 @@ from models import block, single_mass
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.hbm import continuation
-from bladefem.hbm import sweep as sweep_module
+from bladefem.hbm import continuation, from_neighbours
 from bladefem.hbm.continuation import follow
 from bladefem.hbm.frequency_walk import walk_in_frequency
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.arclength import path_distance
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import Balance, evaluate_balance
-from bladefem.hbm.sweep import response, size
+from bladefem.hbm.sweep import response
 from bladefem.reduction.matrices import port_model_from_matrices
 
 
@@ -94,7 +94,7 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
     """One that leads nowhere costs no fallbacks where another leads to the point, at once or in
     small steps; they are the last resort.
     """
-    model, plain, asked = stop(), sweep_module._solve_off_resonance, []
+    model, plain, asked = stop(), from_neighbours.solve_off_resonance, []
     walked = []
     near, beyond = (solve(model, omega, 5, 0) for omega in (1.0, 1.3))
 
@@ -108,15 +108,15 @@ def test_the_neighbour_beyond_a_fold_is_tried_before_the_fallbacks(monkeypatch):
         walked.append(arguments[4])
         return []
 
-    monkeypatch.setattr(sweep_module, "_solve_off_resonance", counted)
-    monkeypatch.setattr(sweep_module, "walk_in_frequency", no_way)
+    monkeypatch.setattr(from_neighbours, "solve_off_resonance", counted)
+    monkeypatch.setattr(from_neighbours, "walk_in_frequency", no_way)
     for leading, tried in (
         ([near], [(near, False)]),
         ([beyond], [(near, False), (beyond, False)]),
         ([], [(near, False), (beyond, False), (near, True)]),
     ):
         asked.clear()
-        point = sweep_module.solve_from(model, 1.1, 5, 0, [near, beyond])
+        point = from_neighbours.solve_from(model, 1.1, 5, 0, [near, beyond])
         assert point.converged == bool(leading) and [f for _, f in asked] == [f for _, f in tried]
         assert all(one is other for (one, _), (other, _) in zip(asked, tried, strict=True))
     # both neighbours, and only where neither leads there at once

@@ -5,9 +5,11 @@ import pytest
 from hbm_grid import grid
 
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
+from bladefem.hbm.next_frequency import local_maxima
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve, stuck_response
-from bladefem.hbm.sweep import local_maxima, response, size, sweep
+from bladefem.hbm.sweep import response, sweep
 
 HZ = 2 * np.pi
 

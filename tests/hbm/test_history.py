@@ -19,10 +19,10 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.sensitivity import sensitivities
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import contact_forces
-from bladefem.hbm.sweep import size
 from bladefem.hbm.traction_gradient import admissible_tractions, farthest_start
 
 LINEAR = Options(tolerance=1e-12)

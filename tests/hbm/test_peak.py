@@ -14,8 +14,9 @@ from bladefem.hbm.optimum import Variation, lowest_peak, optimum
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak, with_slope
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response, size
+from bladefem.hbm.sweep import response
 from bladefem.reduction.matrices import port_model_from_matrices
 
 HZ = 2 * np.pi

@@ -12,9 +12,9 @@ from bladefem.hbm.node_gradients import node_gradients
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.sensitivity import sensitivities
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.sweep import size
 
 TIGHT = Options(tolerance=1e-13)
 COUPLED = ("omega", "force", "load", "mu", "kt", "kn", "gap", "damping")

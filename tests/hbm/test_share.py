@@ -11,7 +11,8 @@ from bladefem.hbm import sweep
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.parallel import share_work, shared_response
 from bladefem.hbm.parameters import vary
-from bladefem.hbm.sweep import response, size
+from bladefem.hbm.solution import size
+from bladefem.hbm.sweep import response
 
 OMEGAS = np.linspace(0.6, 1.8, 39)
 

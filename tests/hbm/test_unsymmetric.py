@@ -10,10 +10,10 @@ from bladefem.errors import InputError
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.nonlinear_modes import nonlinear_mode
 from bladefem.hbm.sensitivity import sensitivities
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.stability import STABLE, UNIQUE, UNSTABLE, stability_verdict
-from bladefem.hbm.sweep import size
 from bladefem.reduction.matrices import port_model_from_matrices
 
 SIZE = 5

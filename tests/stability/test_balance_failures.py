@@ -16,11 +16,12 @@ from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.fallback import solve_balance
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS, newton
 from bladefem.hbm.solver.residual import Balance, evaluate_balance, start_in_stick
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.sweep import sweep
 from bladefem.reduction.matrices import port_model_from_matrices
 
 HZ = 2 * np.pi

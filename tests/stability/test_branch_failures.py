@@ -16,9 +16,9 @@ from bladefem.hbm.history_interval import history_interval
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.peak import find_peak
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
-from bladefem.hbm.sweep import size
 from bladefem.reduction.matrices import port_model_from_matrices
 
 STEPS = 2000

@@ -14,8 +14,9 @@ from bladefem.damper.direct import contact_step, direct
 from bladefem.damper.explicit import damper_cycle
 from bladefem.damper.paper import damper_response, platform
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.sweep import sweep
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.choice import adapted_settings
 from bladefem.study.adaptive.family import family_of

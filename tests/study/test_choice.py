@@ -11,8 +11,8 @@ import pytest
 
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import size
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.choice import (

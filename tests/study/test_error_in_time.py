@@ -8,8 +8,8 @@ from models import bouncing
 
 from bladefem.data import Elements
 from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import size
 from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.choice import Checked
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of

@@ -9,8 +9,8 @@ import pytest
 from models import rebounding
 
 from bladefem.hbm.ring_march import PERIODS_AT_ONCE
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import size
 from bladefem.hbm.time_model import time_system
 from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline import loads

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from bladefem.hbm.peak import find_peak
+from bladefem.hbm.solution import size
 from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
-from bladefem.hbm.sweep import size
 from bladefem.study.adaptive import check_points
 from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive.check_points import peak_of

@@ -10,7 +10,8 @@ import pytest
 from models import FOLDING, folding_pair
 
 from bladefem.hbm.branches import find_branches
-from bladefem.hbm.sweep import response, size
+from bladefem.hbm.solution import size
+from bladefem.hbm.sweep import response
 from bladefem.study.pipeline.resonance_list import local_resonances, reach_sentence
 
 BAND = (249.0, 431.0)

@@ -32,8 +32,8 @@ from bladefem.errors import NotSolvedError
 from bladefem.friction.fourier import synthesis
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.hbm.solution import Solution
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.solution import Solution, size
+from bladefem.hbm.sweep import sweep
 from bladefem.time.shooting import Periodic, periodic_solution, probe_harmonics
 from bladefem.time.system import System, blade_ring
 

@@ -16,7 +16,8 @@ import numpy as np
 from bladefem.contact.seating import solve_seating as seat
 from bladefem.friction.fourier import synthesis
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.solution import size
+from bladefem.hbm.sweep import sweep
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stages import Bodies, find_modes

@@ -11,8 +11,8 @@ import numpy as np
 
 from bladefem.data import Elements
 from bladefem.friction.fourier import synthesis
-from bladefem.hbm.solution import Solution
-from bladefem.hbm.sweep import size, sweep
+from bladefem.hbm.solution import Solution, size
+from bladefem.hbm.sweep import sweep
 from bladefem.view.paper import draw_friction_loops, draw_tip_responses
 from verification.paper.blades import peak, seat_loop
 

@@ -13,9 +13,9 @@ from bladefem.damper.branch import state_of
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import Cycle, explicit_march
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.solution import Solution
+from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response, size
+from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.study.pipeline.stability import in_one_body, stability_of
 from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics

@@ -10,9 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...hbm.model import ReducedModel
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, size
 from ...hbm.stability import AFFORDABLE_OPERATIONS, UNSTABLE, stability_verdict
-from ...hbm.sweep import size
 from ...hbm.truncation_indicator import truncation_indicator
 from .family import Family, family_member
 from .indicators import richer_settings

@@ -14,9 +14,9 @@ from ...errors import NotSolvedError
 from ...hbm.full_stick import sticks_safely
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, size
 from ...hbm.solver.newton import Options
-from ...hbm.sweep import size, sweep
+from ...hbm.sweep import sweep
 from .branch_choice import anchor_of, peak_error
 from .check_points import heights_of, lasting_peak, left_out_motion, peak_of, points_to_check
 from .family import Family, family_member, with_excited_harmonics

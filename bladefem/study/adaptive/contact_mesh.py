@@ -16,8 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...data import PressureMap
-from ...hbm.solution import Solution
-from ...hbm.sweep import size
+from ...hbm.solution import Solution, size
 from .changed_peak import changed_peak
 from .family import Family, carried_displacements, family_member
 from .settings import Settings

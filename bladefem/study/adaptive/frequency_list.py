@@ -10,12 +10,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError, NotSolvedError
+from ...hbm.from_neighbours import solve_from
 from ...hbm.full_stick import sticks_safely
 from ...hbm.predictor import PREDICTOR_POINTS, extrapolate_solution
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, size
 from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
-from ...hbm.sweep import response, size, solve_from
+from ...hbm.sweep import response
 from .check_points import heights_of, left_out_motion, points_to_check
 from .choice import KEPT_DIRECTIONS, Checked, likely_settings, next_settings, solver_options
 from .family import Family, carried_displacements, family_member, with_excited_harmonics

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
-from ...hbm.solution import Solution
-from ...hbm.sweep import MAX_PATH_UNKNOWNS, size
+from ...hbm.solution import Solution, size
+from ...hbm.sweep import MAX_PATH_UNKNOWNS
 from .branch_choice import peak_error
 from .cheaper_settings import cheaper_settings
 from .check_points import (

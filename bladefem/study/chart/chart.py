@@ -18,7 +18,7 @@ import pandas as pd
 
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
-from ...hbm.sweep import size
+from ...hbm.solution import size
 from ..adaptive.choice import adapted_settings, covered_band
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import DAMPER_MODELS, Settings

@@ -20,7 +20,7 @@ from geometry.sizing import MIN_ELEMENTS_ACROSS_SEAT, MIN_ELEMENTS_ALONG_SEAT
 from ...contact.frictional_seating import normal_part
 from ...contact.seating import solve_seating as seat
 from ...errors import NotSolvedError
-from ...hbm.sweep import size as height
+from ...hbm.solution import size as height
 from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene

@@ -16,9 +16,8 @@ import numpy as np
 from ...data import ModeSet, Patch, PortModel
 from ...hbm.linear_resonances import free_resonances
 from ...hbm.model import ReducedModel
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, size
 from ...hbm.solve import free_response
-from ...hbm.sweep import size
 from ..adaptive.changed_peak import changed_peak
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings

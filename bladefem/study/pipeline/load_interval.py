@@ -11,8 +11,7 @@ from ...errors import NotSolvedError
 from ...hbm.history_interval import MONOTONE, POINT, HistoryInterval, history_interval
 from ...hbm.model import ReducedModel
 from ...hbm.peak import find_peak
-from ...hbm.solution import Solution
-from ...hbm.sweep import size
+from ...hbm.solution import Solution, size
 from ..adaptive.settings import Settings
 
 # tolerance of heights, over the accuracy wanted

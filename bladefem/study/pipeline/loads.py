@@ -14,8 +14,7 @@ import numpy as np
 from ...contact.interface_elements import seat_contact
 from ...hbm.history_interval import POINT
 from ...hbm.parallel import share_work
-from ...hbm.solution import Solution
-from ...hbm.sweep import size
+from ...hbm.solution import Solution, size
 from ...scene.tables import Scene
 from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator

@@ -1,0 +1,96 @@
+"""A point of a response from the solved points next to it: at once, in small steps, with more
+samples, and last by fallbacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from itertools import islice
+
+from ..errors import NotSolvedError
+from .frequency_walk import walk_in_frequency
+from .model import ReducedModel
+from .solution import Solution
+from .solve import solve, solve_near
+from .solver.newton import DEFAULT_OPTIONS, Options
+
+# of a frequency: how far next to a resonance without damping a sweep solves, where it hits it
+# exactly
+OFF_RESONANCE = 1e-7
+# times the samples that are tried where walks end close to a point
+MORE_SAMPLES = (2, 4)
+
+
+def solve_from(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    starts: Sequence[Solution],
+    options: Options = DEFAULT_OPTIONS,
+) -> Solution:
+    """The point from the first of several neighbours that leads to it, at once or in small steps,
+    before fallbacks, which take far longer.
+
+    Next to a fold of the curve only the neighbour on its other side does.
+    """
+    simply = replace(options, fallbacks=False)
+    tries = (
+        (solve_off_resonance(model, omega, H, samples, start, simply) for start in starts)
+        if len(starts) > 1
+        else ()
+    )
+    found = next((point for point in tries if point.converged), None)
+    return found or walk_from(model, omega, H, samples, starts, options)[-1]
+
+
+def nearest_neighbours(points: Iterable[Solution], omega: float) -> list[Solution]:
+    """The converged point that is nearest to a frequency, and the nearest on its other side."""
+    near = sorted((p for p in points if p.converged), key=lambda p: abs(p.omega - omega))
+    beyond = (p for p in near if (p.omega > omega) != (near[0].omega > omega))
+    return [*near[:1], *islice(beyond, 1)]
+
+
+def walk_from(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    starts: Sequence[Solution],
+    options: Options,
+) -> list[Solution]:
+    """Points on the way from one of several neighbours to a frequency, the last one at it; with
+    more samples where walks end close to it, by fallbacks where no neighbour leads there.
+    """
+    walked = []
+    for start in starts if options.fallbacks else ():
+        way = walk_in_frequency(model, omega, H, samples, start, options)
+        if way and way[-1].omega == omega:
+            return way
+        walked += way
+    # sampled friction jumps a little at the limit of stick: between two neighbours that are close
+    # to each other there may be no exact zero
+    if walked and samples:
+        nearest = min(walked, key=lambda p: abs(p.omega - omega))
+        for factor in MORE_SAMPLES:
+            point = solve_near(model, omega, H, factor * samples, nearest, options)
+            if point.converged:
+                return [*walked, replace(point, method="more samples")]
+    first = starts[0] if starts else None
+    return [*walked, solve_off_resonance(model, omega, H, samples, first, options)]
+
+
+def solve_off_resonance(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: Solution | None,
+    options: Options,
+) -> Solution:
+    """The point, or the one just next to it."""
+    try:
+        return solve(model, omega, H, samples, start=start, options=options)
+    except NotSolvedError:
+        return solve(model, omega * (1 + OFF_RESONANCE), H, samples, start=start, options=options)
