@@ -46,6 +46,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from numba.core.compiler_lock import global_compiler_lock
 from whole_answer_loop import loop_resonance, paper_loop
 from whole_answer_picture import draw_answer, write_advice, write_section
 
@@ -375,6 +376,10 @@ def ways(known: Prepared) -> Iterator[tuple[str, str, Callable[[Prepared, int], 
     yield "paper's loop", "paper's loop", partial(by_loop, base)
 
 
+# CPU seconds after which a way that was compiling when its time was up is asked again
+AGAIN = 0.2
+
+
 class OutOfTime(BaseException):
     """No library catches it."""
 
@@ -384,7 +389,11 @@ def limited(seconds: float) -> Iterator[None]:
     """Ends the block by OutOfTime after some CPU seconds."""
 
     def stop(*_: object) -> None:
-        raise OutOfTime
+        # an exception inside numba's compiler leaves it unable to compile anything after
+        if global_compiler_lock.is_locked():
+            signal.setitimer(signal.ITIMER_PROF, AGAIN)
+        else:
+            raise OutOfTime
 
     before = signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, 0.0 if np.isinf(seconds) else max(seconds, 1e-3))

@@ -34,7 +34,8 @@ def draw_answer(rows: pd.DataFrame, loads: pd.DataFrame, scene: Scene, file: Pat
                 ylabel="largest error under the worst load [%]",
             )
         axes[0, 0].get_legend().remove()
-        axes[0, 0].figure.suptitle(f"{scene.title}: {what_was_solved(rows, loads)}", fontsize=10)
+        said = f"{scene.title}:\n{what_was_solved(rows, loads)}"
+        axes[0, 0].figure.suptitle(said, fontsize=10)
         names_apart(*axes[0])
 
 
