@@ -382,11 +382,14 @@ def _summary(result: SolvedRun) -> pd.DataFrame:
 
 def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:
     """(rows,) alternating stress [Pa] of the design table: of the whole motion where that was
-    computed, of the mode alone at the other loads, without damper and stuck.
+    computed, in proportion to the amplitude where a march contradicts it, of the mode alone at
+    the other loads, without damper and stuck.
     """
     stress = result.strength.alternating * amplitudes
-    for curve, found in (result.damped or {}).items():
-        stress[1 + curve] = found.largest
+    for number, found in (result.damped or {}).items():
+        curve = result.response.curves[number]
+        marched = curve.peak_amplitude / curve.balance_amplitude
+        stress[1 + number] = marched * found.largest
     return stress
 
 

@@ -94,7 +94,10 @@ def run_of(scene: Scene, mean: float) -> SimpleNamespace:
     """A run with one curve: two blade nodes, and one of the damper with a far larger stress."""
     damped = SimpleNamespace(field=np.array([60.0, 30.0, 900.0]) * MPA, mesh_error=0.1)
     curve = SimpleNamespace(
-        load=80.0, peak_amplitude=1.0, interval=SimpleNamespace(highest=1.2, lowest=0.9)
+        load=80.0,
+        peak_amplitude=1.0,
+        balance_amplitude=1.0,
+        interval=SimpleNamespace(highest=1.2, lowest=0.9),
     )
     bodies = {"blade": np.array([[0, 1]]), "damper": np.array([[2, 2]])}
     return SimpleNamespace(
@@ -116,6 +119,9 @@ def test_a_run_knows_its_utilisation_and_its_bound():
     assert "80 N: 0.3 at (0.0, 0.0, 0.0) mm, 60 MPa over a mean stress of 300 MPa; 0.396" in (
         utilisation_message(run)
     )
+    # a march that keeps to more than the balance, whose stresses they are
+    run.response.curves[0].peak_amplitude = 1.5
+    assert highest_use(run, 0, found) == pytest.approx(0.3 * 1.5 * 1.1, rel=1e-12)
     assert run_utilisation(run_of(Scene(), 0.0)) == {}
     assert utilisation_message(run_of(Scene(), 0.0)) == ""
 

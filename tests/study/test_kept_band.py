@@ -93,7 +93,9 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
 )
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
     band = module.KeptBand(380.0, lowest, highest, 200, reason)
-    elsewhere = SimpleNamespace(kept=band, peak_amplitude=1.0, in_time=None, keeps_unstable=False)
+    elsewhere = SimpleNamespace(
+        kept=band, peak_amplitude=1.0, in_time=None, keeps_unstable=False, marched_instead=False
+    )
     assert Curve.marched.fget(elsewhere) == pytest.approx(share)
     assert Curve.marched.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0
     here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True})
@@ -101,6 +103,24 @@ def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, 
     assert Curve.marched.fget(here) == pytest.approx(beside)
     judged = SimpleNamespace(**vars(here) | {"in_time": band})
     assert Curve.marched.fget(judged) == 0.0
+    instead = SimpleNamespace(**vars(here) | {"marched_instead": True})
+    assert Curve.marched.fget(instead) == pytest.approx(0.0 if reason else 1 - lowest / highest)
+
+
+@pytest.mark.parametrize(
+    ("lowest", "highest", "contradicts"),
+    [(1.7, 1.9, True), (0.5, 0.6, True), (1.04, 1.3, False), (0.7, 1.3, False)],
+)
+def test_a_march_contradicts_a_balance_whose_amplitude_lies_outside_of_its_band(
+    lowest, highest, contradicts
+):
+    """By more than the accuracy; 247 um under 96 N on an imported wedge go to 408 to 455."""
+    point = SimpleNamespace(probe=np.array([[0.0], [1.0]]))
+    band = module.KeptBand(380.0, lowest, highest, 200)
+    assert loads._contradicts(band, point, 0.05) == contradicts
+    unknown = module.KeptBand(380.0, np.nan, np.nan, 0, "too long")
+    assert not loads._contradicts(unknown, point, 0.05)
+    assert not loads._contradicts(None, point, 0.05)
 
 
 @pytest.mark.parametrize(

@@ -118,6 +118,28 @@ def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
     assert errors.total < 0.01 and peak.height == pytest.approx(1.6 - 0.1 / 7)
 
 
+def test_an_error_that_another_respect_brings_out_is_refined_as_well(monkeypatch):
+    """All points leave nothing of their own error, and show that of the rigid damper, which is as
+    large: that one is refined next, although both together have not halved.
+    """
+    model = reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31)
+    one = family_of(model)
+    family = replace(one, dampers=("rigid", "elastic"))
+    settings = replace(first_for(family.modes, dampers=True), harmonics=3, samples=128)
+
+    def found(family, old, point, new, accuracy, fallbacks=True):
+        rigid = new.damper == "rigid"
+        if new.points == 4:
+            return peak_with(1, 1.0 if rigid else 1.02)
+        return peak_with(1, 1.3 if rigid else 1.7)
+
+    monkeypatch.setattr(resonance_choice, "peak_from", found)
+    chosen, peak, errors = resonance_choice.choose_at_peak(
+        family, settings, peak_with(1, 1.0), 0.05
+    )
+    assert chosen.damper == "elastic" and peak.height == 1.7 and errors.total == 0
+
+
 @pytest.mark.parametrize("damping", [0.5, 0.005])
 def test_a_flat_top_does_not_determine_the_frequency(damping):
     """What a shift takes from the height counts where it is less than the weighted shift."""

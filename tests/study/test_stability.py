@@ -117,7 +117,7 @@ def rippling(kept):
     return SimpleNamespace(
         load=50.0, frequency=np.array([100.0]), bifurcation=np.array(["torus"]), peak=top,
         unstable_peak=top, kept=kept, peak_amplitude=1e-3, peak_frequency=100.0,
-        keeps_unstable=True,
+        keeps_unstable=True, marched_instead=False,
     )  # fmt: skip
 
 
@@ -127,6 +127,10 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     assert unstable_sentence(rippling(near), 0.05) == ""
     assert "keeps between 990 and 1200 um" in unstable_sentence(rippling(far), 0.05)
     assert ripple_sentence([rippling(far)], 0.05) == ""
+    marched = SimpleNamespace(
+        **vars(rippling(far)) | {"marched_instead": True, "peak_amplitude": 1.2e-3}
+    )
+    assert "; the amplitude given, 1200 um, is of a march; " in unstable_sentence(marched, 0.05)
 
 
 def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
@@ -142,5 +146,9 @@ def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
     assert seconds is not None and fresh.keeps_unstable and again.keeps_unstable
     assert ripple_sentence([again], 0.05) == ripple_sentence([fresh], 0.05) != ""
     assert unstable_sentence(again, 0.001) == unstable_sentence(fresh, 0.001) != ""
+    above = replace(band, lowest=2e-3, highest=2.5e-3)
+    marched = replace(again, kept=above, marched_instead=True)
+    assert marched.peak_amplitude == 2.5e-3 and marched.balance_amplitude == again.peak_amplitude
+    assert marched.error == pytest.approx(replace(again, kept=None).error + 0.2)
     assert not replace(again, unstable_peak=None).keeps_unstable
     assert not replace(again, unstable_peak=replace(again.peak, omega=1.0)).keeps_unstable

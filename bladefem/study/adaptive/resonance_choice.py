@@ -300,6 +300,9 @@ def choose_at_peak(
     negligible not judged again, nor one that could not be judged where contacts lift off. There
     refining ends once it does not halve an error that is far beyond the accuracy, unless there are
     few contact points; what is left of it then in the richer model the poorer one has as well.
+    What is left is no reason to end where the respect that was made richer has halved its own
+    error: it is another respect's then, which is refined next (5800 N on an imported wedge: 64
+    points a seat leave nothing of 8.5 %, and bring out 7.6 % by the rigid damper).
     Harmonics that are missing come first there, several at once, and where most contacts lift off:
     with few of them more contact points lead away from the truth (36 N on the shipped wedge: 440 um
     with 7 harmonics and 4 points, 452 with 31; 909 with 3 and 16 points).
@@ -321,8 +324,12 @@ def choose_at_peak(
             errors = _with_errors_before(errors, settings, before[2], before[0])
         settings = replace(settings, error=errors.total)
         far = errors.total > FAR_BEYOND * accuracy and _lift_off(peak, errors)
-        stalled = before is not None and errors.total > before[2].total / 2
-        if far and before is not None and stalled and not _few_points(settings, errors, fixed):
+        if (
+            far
+            and before is not None
+            and _stalled(settings, errors, before)
+            and not _few_points(settings, errors, fixed)
+        ):
             poorer = _seen_from(errors, before)
             return min(poorer, (settings, peak, errors), key=lambda found: found[2].total)
         before = settings, peak, errors
@@ -447,6 +454,18 @@ def _with_errors_before(
         height={**errors.height, **{name: errors_before.height[name] for name in kept}},
         frequency={**errors.frequency, **{name: errors_before.frequency[name] for name in kept}},
     )
+
+
+def _stalled(
+    settings: Settings,
+    errors: PeakErrors,
+    before: tuple[Settings, Peak, PeakErrors],
+) -> bool:
+    """Neither all errors together nor those of the respects that were made richer have halved."""
+    poorer, _, own = before
+    refined = [name for name in DIRECTIONS if getattr(settings, name) != getattr(poorer, name)]
+    left, had = (sum(found.height[name] for name in refined) for found in (errors, own))
+    return not (errors.total <= own.total / 2 or left < had / 2)
 
 
 def _few_points(settings: Settings, errors: PeakErrors, fixed: tuple[str, ...]) -> bool:

@@ -150,7 +150,7 @@ def pattern_response(
         solution,
         _free_factor(wheel, pattern, grid),
         float(change) if richer.converged and solution.converged else float("nan"),
-        tuned.height / curve.peak_amplitude - 1,
+        tuned.height / curve.balance_amplitude - 1,
         stress(pattern, solution, peak.blade),
         others,
     )

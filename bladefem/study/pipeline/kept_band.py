@@ -45,7 +45,7 @@ KEPT_BY_STEPS = 50
 FEWEST_POINTS = 4
 # instants of a period of these, and periods before and after with the second number
 INSTANTS_BY_STEPS = (256, 512)
-REFINED_PERIODS = (50, 50)
+REFINED_PERIODS = (75, 25)
 # of the motion at the start: a band that reaches beyond it is marched again with more instants.
 # Steps that are too long for impacts feed them energy: on the shipped wedge with 8e3 N/mm^3 under
 # 80 N, 58 um, 256 instants end between 120 and 550 um, 512 and 1024 on 58.0 +- 0.4 um

@@ -21,6 +21,7 @@ from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import Checked, checked_points, estimated_errors
+from ..adaptive.choice_in_time import MarchedBand
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
 from ..adaptive.layer_change import layer_change
@@ -101,6 +102,9 @@ class Curve:
     unstable_peak: Solution | None = None
     # what the blade does at that one in time; None where it is stable
     kept: KeptBand | None = None
+    # the resonance given is unstable, and a march from it keeps to amplitudes farther off than the
+    # accuracy: the highest of these is given in place of that of the balance
+    marched_instead: bool = False
     # a march from the resonance that its estimated error was taken from; None where richer balances
     # tell it
     in_time: KeptBand | None = None
@@ -124,13 +128,14 @@ class Curve:
         many contact points change (the contact mesh), the body's mesh, and the tangent of a layer
         that stiffens; None where it was not asked for.
 
-        A march from an unstable resonance tells the error of its balance as well, one that ends
-        above a resonance elsewhere adds to it.
+        A march from an unstable resonance tells the error of its balance as well; one that ends
+        above a resonance elsewhere adds to it, and so does the width of one that is given itself.
         """
         if self.settings.error is None:
             return None
         balance = self.settings.error
-        balance = max(balance, self.marched) if self.keeps_unstable else balance + self.marched
+        same = self.keeps_unstable and not self.marched_instead
+        balance = max(balance, self.marched) if same else balance + self.marched
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
         layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
@@ -140,10 +145,13 @@ class Curve:
     def marched(self) -> float:
         """How far from the resonance given the blade was marched where the highest motion is
         unstable, relative to that resonance: to either side of it where it is that motion, above
-        it where it is another. Nothing where a march from there is its error anyway.
+        it where it is another. Nothing where a march from there is its error anyway; the
+        relative width of the band where its upper end is given.
         """
         if self.kept is None or self.kept.reason:
             return 0.0
+        if self.marched_instead:
+            return 1 - self.kept.lowest / self.kept.highest
         if self.keeps_unstable:
             ends = (self.kept.lowest, self.kept.highest)
             beside = max(abs(end / self.peak_amplitude - 1) for end in ends)
@@ -166,7 +174,14 @@ class Curve:
 
     @property
     def peak_amplitude(self) -> float:
-        """[m]"""
+        """That of the balance, or the highest that a march keeps to where it contradicts it [m]."""
+        if self.marched_instead and self.kept is not None:
+            return self.kept.highest
+        return self.balance_amplitude
+
+    @property
+    def balance_amplitude(self) -> float:
+        """Of the periodic motion at the resonance [m]."""
         return size(self.peak)
 
 
@@ -261,7 +276,10 @@ def curve_of(
         richer = richer_models(models, curve.settings)
         marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
     top, kept = _resonance(marches, curve, marks, scene.accuracy)
-    curve, estimated, in_time = _judged_in_time(scene, marches, curve, top)
+    instead = top is peak_of(curve.points) and _contradicts(kept, top, scene.accuracy)
+    estimated, in_time = estimated_errors(curve), None
+    if not instead:
+        curve, estimated, in_time = _judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     rows = [_record(point) for point in curve.points]
     columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
@@ -285,6 +303,7 @@ def curve_of(
         bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
         unstable_peak=None if kept is None else peak_of(curve.points),
         kept=kept,
+        marched_instead=instead,
         in_time=in_time,
         interval=interval,
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
@@ -365,6 +384,15 @@ def _resonance(
     known = not (kept.reason or kept.holds(size(highest), accuracy))
     lower = max(lasting, key=size, default=highest)
     return (lower if known and kept.highest < size(lower) else highest), kept
+
+
+def _contradicts(kept: KeptBand | None, top: Solution, accuracy: float) -> bool:
+    """What the blade keeps to is known, and not the amplitude of the motion that it was marched
+    from.
+    """
+    if kept is None or kept.reason:
+        return False
+    return MarchedBand(kept.lowest, kept.highest).beyond(size(top)) > accuracy
 
 
 def _record(p: Solution) -> dict[str, Any]:

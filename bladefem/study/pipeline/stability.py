@@ -435,7 +435,9 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
-    if curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
+    if curve.marched_instead:
+        lost += f"; the amplitude given, {1e6 * curve.peak_amplitude:.4g} um, is of a march"
+    elif curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
         lost += "; it is given as the resonance"
     elif curve.keeps_unstable:
         lost += "; it is given as the resonance, being the larger amplitude"

@@ -120,14 +120,15 @@ def highest_use(
     stress: DampedStress | None = None,
 ) -> float:
     """The largest utilisation with the estimated error of the mesh and the largest amplitude that
-    a loading history can leave.
+    a loading history can leave, or a march from an unstable motion.
 
     Args:
         number: of the curve under the same load.
         stress: that of the tuned wheel at the curve's resonance when left out.
     """
     curve = run.response.curves[number]
-    share = 1.0
+    # stresses are those of the balance
+    share = curve.peak_amplitude / curve.balance_amplitude
     if curve.interval is not None:
-        share = max(curve.interval.highest / curve.peak_amplitude, 1.0)
+        share = max(curve.interval.highest / curve.balance_amplitude, share)
     return float(used.used[used.worst] * share * (1 + (stress or run.damped[number]).mesh_error))
