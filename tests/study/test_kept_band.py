@@ -175,7 +175,7 @@ PERIODS = np.arange(200)
     ("heights", "periods"),
     [
         # falls to another motion, and stays there
-        (0.9 + 0.1 * np.exp(-PERIODS / 12), 125),
+        (0.9 + 0.1 * np.exp(-PERIODS / 12), 100),
         # leaves the unstable motion slowly: a hundred thousandth first, more with each period
         (1.0 - 1e-5 * np.exp(PERIODS / 23), 200),
         # goes on falling by a thousandth a period

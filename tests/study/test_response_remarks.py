@@ -7,7 +7,11 @@ from types import SimpleNamespace
 import numpy as np
 
 from bladefem.study.pipeline.kept_band import KeptBand
-from bladefem.study.pipeline.response_remarks import beyond_tolerance, resonance_warnings
+from bladefem.study.pipeline.response_remarks import (
+    beyond_tolerance,
+    resonance_warnings,
+    stiff_layer_sentence,
+)
 
 
 def curve(
@@ -35,6 +39,16 @@ def curve(
         estimated=np.array(estimated),
         tolerated=np.array([0.1, 0.05, 0.1]),
     )
+
+
+def test_a_softer_layer_says_where_the_stiff_one_resonates():
+    """Loads whose resonance is that of the layer itself are left out."""
+    shifted, plain = curve(80.0, 0.17), curve(320.0, 0.03)
+    shifted.layer_shift = 0.012
+    plain.layer_shift = np.nan
+    said = stiff_layer_sentence([shifted, plain])
+    assert said.endswith("at 101.2 Hz in place of 100 Hz under 80 N")
+    assert stiff_layer_sentence([plain]) == ""
 
 
 def test_loads_with_one_reason_share_a_sentence():

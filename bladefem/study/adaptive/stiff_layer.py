@@ -8,7 +8,7 @@ wedge with 1e5 N/mm^3 under 80 and 320 N it took 67 and 261 s, without that comp
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,16 @@ PATH_STEPS = 15
 PATH_ACCURACY = 0.01
 # of the way: what is left beyond it is extrapolated
 ENOUGH_OF_THE_WAY = 0.5
+
+
+@dataclass(frozen=True)
+class StiffLayerChange:
+    """Of a resonance, from the softer layer to the layer itself."""
+
+    # relative, of the amplitude; inf where less than half of the way between them was solved
+    height: float
+    # relative, of the frequency, with its sign; NaN there
+    frequency: float
 
 
 def softened_where_lifting(family: Family, settings: Settings, top: Solution) -> Settings:
@@ -107,12 +117,11 @@ def stiff_layer_change(
     settings: Settings,
     top: Solution,
     accuracy: float,
-) -> float:
-    """Relative change of a resonance amplitude from the softer layer to the layer itself; inf where
-    less than half of the way between them was solved.
+) -> StiffLayerChange:
+    """How a resonance moves from the softer layer to the layer itself.
 
-    Where the way was not solved to its end, the largest change on it is taken to go on in
-    proportion to the layer's compliance.
+    Where the way was not solved to its end, the largest change of the amplitude on it and the last
+    one of the frequency are taken to go on in proportion to the layer's compliance.
 
     Args:
         settings, top: of the resonance, and its highest point.
@@ -125,22 +134,26 @@ def stiff_layer_change(
     try:
         base = peak_from(family, settings, top, small, accuracy, fallbacks=False)
     except NotSolvedError:
-        return np.inf
+        return StiffLayerChange(np.inf, np.nan)
     layer = family_member(family, replace(small, softened=False)).model
     largest = 0.0
     solved = 0.0
+    shift = 0.0
     near = base.solution
     for share in PATH_SHARES:
         peak = _peak_on_the_way(stiffened_model(layer, share), small, near, accuracy)
         if peak is None:
             break
         change = abs(peak.height / base.height - 1)
+        shift = peak.omega / base.omega - 1
         if share == 1.0:
-            return change
+            return StiffLayerChange(change, shift)
         near = peak.solution
         solved = share
         largest = max(largest, change)
-    return largest / solved if solved >= ENOUGH_OF_THE_WAY else np.inf
+    if solved < ENOUGH_OF_THE_WAY:
+        return StiffLayerChange(np.inf, np.nan)
+    return StiffLayerChange(largest / solved, shift / solved)
 
 
 def _peak_on_the_way(

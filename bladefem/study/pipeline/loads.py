@@ -121,6 +121,9 @@ class Curve:
     # relative change of the peak's height with the layer's law in place of its tangent; NaN: not
     # estimated
     layer_law: float = np.nan
+    # relative change of the peak's frequency from a softer layer to the stiff one that it stands
+    # for; NaN: none does, or it is not known
+    layer_shift: float = np.nan
 
     @property
     def error(self) -> float | None:
@@ -197,6 +200,8 @@ class UnseenErrors:
     body_mesh: float = np.nan
     # with the layer's law in place of its tangent, or a stiff layer in place of a softer one
     layer_law: float = np.nan
+    # of the frequency, with a stiff layer in place of a softer one
+    layer_shift: float = np.nan
 
 
 def study_loads(
@@ -311,6 +316,7 @@ def curve_of(
         halved=unseen.halved,
         body_mesh=unseen.body_mesh,
         layer_law=unseen.layer_law,
+        layer_shift=unseen.layer_shift,
     )
 
 
@@ -350,14 +356,18 @@ def _unseen_errors(
     # nothing is gained by parts of an error that is unknown as a whole
     if settings.error is not None and not np.isfinite(settings.error):
         return UnseenErrors()
+    if settings.softened:
+        change = stiff_layer_change(models, settings, top, scene.accuracy)
+        layer, shift = change.height, change.frequency
+    else:
+        layer, shift = layer_change(models, settings, top, case.decay), np.nan
     return UnseenErrors(
         np.nan if scene.contact.points else halved_change(models, settings, top),
         np.nan
         if softer is None
         else softened_change(softer, models, case, settings, top, scene.excitation.mode),
-        stiff_layer_change(models, settings, top, scene.accuracy)
-        if settings.softened
-        else layer_change(models, settings, top, case.decay),
+        layer,
+        shift,
     )
 
 

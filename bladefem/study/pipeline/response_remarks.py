@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -88,6 +88,7 @@ def response_remarks(
         )
     remarks.extend(warning(text) for text in map(search_sentence, curves) if text)
     remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
+    remarks.extend(map(warning, filter(None, [stiff_layer_sentence(curves)])))
     remarks.extend(map(warning, resonance_warnings(curves, scene.accuracy)))
     remarks.extend(map(warning, filter(None, [beyond_tolerance(curves)])))
     return remarks
@@ -100,6 +101,24 @@ def search_sentence(curve: Curve) -> str:
     said = "; ".join(curve.notes[:MAX_NOTES])
     more = len(curve.notes) - MAX_NOTES
     return f"load {load_of(curve)}: {said}" + (f"; and {more} more of the kind" if more > 0 else "")
+
+
+def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
+    """Where the stiff layer itself resonates, under loads whose resonance is a softer one's, or
+    "".
+    """
+    each = ", ".join(
+        f"{(1 + c.layer_shift) * c.peak_frequency:.5g} Hz in place of {c.peak_frequency:.5g} Hz "
+        f"under {load_of(c)}"
+        for c in curves
+        if np.isfinite(c.layer_shift)
+    )
+    return (
+        "contacts lift off, and the resonance given is that of a softer layer; followed to the "
+        f"stiff one it lies at {each}"
+        if each
+        else ""
+    )
 
 
 def load_of(curve: Curve) -> str:
