@@ -8,6 +8,7 @@ from __future__ import annotations
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from bladefem.study.adaptive import check_points
 from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.family import Family, Member
+from bladefem.study.adaptive.resonance_choice import PeakErrors
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import first_for
 
@@ -78,3 +80,30 @@ def test_an_unstable_motion_is_not_what_settings_are_chosen_for(monkeypatch):
     heights = {p.omega: size(p) for p in after.points}
     judged = max(heights[omega] for omega in after.errors)
     assert judged <= 0.98 * highest < max(heights.values())
+
+
+def test_flanks_are_judged_by_a_model_as_large_as_that_of_the_peak(monkeypatch):
+    """Contacts that lift off at the resonance limit that one; on the flanks none may lift off."""
+    lifts = {"lift": 2, "slip": 14}
+    points = [
+        SimpleNamespace(
+            omega=100.0 + k,
+            frequency=16.0 + k,
+            converged=True,
+            probe=np.array([[0.0], [amplitude]]),
+            states=lifts if amplitude == 1.0 else {"lift": 0, "slip": 16},
+        )
+        for k, amplitude in enumerate((0.3, 0.6, 0.9, 1.0, 0.9, 0.6, 0.3))
+    ]
+    top = points[3]
+    asked = []
+
+    def compared(family, settings, other, name, point):
+        asked.append(point)
+
+    monkeypatch.setattr(curve_module, "compared_settings", compared)
+    monkeypatch.setattr(curve_module, "judge_settings", lambda *_: first_for(4))
+    errors = PeakErrors({"points": 0.1}, {"points": 0.0}, {"points": SimpleNamespace(omega=103.0)})
+    found = curve_module._checked_flanks(None, first_for(4), points, top, errors)
+    assert len(found) > 1 and len(asked) == len(found) - 1
+    assert all(point is top for point in asked)

@@ -22,6 +22,7 @@ def curve(
     estimated=(0.0, 0.0, 0.0),
     converged=True,
     layer_law=np.nan,
+    body_mesh=np.nan,
     in_time=None,
 ):
     """Three points, the resonance in the middle."""
@@ -31,6 +32,7 @@ def curve(
         error=error,
         halved=halved,
         layer_law=layer_law,
+        body_mesh=body_mesh,
         in_time=in_time,
         peak_amplitude=656e-6,
         frequency=np.array([99.0, 100.0, 101.0]),
@@ -71,6 +73,13 @@ def test_the_part_of_the_layer_is_told_where_it_is_the_larger():
     curves = [curve(18.0, 0.08, layer_law=0.07), curve(36.0, 0.09, layer_law=0.01)]
     (above,) = resonance_warnings(curves, 0.05)
     assert "; 7 % under 18 N are what the tangent of a layer that stiffens leaves out" in above
+
+
+def test_an_error_by_the_mesh_of_the_bodies_says_so():
+    (above,) = resonance_warnings([curve(192.8, 0.071, body_mesh=0.049)], 0.05)
+    assert above.endswith(
+        "4.9 % under 192.8 N are the estimated error of the mesh of the bodies, expected a finer one"
+    )
 
 
 def test_an_error_from_a_march_says_so():

@@ -32,6 +32,7 @@ LARGEST_PARTS = {
         "what half as many contact points change, expected a finer contact mesh "
         "(mesh.seat_elements, mesh.contact_size)"
     ),
+    "body_mesh": "the estimated error of the mesh of the bodies, expected a finer one",
     "layer_law": (
         "what the tangent of a layer that stiffens leaves out, or the softer layer that stands for "
         "a stiff one where contacts lift off, expected a linear, softer one (contact.kn_area) to "
