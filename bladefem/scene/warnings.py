@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from .fields import value_at
 from .kinds import kind_named
 from .part_materials import part_materials
 from .tables import Material, Scene
@@ -14,13 +15,15 @@ from .validate_contact import self_locking
 MODULUS_RANGE = (1e9, 1e12)
 # density [kg/m^3]: foam to osmium
 DENSITY_RANGE = (500.0, 25000.0)
+# mass of an underplatform damper [kg]: small turbines to the last stages of large ones
+DAMPER_MASS_RANGE = (1e-4, 1.0)
 # [m/s] beyond which no disc holds
 MAX_RIM_SPEED = 900.0
 
 
 def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
-    said = [*_doubtful_materials(scene), *_doubtful_mesh(scene)]
+    said = [*_doubtful_materials(scene), *_doubtful_masses(scene), *_doubtful_mesh(scene)]
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
@@ -43,6 +46,20 @@ def _doubtful_material(name: str, material: Material) -> Iterator[str]:
             f"{name}.rho = {show(material.rho, 'kg/m^3')}: solids for machines have 500 to 25000 "
             "kg/m^3"
         )
+
+
+def _doubtful_masses(scene: Scene) -> Iterator[str]:
+    """Of the damper, as the scene gives it and as the study varies it."""
+    field = kind_named(scene.kind).damper_mass
+    given = None if field is None else value_at(scene, field)
+    named = {} if field is None or given is None else {field: (given,)}
+    for name, masses in {**named, "study.masses": scene.study.masses or ()}.items():
+        outside = [m for m in masses if not DAMPER_MASS_RANGE[0] <= m <= DAMPER_MASS_RANGE[1]]
+        if outside:
+            yield (
+                f"{name} = {', '.join(show(mass, 'kg') for mass in outside)}: underplatform "
+                "dampers have 0.1 g to 1 kg"
+            )
 
 
 def _doubtful_speed(scene: Scene) -> Iterator[str]:

@@ -30,6 +30,11 @@ def test_shipped_scenes_raise_none(file):
             "material.damper.rho=7.85 kg/m^3",
             "material.damper.rho = 7.85 kg/m^3: solids for machines have 500 to 25000",
         ),
+        ("damper.mass=3 kg", "damper.mass = 3 kg: underplatform dampers have 0.1 g to 1 kg"),
+        (
+            "study.masses=20 g, 3 kg",
+            "study.masses = 3 kg: underplatform dampers have 0.1 g to 1 kg",
+        ),
         ("operation.speed=8000 rad/s", "the rim at 200 mm moves with 1600 m/s"),
         ("operation.speed=30000 rpm", "the tip at 365 mm moves with 1147 m/s"),
         (
