@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from processes import clean_environment, on_ranks
+from processes import clean_environment, run_on_ranks
 
 import bladefem.report
 import bladefem.study.pipeline
@@ -598,11 +598,9 @@ sys.exit(ranks.exit_code_of(action, SimpleNamespace()))
 )
 def test_no_rank_waits_for_ever(all_ranks, message):
     program = ONE_RANK_FAILS.format(all=all_ranks)
-    done = subprocess.run(
-        on_ranks(2, [sys.executable, "-c", program]),
-        capture_output=True,
-        text=True,
-        env=clean_environment(),
+    done = run_on_ranks(
+        2,
+        [sys.executable, "-c", program],
         timeout=60,
     )
     assert done.returncode == 2 and done.stderr.count(message) == 1, done.stderr
@@ -622,11 +620,9 @@ def test_a_scene_is_read_by_one_rank_and_solved_by_two(tmp_path):
         ),
         *("--set", "mesh.scale=4", "--set", "study.loads=20 N"),
     ]
-    done = subprocess.run(
-        on_ranks(2, command),
-        capture_output=True,
-        text=True,
-        env=clean_environment(),
+    done = run_on_ranks(
+        2,
+        command,
         timeout=120,
     )
     assert done.returncode == 0, done.stderr

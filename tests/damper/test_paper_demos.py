@@ -2,12 +2,11 @@
 demos/paper_NAME.py
 """
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from processes import clean_environment, on_ranks
+from processes import run_on_ranks
 
 HERE = Path(__file__).resolve().parents[2]
 # blades: 10.6852 on half the element size, 10.41 on the seats of ten elements that are too coarse
@@ -17,12 +16,11 @@ PINNED = {"element": 0.542996, "contact": 0.97322916, "zmass": 0.105900, "blades
 def output(name: str, ranks: int = 1) -> list[str]:
     """Lines that a demo prints in its coarse setting."""
     command = [sys.executable, f"demos/paper_{name}.py"]
-    done = subprocess.run(
-        on_ranks(ranks, command),
+    done = run_on_ranks(
+        ranks,
+        command,
         cwd=HERE,
-        env={**clean_environment(), "BLADEFEM_COARSE": "1", "PYTHONPATH": str(HERE)},
-        capture_output=True,
-        text=True,
+        variables={"BLADEFEM_COARSE": "1", "PYTHONPATH": str(HERE)},
         timeout=600,
     )
     assert done.returncode == 0, done.stderr[-3000:]

@@ -6,12 +6,11 @@ the pin and 1e-8 between rank counts. Remake them with: BLADEFEM_COARSE=1 ./run 
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from processes import clean_environment, on_ranks
+from processes import run_on_ranks
 
 HERE = Path(__file__).resolve().parents[2]
 PINNED = {
@@ -30,12 +29,11 @@ PINNED = {
 def final_number(name: str, ranks: int) -> float:
     """The last number that a demo prints."""
     command = [sys.executable, f"demos/{name}.py"]
-    done = subprocess.run(
-        on_ranks(ranks, command),
+    done = run_on_ranks(
+        ranks,
+        command,
         cwd=HERE,
-        env={**clean_environment(), "BLADEFEM_COARSE": "1"},
-        capture_output=True,
-        text=True,
+        variables={"BLADEFEM_COARSE": "1"},
         timeout=900,
     )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]

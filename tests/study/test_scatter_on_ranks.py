@@ -1,13 +1,12 @@
 """'bladefem scatter' on two ranks: the files of one rank."""
 
 import shutil
-import subprocess
 import sys
 
 import numpy as np
 import pandas as pd
 from mistuned import COARSE_MISTUNED, MISTUNED
-from processes import clean_environment, on_ranks
+from processes import run_on_ranks
 
 FEW_WHEELS = [*COARSE_MISTUNED, "mistuning.wheels=3", "mistuning.families=1"]
 
@@ -23,11 +22,10 @@ def scatter(folder, ranks):
         "-o",
         str(folder),
     ]
-    done = subprocess.run(
-        on_ranks(ranks, [*command, *changes]),
-        capture_output=True,
-        text=True,
-        env=clean_environment(),
+    done = run_on_ranks(
+        ranks,
+        [*command, *changes],
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout

@@ -1,11 +1,10 @@
 """Wheels dealt out over ranks: the statistics are those of one rank, whatever their number."""
 
-import subprocess
 import sys
 
 import numpy as np
 import pytest
-from processes import clean_environment, on_ranks
+from processes import run_on_ranks
 
 # the smallest wheel, and fewer wheels than some numbers of ranks
 PROGRAM = """
@@ -37,11 +36,10 @@ if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
 def statistics_on(ranks, folder):
     """What the last of some ranks knows."""
     file = folder / f"{ranks}.npz"
-    done = subprocess.run(
-        on_ranks(ranks, [sys.executable, "-c", PROGRAM, str(file)]),
-        capture_output=True,
-        text=True,
-        env=clean_environment(),
+    done = run_on_ranks(
+        ranks,
+        [sys.executable, "-c", PROGRAM, str(file)],
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr
     return np.load(file)

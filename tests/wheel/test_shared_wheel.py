@@ -1,12 +1,11 @@
 """One wheel's sectors and nodal diameters shared by ranks: the motion is that of one rank."""
 
-import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import clean_environment, on_ranks
+from processes import run_on_ranks
 
 # six sectors and four nodal diameters: of five ranks one has neither
 PROGRAM = """
@@ -42,11 +41,9 @@ def motion_on(ranks, folder):
     """What the last of some ranks knows."""
     file = folder / f"{ranks}.npz"
     here = str(Path(__file__).parent)
-    done = subprocess.run(
-        on_ranks(ranks, [sys.executable, "-c", PROGRAM, str(file), here]),
-        capture_output=True,
-        text=True,
-        env=clean_environment(),
+    done = run_on_ranks(
+        ranks,
+        [sys.executable, "-c", PROGRAM, str(file), here],
         timeout=120,
     )
     assert done.returncode == 0, done.stderr
