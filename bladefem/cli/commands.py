@@ -273,11 +273,12 @@ def prepared(
 
     def prepare() -> Scene:
         from ..io.run_folder import keep_given, lock_run_folder, take_folder
+        from ..study.pipeline.stage_inputs import same_mesh
 
         scene = given_scene(options, responds)
         given = _given_fields(options)
         options.held.enter_context(lock_run_folder(folder))
-        moved = take_folder(folder, scene)
+        moved = take_folder(folder, scene, same_mesh)
         keep_given(folder, given)
         if moved and not options.quiet:
             print(f"bladefem: {moved}", file=sys.stderr, flush=True)

@@ -8,7 +8,7 @@ import fcntl
 import json
 import os
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -22,6 +22,8 @@ EARLIER_FOLDER = "earlier"
 GIVEN_FIELDS_FILE = "given.json"
 # not all .msh are results: a mesh of the user's own may lie in the folder
 NAMED_MESH = "named_mesh.msh"
+# what belongs to the mesh alone
+MESH_FILES = (NAMED_MESH, "mesh.vtu")
 RESULT_SUFFIXES = (
     ".csv",
     ".gif",
@@ -66,12 +68,20 @@ def lock_run_folder(folder: str | Path) -> Iterator[None]:
         os.close(file)
 
 
-def take_folder(folder: str | Path, scene: Scene) -> str:
+def take_folder(
+    folder: str | Path,
+    scene: Scene,
+    same_mesh: Callable[[Scene, Scene], bool] | None = None,
+) -> str:
     """Write the scene into a run folder; results of another scene are put away into its folder
     "earlier".
 
     Stages stay: each knows by its hash whether it belongs to the scene. Folders inside with a scene
     of their own stay as well.
+
+    Args:
+        same_mesh: whether two scenes have the same mesh, whose files then stay; files of the mesh
+            go with the other results when left out.
 
     Returns:
         a sentence about what was put away, or "".
@@ -81,7 +91,12 @@ def take_folder(folder: str | Path, scene: Scene) -> str:
     """
     folder = open_folder(folder)
     file = folder / "scene.toml"
-    said = _put_away(folder) if file.is_file() and not _holds(file, scene) else ""
+    said = ""
+    if file.is_file():
+        held = _read(file)
+        if held != scene:
+            keep_mesh = same_mesh is not None and held is not None and same_mesh(held, scene)
+            said = _put_away(folder, MESH_FILES if keep_mesh else ())
     write_text(file, dump_scene(scene))
     return said
 
@@ -121,21 +136,22 @@ def given_fields(folder: str | Path) -> list[str] | None:
     return [str(name) for name in names] if isinstance(names, list) else None
 
 
-def _holds(file: Path, scene: Scene) -> bool:
-    """Whether a file is this very scene; one that an older program wrote may not be readable."""
+def _read(file: Path) -> Scene | None:
+    """The scene of a file; None for one that an older program wrote and that is not readable."""
     try:
-        return load_scene(file) == scene
+        return load_scene(file)
     except InputError:
-        return False
+        return None
 
 
-def _put_away(folder: Path) -> str:
-    """Move results, with the scene that they belong to."""
+def _put_away(folder: Path, kept: Container[str]) -> str:
+    """Move results other than the kept files, with the scene that they belong to."""
     results = [
         p
         for p in folder.iterdir()
         if (p.suffix in RESULT_SUFFIXES or p.name == NAMED_MESH)
         and not p.name.startswith(".")
+        and p.name not in kept
         and p.is_file()
     ]
     if not results:

@@ -24,6 +24,7 @@ from ..study.modes.comparison import family_table
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import Survey, Wanted, excited_set, survey_modes
 from ..study.pipeline.run_records import folder_of
+from ..study.pipeline.stage_inputs import all_declared
 from ..util.communicator import Communicator
 from ..util.progress import Progress, without_progress
 from ..view import convergence, forced, mesh, modes, speed
@@ -230,6 +231,9 @@ def _report(
             [] if result.convergence is not None else [MESH_STEP],
             "report_modes",
             f"{run.scene.kind}, natural frequencies and mode shapes",
+            # damping: of forced responses
+            inputs={"operation", *all_declared("survey", run.scene)}
+            | all_declared("stress", run.scene),
         ),
     )
 

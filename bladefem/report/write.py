@@ -8,7 +8,7 @@ import json
 import mimetypes
 import os
 import struct
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from importlib import resources
@@ -23,7 +23,7 @@ from bladefem.io.run_folder import given_fields
 from bladefem.io.stage_cache import library_versions, open_folder, write_text
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
-from bladefem.scene.toml import dump_scene, resolved_rows
+from bladefem.scene.toml import Row, dump_scene, resolved_rows
 from bladefem.util.message import by_level
 
 from .captions import caption_of
@@ -81,6 +81,8 @@ class Page:
     subject: str = ""
     # numbers after the first ones
     more: Sequence[Headline] = ()
+    # fields and whole tables among the inputs that the results depend on; all when left out
+    inputs: Collection[str] | None = None
 
 
 def write_report(
@@ -173,7 +175,7 @@ def page_contents(
         "subject": page.subject or scene.kind,
         "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
         "inputs_hash": inputs_hash(scene),
-        "inputs": resolved_rows(scene, given),
+        "inputs": _relevant(resolved_rows(scene, given), page.inputs),
         "mark": "changed" if given is None else "given",
         "statements": statements,
         "warnings": said["warning"],
@@ -310,6 +312,13 @@ def page_table(
         "left_out": max(len(table) - MAX_PAGE_ROWS, 0),
         "columns_left_out": table.attrs.get("left_out", []),
     }
+
+
+def _relevant(rows: list[Row], inputs: Collection[str] | None) -> list[Row]:
+    """The rows that are named, themselves or by their table."""
+    if inputs is None:
+        return rows
+    return [row for row in rows if any(f"{row.name}.".startswith(f"{name}.") for name in inputs)]
 
 
 def inputs_hash(scene: Scene) -> str:

@@ -80,6 +80,13 @@ def test_folder_holds_tables_pictures_and_shapes(folder):
     assert table["family"].iloc[0] == "first flap"
 
 
+def test_the_page_lists_inputs_of_the_modes_alone(folder):
+    page = (folder / "report_modes.md").read_text()
+    for name in ("material.blade.E", "operation.damping", "support.clamp", "mesh.size"):
+        assert f"{name} " in page or f"`{name}`" in page
+    assert not any(name in page for name in ("contact.mu", "study.loads", "model.harmonics"))
+
+
 def test_a_run_equals_itself_and_another_mesh_is_recognised(folder, tmp_path, capsys):
     other = [
         *PLANE[:-1],

@@ -11,6 +11,7 @@ from bladefem.errors import InputError
 from bladefem.io.run_folder import lock_run_folder, take_folder
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
+from bladefem.study.pipeline.stage_inputs import same_mesh
 
 OTHER = vary(Scene(), contact__mu=0.2)
 
@@ -49,6 +50,17 @@ def test_results_go_with_their_scene_and_stages_stay(tmp_path):
     )
     assert take_folder(tmp_path, Scene()) == ""  # nothing to put away: what is there stays
     assert (tmp_path / "earlier" / "report.md").read_text() == "first"
+
+
+def test_files_of_a_mesh_stay_while_it_is_the_same(tmp_path):
+    take_folder(tmp_path, Scene())
+    for name in ("mesh.vtu", "named_mesh.msh", "report.md"):
+        (tmp_path / name).write_text("first")
+    assert "1 file moved" in take_folder(tmp_path, OTHER, same_mesh)
+    assert {"mesh.vtu", "named_mesh.msh"} < results(tmp_path)
+    finer = vary(OTHER, mesh__scale=0.5)
+    assert "2 files moved" in take_folder(tmp_path, finer, same_mesh)
+    assert not {"mesh.vtu", "named_mesh.msh"} & results(tmp_path)
 
 
 def test_a_scene_that_cannot_be_read_counts_as_another(tmp_path):

@@ -14,7 +14,11 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.modes.clamped_aerofoil import clamped_blade
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline import stages
-from bladefem.study.pipeline.stage_inputs import STAGE_INPUTS, declared_fields, stage_key
+from bladefem.study.pipeline.stage_inputs import (
+    all_declared,
+    declared_fields,
+    stage_key,
+)
 from geometry.builders import build_here
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -40,14 +44,6 @@ def watched(value, read, path=""):
 def covered(field, declared):
     """A declared name is the field itself or a table that holds it."""
     return any(field == name or field.startswith(f"{name}.") for name in declared)
-
-
-def all_declared(stage, scene):
-    """Fields of a stage and of those before it."""
-    names = set(declared_fields(stage, scene))
-    for earlier in STAGE_INPUTS[stage].after:
-        names |= all_declared(earlier, scene)
-    return names
 
 
 @pytest.fixture(scope="module")

@@ -167,6 +167,17 @@ def stage_key(name: str, scene: Scene, *more: Any) -> str:
     return key_of(name, keys, values, code_of(*STAGE_INPUTS[name].code), stamp, *more)
 
 
+def same_mesh(one: Scene, other: Scene) -> bool:
+    """Whether two scenes have the same mesh: the same stored one serves both."""
+    return stage_key("mesh", one) == stage_key("mesh", other)
+
+
+def all_declared(name: str, scene: Scene) -> set[str]:
+    """The fields and tables of a stage and of those before it."""
+    fields = set(declared_fields(name, scene))
+    return fields.union(*(all_declared(before, scene) for before in STAGE_INPUTS[name].after))
+
+
 def declared_fields(name: str, scene: Scene) -> Iterator[str]:
     """The fields and tables that a stage itself declares; those of the mesh hang on the kind."""
     if name == "mesh":
