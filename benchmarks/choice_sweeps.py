@@ -72,9 +72,9 @@ from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, family_member, family_of
 from bladefem.study.adaptive.frequency_list import adapt_frequency_list
 from bladefem.study.adaptive.settings import Settings, first_for, restarted_settings
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
 from bladefem.study.pipeline.pipeline import run
-from bladefem.study.pipeline.stages import Bodies
 
 HOLDS = (31, 1024)  # harmonics and samples of a fixed model that keeps 0.1 % over lift-off
 ACCURACIES = (0.02, 0.001)

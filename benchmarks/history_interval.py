@@ -27,8 +27,8 @@ from bladefem.hbm.peak import Peak, find_peak
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
 from bladefem.study.pipeline import case_models, pipeline
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.loads import curve_of
-from bladefem.study.pipeline.stages import Bodies
 from bladefem.util.progress import without_progress
 
 LOADS = (640.0, 1300.0, 2600.0)

@@ -61,8 +61,8 @@ def timed(work: Callable[[], Any]) -> tuple[float, float, Any]:
 def on_ranks(folder: Path) -> None:
     """The row of one number of ranks, written by rank 0."""
     from bladefem.fem.compat import MPI
+    from bladefem.study.pipeline.bodies import Bodies
     from bladefem.study.pipeline.stages import (
-        Bodies,
         contact_patches,
         reduce_sector,
         sector_of,

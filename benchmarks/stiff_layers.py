@@ -24,9 +24,10 @@ from bladefem.study.adaptive.settings import Settings, first_settings
 from bladefem.study.chart.cpu_clock import running_clock
 from bladefem.study.pipeline import case_models, pipeline
 from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stage_inputs import stage_key
-from bladefem.study.pipeline.stages import Bodies, harmonic_diameters, reduce_sector
+from bladefem.study.pipeline.stages import harmonic_diameters, reduce_sector
 from bladefem.util.progress import without_progress
 
 LAYERS = ("40", "400", "4000", "10000", "40000", "100000", "rigid", "default")

@@ -64,6 +64,7 @@ from bladefem.study.adaptive.indicators import moved_solution
 from bladefem.study.adaptive.settings import Settings, restarted_settings, scene_line
 from bladefem.study.chart.cpu_clock import Clock, running_clock
 from bladefem.study.chart.rows import parabola_resonance
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.seated_loads import seat_every_load
@@ -74,7 +75,7 @@ from bladefem.study.pipeline.stability import (
     stability_of,
 )
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
-from bladefem.study.pipeline.stages import Bodies, build_mesh, contact_patches
+from bladefem.study.pipeline.stages import build_mesh, contact_patches
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs" / "figures"

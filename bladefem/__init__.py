@@ -12,7 +12,7 @@ from .util.lazy import lazy_getattr
 __version__ = "0.1.0"
 
 _WHERE = {
-    "Bodies": ".study.pipeline.stages",
+    "Bodies": ".study.pipeline.bodies",
     "InputError": ".errors",
     "NotSolvedError": ".errors",
     "Scene": ".scene.tables",

@@ -9,7 +9,8 @@ from bladefem.fem.compat import MPI
 from bladefem.fem.groups import group_size, shared_out
 from bladefem.fem.memory import modal_solve_memory
 from bladefem.scene.tables import Scene
-from bladefem.study.pipeline.stages import Bodies, wheel_modes
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import wheel_modes
 
 pytestmark = pytest.mark.mpi
 

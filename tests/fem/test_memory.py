@@ -23,7 +23,7 @@ from bladefem.fem.memory import (
 )
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material, Scene
-from bladefem.study.pipeline.stages import Bodies
+from bladefem.study.pipeline.bodies import Bodies
 
 
 @pytest.mark.parametrize(

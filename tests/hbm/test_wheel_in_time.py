@@ -20,9 +20,10 @@ from bladefem.hbm.solve import solve
 from bladefem.reduction.truncate import truncate_modes
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.assemble_model import joint_model
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
 from bladefem.study.pipeline.run_records import Seating
-from bladefem.study.pipeline.stages import Bodies, build_mesh, reduce_sector, seat_damper
+from bladefem.study.pipeline.stages import build_mesh, reduce_sector, seat_damper
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 BLADES = 4

@@ -14,6 +14,7 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.modes.clamped_aerofoil import clamped_blade
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline import stages
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.stage_inputs import (
     all_declared,
     declared_fields,
@@ -50,7 +51,7 @@ def covered(field, declared):
 def plane():
     scene = load_scene(SCENES / "plane.toml", ["mesh.scale=3"])
     mesh = build_here(scene)
-    bodies = stages.Bodies(scene, mesh)
+    bodies = Bodies(scene, mesh)
     patches = [make_patch(mesh, name) for name in ("this", "next")]
     modes = stages.find_modes(bodies)
     return SimpleNamespace(scene=scene, mesh=mesh, bodies=bodies, patches=patches, modes=modes)
@@ -59,17 +60,17 @@ def plane():
 STAGES = {
     "mesh": lambda scene, known: build_here(scene),
     "modes": lambda scene, known: (
-        stages.find_modes(stages.Bodies(scene, known.mesh)),
-        clamped_blade(stages.Bodies(scene, known.mesh)),
+        stages.find_modes(Bodies(scene, known.mesh)),
+        clamped_blade(Bodies(scene, known.mesh)),
     ),
     "stress": lambda scene, known: mode_strength(
-        stages.Bodies(scene, known.mesh), stages.excited_modes(scene, known.mesh, known.modes)
+        Bodies(scene, known.mesh), stages.excited_modes(scene, known.mesh, known.modes)
     ),
     "contact": lambda scene, known: stages.condense_contact(
-        stages.Bodies(scene, known.mesh), known.patches
+        Bodies(scene, known.mesh), known.patches
     ),
     "reduction": lambda scene, known: stages.reduce_sector(
-        stages.Bodies(scene, known.mesh), known.patches, [0], 5
+        Bodies(scene, known.mesh), known.patches, [0], 5
     ),
 }
 

@@ -18,8 +18,9 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import body_mesh, pipeline
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.body_mesh import softened_change
-from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes, reduce_sector
+from bladefem.study.pipeline.stages import build_mesh, find_modes, reduce_sector
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))

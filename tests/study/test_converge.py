@@ -29,7 +29,8 @@ from bladefem.study.modes.mesh_convergence import (
     paired_modes,
     richardson,
 )
-from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import build_mesh, find_modes
 from geometry.export import write_msh
 
 

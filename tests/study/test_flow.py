@@ -18,11 +18,11 @@ from bladefem.study.mistuning.blade_stress import WheelShapes, all_modes, blade_
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import flutter as subject
 from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
 from bladefem.study.pipeline.damped_motion import damped_motion
 from bladefem.study.pipeline.flow import scene_flow
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
-from bladefem.study.pipeline.stages import Bodies
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.solve import solve_wheel
 

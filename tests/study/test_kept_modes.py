@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from bladefem.scene.toml import load_scene
-from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes, reduce_sector
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import build_mesh, find_modes, reduce_sector
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 

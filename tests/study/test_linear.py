@@ -32,7 +32,8 @@ from bladefem.study.modes.linear_response_report import (
     stress_states,
     stress_table,
 )
-from bladefem.study.pipeline.stages import Bodies, wheel_modes
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import wheel_modes
 from geometry.mesh import Mesh
 
 COUNT, SMALL = 5, (2, 1, 1)

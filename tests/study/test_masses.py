@@ -5,8 +5,8 @@ density.
 import numpy as np
 
 from bladefem.scene.toml import load_scene
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.stages import (
-    Bodies,
     build_mesh,
     contact_patches,
     reduce_sector,

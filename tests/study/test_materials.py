@@ -15,7 +15,8 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
 from bladefem.scene.part_materials import part_materials
 from bladefem.scene.tables import Imported, Material, Operation, Scene
-from bladefem.study.pipeline.stages import Bodies, find_modes
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import find_modes
 from geometry.export import write_msh
 from geometry.imported import read_mesh
 

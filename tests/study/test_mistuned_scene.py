@@ -28,10 +28,10 @@ from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
 from bladefem.study.pipeline.damped_motion import damped_stress
 from bladefem.study.pipeline.preflight import refuse_run
-from bladefem.study.pipeline.stages import Bodies
 from bladefem.study.pipeline.utilisation import (
     blade_nodes,
     lowest_curve,

@@ -22,7 +22,8 @@ from bladefem.study.modes.mesh_transfer import (
     transfer_fields,
 )
 from bladefem.study.modes.survey import clamped_blade
-from bladefem.study.pipeline.stages import Bodies, build_mesh, find_modes
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import build_mesh, find_modes
 from geometry.mesh import Mesh
 
 

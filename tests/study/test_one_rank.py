@@ -6,13 +6,12 @@ import pytest
 from bladefem import load_scene
 from bladefem.fem.compat import MPI
 from bladefem.reduction.other_diameters import spanned_models
+from bladefem.study.pipeline.bodies import Bodies, on_one_rank
 from bladefem.study.pipeline.stages import (
     KEPT_MODES,
-    Bodies,
     build_mesh,
     contact_patches,
     find_modes,
-    on_one_rank,
     reduce_sector,
 )
 

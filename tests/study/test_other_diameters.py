@@ -12,6 +12,7 @@ from bladefem.hbm.stability import stability_verdict
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_member
 from bladefem.study.adaptive.settings import first_settings
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, other_diameters
 from bladefem.study.pipeline.other_diameters import (
     ClassVerdict,
@@ -20,7 +21,7 @@ from bladefem.study.pipeline.other_diameters import (
 )
 from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.stability import Disturbances
-from bladefem.study.pipeline.stages import Bodies, build_mesh, reduce_sector, seat_damper
+from bladefem.study.pipeline.stages import build_mesh, reduce_sector, seat_damper
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 MODES = 20

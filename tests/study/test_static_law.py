@@ -12,10 +12,10 @@ from bladefem.contact.seating import solve_seating as seat
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.solve import solve
 from bladefem.study.pipeline.assemble_model import joint_model
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
 from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.stages import (
-    Bodies,
     build_mesh,
     harmonic_diameters,
     on_layer,

@@ -11,7 +11,8 @@ import pytest
 from bladefem.report.run import _coriolis
 from bladefem.scene.tables import Excitation, Material, Materials, Operation, Scene
 from bladefem.study.modes.stress import mode_strength
-from bladefem.study.pipeline.stages import Bodies, excited_modes, find_modes
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.stages import excited_modes, find_modes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))
 from structured import box

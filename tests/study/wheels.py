@@ -6,7 +6,7 @@ import numpy as np
 
 from bladefem.fem import shape_functions as shape
 from bladefem.scene.tables import Excitation, Operation, Scene
-from bladefem.study.pipeline.stages import Bodies
+from bladefem.study.pipeline.bodies import Bodies
 from geometry.mesh import Mesh, Pair, Sector
 
 

@@ -25,9 +25,9 @@ from bladefem.reduction.assemble import recombine_contact
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
+from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.stage_inputs import stage_key
 from bladefem.study.pipeline.stages import (
-    Bodies,
     Reduced,
     build_mesh,
     condense_contact,

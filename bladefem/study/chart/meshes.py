@@ -30,12 +30,12 @@ from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import family_member
 from ..adaptive.settings import Settings
+from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import EXACT_HARMONICS, family_of_case, load_cases
 from ..pipeline.coriolis import with_coriolis
 from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
 from ..pipeline.run_records import Seating
 from ..pipeline.stages import (
-    Bodies,
     build_mesh,
     contact_patches,
     harmonic_diameters,

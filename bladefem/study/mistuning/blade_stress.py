@@ -21,6 +21,7 @@ from ...util.arrays import ComplexArray
 from ...wheel.model import Pattern, Wheel
 from ...wheel.solve import WheelSolution, deviation_forces
 from ..pipeline.assemble_model import LoadCase
+from ..pipeline.bodies import Bodies
 from ..pipeline.coriolis import response_damping
 from ..pipeline.damped_motion import (
     MAX_FREQUENCY_RATIO,
@@ -31,7 +32,7 @@ from ..pipeline.damped_motion import (
 )
 from ..pipeline.flow import family_modes, flowing_modes, scene_flow
 from ..pipeline.ports import Ports, blade_ports
-from ..pipeline.stages import MODES_SHOWN, Bodies, wheel_modes
+from ..pipeline.stages import MODES_SHOWN, wheel_modes
 
 # name of the modes that bodies keep
 SHAPES_KEY = "modes of all nodal diameters"

@@ -30,7 +30,8 @@ from ...errors import InputError
 from ...scene.tables import Scene
 from ...wheel.model import Pattern
 from ..modes.comparison import blade_root
-from ..pipeline.stages import Bodies, blade_parts, build_mesh
+from ..pipeline.bodies import Bodies, blade_parts
+from ..pipeline.stages import build_mesh
 
 if TYPE_CHECKING:
     from ...fem.held_part import HeldPart

@@ -29,12 +29,12 @@ from ...wheel.statistics import (
     wheel_respond,
 )
 from ..pipeline.assemble_model import LoadCase
+from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases
 from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.stage_inputs import stage_key
-from ..pipeline.stages import Bodies
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_stress import WheelShapes, all_modes, blade_stress
 from .law_level import law_level, with_checks

@@ -21,10 +21,11 @@ from ...wheel.model import Wheel, engine_order
 from ..adaptive.family import coarsened_elements
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
+from ..pipeline.bodies import Bodies
 from ..pipeline.contact_cycle import element_labels
 from ..pipeline.coriolis import with_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
-from ..pipeline.stages import Bodies, Reduced, reduce_sector, with_damper_mass
+from ..pipeline.stages import Reduced, reduce_sector, with_damper_mass
 from .other_blades import foot_of
 from .validate import read_orders
 

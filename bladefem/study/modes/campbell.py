@@ -23,7 +23,7 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...scene.fields import split_values
 from ...scene.units import is_plain, parse
-from ..pipeline.stages import Bodies, is_wheel
+from ..pipeline.bodies import Bodies, is_wheel
 from .crossings import (
     campbell_crossings,
     crossing_margins,

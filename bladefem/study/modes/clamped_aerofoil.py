@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ...data import ModeSet
-from ..pipeline.stages import MODES_SHOWN, Bodies, is_wheel
+from ..pipeline.bodies import Bodies, is_wheel
+from ..pipeline.stages import MODES_SHOWN
 from .comparison import blade_root
 
 

@@ -23,9 +23,9 @@ from ...hbm.linear_resonances import wave_frequencies
 from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
 from ...util.arrays import RealArray, RealOrComplex
+from ..pipeline.bodies import Bodies, is_wheel
 from ..pipeline.coriolis import coriolis_in_response
 from ..pipeline.ports import blade_ports
-from ..pipeline.stages import Bodies, is_wheel
 
 if TYPE_CHECKING:
     from ...fem.flexibility import Flexibility

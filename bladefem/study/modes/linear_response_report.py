@@ -17,8 +17,8 @@ from ...hbm.model import Damping
 from ...hbm.parallel import share_work
 from ...scene.fields import split_values
 from ...scene.units import parse
+from ..pipeline.bodies import Bodies
 from ..pipeline.ports import blade_ports
-from ..pipeline.stages import Bodies
 from .linear_response import (
     Forced,
     displacement_at,

@@ -32,7 +32,8 @@ from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
-from ..pipeline.stages import Bodies, blade_dofs, build_mesh, find_modes
+from ..pipeline.bodies import Bodies, blade_dofs
+from ..pipeline.stages import build_mesh, find_modes
 from .comparison import mac_of
 from .mesh_transfer import nodal_volumes, transfer_fields
 

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...data import ModeSet
 from ...util.arrays import RealArray
+from ..pipeline.bodies import Bodies
 from ..pipeline.coriolis import mode_shift
 from ..pipeline.ports import blade_ports
-from ..pipeline.stages import Bodies
 from .linear_response import static_offset
 
 

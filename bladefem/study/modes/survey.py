@@ -24,9 +24,10 @@ from ...util.communicator import Communicator
 from ...util.message import method
 from ...util.progress import Progress, without_progress
 from ..pipeline import pipeline
+from ..pipeline.bodies import Bodies, is_wheel
 from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
-from ..pipeline.stages import MODES_SHOWN, Bodies, excited_modes, is_wheel, wheel_modes
+from ..pipeline.stages import MODES_SHOWN, excited_modes, wheel_modes
 from ..pipeline.validate_mesh import check_blade, refuse_loads
 from .campbell import Campbell, campbell_tables
 from .clamped_aerofoil import clamped_blade

@@ -22,8 +22,9 @@ from ..adaptive.changed_peak import changed_peak
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
+from .bodies import Bodies
 from .ports import blade_ports
-from .stages import Bodies, Reduced
+from .stages import Reduced
 
 # deviation of the modes seen by the reduction from those of the stage, beyond which they are not
 # the same ones

@@ -27,6 +27,7 @@ from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak, peak_fr
 from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
 from ..adaptive.stiff_layer import softened_where_lifting
 from .assemble_model import LoadCase, joint_model
+from .bodies import Bodies, is_wheel
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
 from .changed_cases import seated_case
 from .contact_cycle import element_labels
@@ -34,14 +35,7 @@ from .coriolis import with_coriolis
 from .liftoff import naming_the_load
 from .run_records import Seating
 from .stage_inputs import stage_key
-from .stages import (
-    Bodies,
-    Reduced,
-    harmonic_diameters,
-    is_wheel,
-    reduce_sector,
-    with_damper_mass,
-)
+from .stages import Reduced, harmonic_diameters, reduce_sector, with_damper_mass
 
 # higher ones borrow the nodal diameter next to their own
 EXACT_HARMONICS = 3

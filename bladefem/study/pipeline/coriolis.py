@@ -17,7 +17,8 @@ from ...hbm.linear_resonances import wave_frequencies
 from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
-from .stages import MODES_SHOWN, Bodies, Reduced, excited_modes, rotation_of
+from .bodies import Bodies, rotation_of
+from .stages import MODES_SHOWN, Reduced, excited_modes
 
 # of the accuracy: shift of a frequency that responses may leave out
 CORIOLIS_SHARE = 0.1

@@ -24,11 +24,11 @@ from ...scene.support import area_springs, held_letters
 from ...util.arrays import ComplexArray, RealArray
 from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
+from .bodies import Bodies, is_wheel
 from .contact_cycle import element_labels
 from .coriolis import response_damping
 from .flow import family_modes, flowing_modes, scene_flow
 from .ports import blade_ports
-from .stages import Bodies, is_wheel
 
 # highest harmonic's frequency over the highest mode's: beyond it the inertia series is too slow
 MAX_FREQUENCY_RATIO = 0.8

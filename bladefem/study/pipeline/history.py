@@ -24,7 +24,8 @@ from ...data import Patch
 from ...errors import InputError
 from ...scene.material_table import operating_materials
 from ...scene.tables import Scene
-from .stages import Bodies, seat_clearance
+from .bodies import Bodies
+from .stages import seat_clearance
 
 FRICTIONLESS = "frictionless"
 

@@ -22,6 +22,7 @@ from ..adaptive.contact_mesh import coarse_sentence
 from ..adaptive.settings import first_settings
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import mode_strength
+from .bodies import Bodies, on_one_rank
 from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
 from .flutter import find_flutter, flutter_sentences
@@ -31,7 +32,7 @@ from .run_records import ModalRun, ReducedRun, Run, SeatedRun, SolvedRun
 from .seated_loads import seat_every_load
 from .stage_inputs import stage_key
 from .stage_runner import Folder, StageClock, StageRunner
-from .stages import Bodies, build_mesh, excited_modes, find_modes, on_one_rank
+from .stages import build_mesh, excited_modes, find_modes
 from .validate_mesh import check_blade, found_patches
 
 STAGES = ("mesh", "modes", "contact", "reduction", "response")

@@ -19,6 +19,7 @@ from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
 from .assemble_model import LoadCase, rigid_body
 from .best_load import BestLoad, chart_loads, find_best_load
+from .bodies import Bodies, is_wheel
 from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
 from .changed_cases import cases_of, changed_cases
@@ -33,7 +34,7 @@ from .seated_loads import seat_at_loads, studied_loads
 from .stability import Disturbances, judged_disturbances
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
-from .stages import Bodies, is_wheel, with_damper_mass
+from .stages import with_damper_mass
 from .utilisation import utilisation_message
 
 

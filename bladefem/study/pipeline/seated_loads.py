@@ -15,6 +15,7 @@ from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...util.message import warning
+from .bodies import Bodies, on_one_rank
 from .history import (
     FRICTIONLESS,
     coarse_history,
@@ -27,7 +28,7 @@ from .loads import default_loads
 from .run_records import Seating
 from .stage_inputs import stage_key
 from .stage_runner import StageClock, StageRunner
-from .stages import Bodies, condense_contact, on_layer, on_one_rank
+from .stages import condense_contact, on_layer
 
 
 def seat_every_load(

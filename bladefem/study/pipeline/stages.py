@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from functools import partial
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -13,31 +13,22 @@ from geometry.mesh import Mesh, sector_of
 
 from ...contact.interface_elements import pair_ratio, with_interface_law
 from ...contact.patch import make_patch, normal_ports, port_matrix
-from ...contact.seating import ContactProblem, counting_sense, spin_axis
+from ...contact.seating import ContactProblem
 from ...data import ModeSet, Patch, PortModel, SectorSpan
-from ...errors import InputError, suggestion
+from ...errors import InputError
 from ...io.stage_cache import on_root
 from ...reduction.assemble import folded_diameter
-from ...scene.fields import value_at
 from ...scene.kinds import kind_named
-from ...scene.material_table import operating_materials, operating_temperature
-from ...scene.part_materials import part_materials
-from ...scene.support import area_springs, held_letters
-from ...scene.tables import Material, Scene
-from ...scene.temperature_file import read_temperatures
+from ...scene.material_table import operating_materials
+from ...scene.tables import Scene
 from ...util.arrays import RealOrComplex
 from ...util.communicator import Communicator
-from ...util.progress import Progress, without_progress
+from .bodies import Bodies, is_wheel, on_one_rank, rotation_of
 from .ports import Ports, blade_ports, damper_ports
 
 # dolfinx is slow to load: the functions below import it when they run
 if TYPE_CHECKING:
-    from ...fem.body import Body
-    from ...fem.constraint import Transformation
     from ...fem.eigensolver import Eigensolver
-    from ...fem.flexibility import Flexibility
-    from ...fem.gyroscopic import Spin
-    from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
 # of each nodal diameter, in tables and pictures
@@ -46,192 +37,6 @@ MODES_SHOWN = 10
 KEPT_MODES = "modes"
 # of the elastic damper, its six rigid ones included
 DAMPER_MODES = 16
-
-
-@dataclass(frozen=True)
-class Bodies:
-    """Blade and damper as finite elements, assembled and factorised when first asked for, then
-    kept.
-
-    Vibrations use the stiffness under rotation (stress stiffening, spin softening) and thermal
-    stress about the linear preload, or about the nonlinear one where ``operation.preload`` says so.
-    Seating the damper uses the elastic stiffness at rest, under the whole centrifugal load: both
-    are first-order theory, in which displacements grow with the square of the speed, and the
-    stiffness under rotation would count the rotation twice. For static displacements the difference
-    is of the order of the strain.
-    """
-
-    scene: Scene
-    mesh: Mesh
-    comm: Communicator | None = None
-    progress: Progress = without_progress
-
-    @cached_property
-    def kept(self) -> dict[str, Any]:
-        """What one stage leaves to a later one: under KEPT_MODES fem.all_diameters.KeptPairs."""
-        return {}
-
-    @cached_property
-    def fits_one_rank(self) -> bool:
-        """One rank has memory for the whole bodies (collective)."""
-        from ...fem.compat import MPI
-        from ...fem.groups import fits_one_rank
-
-        return fits_one_rank(self.comm or MPI.COMM_WORLD, blade_dofs(self.mesh))
-
-    @cached_property
-    def ranks_of_sector(self) -> int:
-        """Ranks that solve a nodal diameter together (collective)."""
-        from ...fem.compat import MPI
-        from ...fem.groups import group_size
-
-        return group_size(self.comm or MPI.COMM_WORLD, blade_dofs(self.mesh))
-
-    @cached_property
-    def alone(self) -> Bodies:
-        """The same bodies on this rank alone."""
-        from ...fem.compat import MPI
-
-        if (self.comm or MPI.COMM_WORLD).size == 1:
-            return self
-        return Bodies(self.scene, self.mesh, MPI.COMM_SELF, self.progress)
-
-    def of_group(self, part: Communicator) -> Bodies:
-        """The bodies on a group of ranks; these ones where the group has all ranks."""
-        from ...fem.compat import MPI
-
-        if part.size == (self.comm or MPI.COMM_WORLD).size:
-            return self
-        return self.alone if part.size == 1 else Bodies(self.scene, self.mesh, part, self.progress)
-
-    def heat(self, materials: Iterable[Material]) -> Temperatures | None:
-        """Temperatures of the nodes; None where neither the scene gives some nor a material has a
-        table.
-        """
-        from ...fem.temperature import Temperatures
-
-        given = self.scene.temperature
-        if given.file:
-            return Temperatures(self.temperatures_of_file, given.reference)
-        if given.uniform is None and all(material.table is None for material in materials):
-            return None
-        nodal = np.full(len(self.mesh.points), operating_temperature(self.scene))
-        return Temperatures(nodal, given.reference)
-
-    @cached_property
-    def temperatures_of_file(self) -> np.ndarray:
-        """(n_points,) [K]."""
-        from ...fem.temperature_field import mesh_temperatures
-
-        return mesh_temperatures(self.mesh, read_temperatures(self.scene.temperature.file))
-
-    @cached_property
-    def still_blade(self) -> Body:
-        """The blade at rest."""
-        from ...fem.body import assemble
-        from ...fem.supports import AreaSpring, supported
-
-        mesh, materials = blade_parts(self.scene, self.mesh)
-        heat = self.heat(materials.values())
-        body = assemble(mesh, tuple(materials), materials, self.comm, heat=heat)
-        support = self.scene.support
-        springs = [AreaSpring(*spring) for spring in area_springs(support)]
-        return supported(body, support.clamp, springs, held_letters(support))
-
-    @property
-    def storage_remarks(self) -> list[str]:
-        """What there is to say of where factors are kept; nothing where no blade was assembled."""
-        from ...fem.memory import storage_remark
-
-        body = vars(self).get("still_blade")
-        return [] if body is None else storage_remark(body.plan)
-
-    @cached_property
-    def blade(self) -> Body:
-        """The blade, with the stiffness that it has under rotation and heat."""
-        return self.blade_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
-
-    def blade_at(self, speed: float) -> Body:
-        """The blade with its stiffness at a speed [rad/s]."""
-        from ...fem.rotation import body_under_rotation, has_thermal_strain, linear_tangent
-
-        if speed == 0 and not has_thermal_strain(self.still_blade):
-            return self.still_blade
-        if self.scene.operation.preload == "nonlinear":
-            return body_under_rotation(self.still_blade, speed, "clamp", spin_axis(self.mesh))
-        u0 = speed**2 * self.swell + self.thermal_displacement
-        return replace(
-            self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh))
-        )
-
-    @cached_property
-    def swell(self) -> np.ndarray:
-        """(n_points, dim) linear displacement of the blade for unit rotation [m s^2]."""
-        from ...fem.rotation import unit_speed_displacement
-
-        return unit_speed_displacement(self.still, spin_axis(self.mesh))
-
-    @cached_property
-    def thermal_displacement(self) -> np.ndarray:
-        """(n_points, dim) linear displacement of the blade by its temperatures [m]."""
-        from ...fem.rotation import has_thermal_strain, thermal_displacement
-
-        if not has_thermal_strain(self.still_blade):
-            return np.zeros((len(self.mesh.points), self.mesh.dimension))
-        return thermal_displacement(self.still)
-
-    @cached_property
-    def damper(self) -> Flexibility:
-        """The floating damper."""
-        from ...fem.body import assemble
-        from ...fem.constraint import constrain
-        from ...fem.flexibility import flexible
-
-        material = _damper_material(self.scene, self.mesh)
-        body = assemble(self.mesh, "damper", material, self.comm, heat=self.heat([material]))
-        return flexible(constrain(body, clamp=None))
-
-    @cached_property
-    def frame(self) -> Transformation:
-        """What serves every nodal diameter."""
-        from ...fem.constraint import transformation
-
-        return transformation(self.blade, "clamp", is_wheel(self.mesh))
-
-    @cached_property
-    def still(self) -> Flexibility:
-        """The blade at rest under loads that are the same on all
-        blades.
-        """
-        from ...fem.constraint import in_step
-        from ...fem.flexibility import flexible
-
-        return flexible(in_step(self.still_blade))
-
-    def factorised(self, diameter: int) -> Flexibility:
-        """The blade in one nodal diameter, or clamped at its root;
-        under rotation.
-        """
-        from ...fem.constraint import at_diameter
-        from ...fem.flexibility import flexible
-
-        if diameter == 0 and self.blade is self.still_blade:
-            return self.still
-        return flexible(at_diameter(self.frame, diameter if is_wheel(self.mesh) else None))
-
-
-def on_one_rank(bodies: Bodies, compute: Callable[[Bodies], Result]) -> Result:
-    """What several ranks would not do faster: rank 0 computes it with the factorisations that it
-    has, or all ranks together where one has no memory for the bodies.
-    """
-    if not bodies.fits_one_rank:
-        return compute(bodies)
-    return on_root(bodies.comm, lambda: compute(bodies.alone))
-
-
-def blade_dofs(mesh: Mesh) -> int:
-    """Displacements of the blade's nodes."""
-    return mesh.dimension * len(np.unique(mesh.bodies["blade"]))
 
 
 @dataclass(frozen=True)
@@ -254,16 +59,6 @@ class Reduced:
     # what their modes span, for the other nodal diameters; None where nobody asked, or where ranks
     # share the diameters out
     span: SectorSpan | None = None
-
-
-def rotation_of(bodies: Bodies) -> Spin:
-    """The frame of the bodies as it turns: in the sense in which the sectors are counted, so that
-    a blade meets a load at rest in space later than the next one does.
-    """
-    from ...fem.gyroscopic import Spin
-
-    speed = counting_sense(bodies.mesh) * bodies.scene.operation.speed
-    return Spin(spin_axis(bodies.mesh), speed)
 
 
 def with_damper_mass(reduced: Reduced, mass: float | None) -> Reduced:
@@ -295,11 +90,6 @@ def build_mesh(scene: Scene, comm: Communicator | None = None) -> Mesh:
         return build_isolated(scene)
 
     return on_root(comm, draw)
-
-
-def is_wheel(mesh: Mesh) -> bool:
-    """The blade is a sector of a wheel with elastic disc: it has cut faces."""
-    return "cyclic" in mesh.pairs
 
 
 def contact_patches(mesh: Mesh) -> list[Patch]:
@@ -640,46 +430,3 @@ def _span_of_ranks(
         found = comm.gather(blocks.pop(n, None), 0) or []
         every += [block for block in found if block is not None]
     return on_root(comm, lambda: sector_span(bodies.alone.frame, every, ports.matrix))
-
-
-def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
-    """The mesh with the volumes of other materials as bodies next to the rest of the blade, and the
-    material of each.
-
-    Raises:
-        InputError: a volume with a material that the mesh does not have, or that shares cells with
-            another one.
-    """
-    given = part_materials(scene)
-    if not given:
-        return mesh, {"blade": scene.material.blade}
-    cells = mesh.bodies["blade"]
-    owner = np.zeros(len(mesh.bodies["blade"]), int)
-    for i, name in enumerate(given, 1):
-        if name not in mesh.parts:
-            raise InputError(
-                f"imported.materials: the mesh has no volume '{name}'{suggestion(name, mesh.parts)}"
-            )
-        if owner[mesh.parts[name]].any():
-            raise InputError(
-                f"imported.materials: volume '{name}' shares cells with another one, expected "
-                "separate ones"
-            )
-        owner[mesh.parts[name]] = i
-    names = [("blade", scene.material.blade), *given.items()]
-    some = [(i, name) for i, (name, _) in enumerate(names) if (owner == i).any()]
-    bodies = {f"blade, {name}": cells[owner == i] for i, name in some}
-    return replace(mesh, bodies={**mesh.bodies, **bodies}), {
-        f"blade, {name}": names[i][1] for i, name in some
-    }
-
-
-def _damper_material(scene: Scene, mesh: Mesh) -> Material:
-    """The damper's material, its density set by the given mass where there is one."""
-    from ...fem.loads import body_volume
-
-    given = value_at(scene, kind_named(scene.kind).damper_mass)
-    if given is None:
-        return scene.material.damper
-    # constants, lest a table of densities overrule the mass
-    return replace(operating_materials(scene)[1], rho=given / body_volume(mesh, "damper"))
