@@ -51,6 +51,7 @@ def backbone_table(found: Sequence[Backbone]) -> pd.DataFrame:
                     "friction_damping": one.friction,
                     "own_damping": one.own,
                     "drive": one.drive,
+                    "fold": one.fold,
                     "converged": one.converged,
                 }
             )
@@ -77,6 +78,15 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
             f"{worst.load:.4g} N"
         )
     for one in found:
+        if one.fold.any():
+            turns = " and ".join(
+                f"{1e6 * one.amplitude[i]:.4g} um ({one.frequency[i]:.5g} Hz)"
+                for i in np.flatnonzero(one.fold)
+            )
+            sentences.append(
+                f"load {one.load:g} N: the nonlinear mode turns back in amplitude at {turns}; "
+                "several motions share the amplitudes between"
+            )
         lost = int((~one.converged).sum())
         if lost:
             sentences.append(

@@ -70,7 +70,8 @@ CAPTIONS = {
     "those of the full balance, and the largest damping by friction.",
     "response/design_map": "Nonlinear modes: damping and frequency against amplitude for each "
     "load; dashed the damping that the force needs, so that crossings are resonances, dots those "
-    "of the balance. Right: resonance amplitude and forced response by the mode alone next to the "
+    "of the balance, diamonds where the mode turns back in amplitude. Right: resonance amplitude "
+    "and forced response by the mode alone next to the "
     "balance.",
     "wheel/whole_wheel": "The whole wheel with its pattern: the highest blade next to the tuned "
     "wheel, and the alternating stress of its whole damped motion.",

@@ -89,6 +89,7 @@ COLUMNS = {
     "limit_cycle": Column("limit cycle", "m", "µm", 1e6),
     "flutter_amplitude": Column("grows from", "m", "µm", 1e6),
     "drive": Column("force at resonance over the scene's", "1", digits=4),
+    "fold": Column("turns back in amplitude"),
     "peak_frequency": Column("resonance", "Hz"),
     "peak_amplitude": Column("resonance amplitude", "m", "µm", 1e6),
     "frictionless": Column("mass without friction", "kg", "g", 1e3),

@@ -35,7 +35,9 @@ LOWEST_AMPLITUDE_RATIO, HIGHEST_AMPLITUDE_RATIO = 0.03, 3.0
 
 @dataclass(frozen=True)
 class Backbone:
-    """One nonlinear mode under one load; k amplitudes, ascending."""
+    """One nonlinear mode under one load; k amplitudes in the order of its branch, which ascend but
+    between its folds.
+    """
 
     # [N], and of the damper [kg]
     load: float
@@ -50,6 +52,8 @@ class Backbone:
     # (k,) force that keeps the motion up at its resonance, over the scene's [1]
     drive: RealArray
     converged: BooleanArray
+    # (k,) the branch turns back in amplitude here
+    fold: BooleanArray
     # resonance amplitude [m] and frequency [Hz] of the balance
     balance: tuple[float, float]
 
@@ -60,10 +64,11 @@ class Backbone:
         """
         known = np.flatnonzero(self.converged)
         drive = self.drive[known]
-        crossings = np.flatnonzero((drive[:-1] <= 1) & (drive[1:] > 1))
+        crossings = np.flatnonzero((drive[:-1] <= 1) != (drive[1:] <= 1))
         if not len(crossings):
             return np.nan, np.nan
-        i, j = known[crossings[-1]], known[crossings[-1] + 1]
+        highest = max(crossings, key=lambda k: self.amplitude[known[k]])
+        i, j = known[highest], known[highest + 1]
         share = -np.log(self.drive[i]) / np.log(self.drive[j] / self.drive[i])
         amplitude = self.amplitude[i] * (self.amplitude[j] / self.amplitude[i]) ** share
         frequency = self.frequency[i] + share * (self.frequency[j] - self.frequency[i])
@@ -176,5 +181,6 @@ def curve_backbone(
         (viscous + hysteretic / omega) / (2 * omega),
         np.array([force_at_resonance(model, p) for p in points]) / abs(force[mode]),
         np.array([p.converged for p in points]),
+        np.array([p.fold for p in points]),
         (curve.peak_amplitude, curve.peak_frequency),
     )

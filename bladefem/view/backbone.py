@@ -37,6 +37,7 @@ def draw_design_map(
         title: headline.
     """
     colours = load_colours(np.array([one.load for one in found]))
+    turning = next((one for one in found if one.fold.any()), None)
     with canvas(file, size=(11.0, 7.6), grid=(2, 2)) as axes:
         for one in found:
             colour = colours[one.load]
@@ -45,6 +46,19 @@ def draw_design_map(
             total = 100 * (one.friction + one.own)[kept]
             axes[0, 0].plot(micro, total, color=colour, label=load_name(one.load))
             axes[1, 0].plot(micro, one.frequency[kept], color=colour)
+            folds = MICRO * one.amplitude[one.fold]
+            share = 100 * (one.friction + one.own)[one.fold]
+            axes[0, 0].plot(folds, share, "D", color=colour, markersize=5, fillstyle="none")
+            label = "turns back in amplitude" if one is turning else None
+            axes[1, 0].plot(
+                folds,
+                one.frequency[one.fold],
+                "D",
+                color=colour,
+                markersize=5,
+                fillstyle="none",
+                label=label,
+            )
         _draw_need(axes[0, 0], found, colours)
         _draw_response(axes[1, 1], found, points, colours)
         _draw_prediction(axes[0, 1], found, colours)
@@ -57,6 +71,8 @@ def draw_design_map(
         for ax in axes[:, 0]:
             ax.margins(x=0.01)
         axes[0, 0].legend(title="normal load per seat", fontsize=8, loc="best")
+        if turning is not None:
+            axes[1, 0].legend(fontsize=8, loc="best")
         return axes[0, 0].figure
 
 
@@ -77,16 +93,20 @@ def _draw_need(ax: Axes, found: Sequence[Backbone], colours: dict[float, Any]) -
     )
     for other in found:
         height, _ = other.balance
-        need = np.interp(height, other.amplitude, total_need(other))
+        need = needed_at(other, height)
         ax.plot(MICRO * height, 100 * need, "o", color=colours[other.load], zorder=4)
     highest = max(float((o.friction + o.own)[o.converged].max()) for o in found)
     lowest = min(float((o.friction + o.own)[o.converged].min()) for o in found)
     ax.set_ylim(100 * max(0.7 * lowest, MIN_DAMPING_SHARE * highest), 150 * highest)
 
 
-def total_need(one: Backbone) -> np.ndarray:
-    """(k,) damping that the scene's force needs to keep each amplitude up [1]."""
-    return (one.friction + one.own) / one.drive
+def needed_at(one: Backbone, amplitude: float) -> float:
+    """Damping that the scene's force needs to keep an amplitude up [1]: it falls as its inverse
+    from that of the nearest motion.
+    """
+    i = int(np.argmin(abs(np.log(one.amplitude / amplitude))))
+    need = (one.friction[i] + one.own[i]) / one.drive[i]
+    return float(need * one.amplitude[i] / amplitude)
 
 
 def _draw_response(

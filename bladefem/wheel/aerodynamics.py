@@ -28,6 +28,8 @@ class LimitCycle:
     amplitude: float
     # [rad/s]
     omega: float
+    # (probes,) size of the first harmonic at each [m]
+    probe: np.ndarray
     # larger motions decay and smaller ones grow
     stable: bool
 
@@ -91,8 +93,10 @@ def aerodynamic_damping(influence: np.ndarray, omega: np.ndarray) -> np.ndarray:
 def limit_cycles(points: Sequence[NonlinearMode], damping: float) -> list[LimitCycle]:
     """Amplitudes at which friction's damping balances what else there is, between the points.
 
+    Where the branch runs back in amplitude, between two folds, no cycle is stable.
+
     Args:
-        points: of one nonlinear mode, ascending in amplitude.
+        points: of one nonlinear mode, in the order of its branch.
         damping: share of critical damping of bodies and flow together, negative for flutter.
 
     Raises:
@@ -114,5 +118,8 @@ def limit_cycles(points: Sequence[NonlinearMode], damping: float) -> list[LimitC
         # straight in the logarithm of the amplitude
         amplitude = a.amplitude * (b.amplitude / a.amplitude) ** share
         omega = a.omega + share * (b.omega - a.omega)
-        found.append(LimitCycle(float(amplitude), float(omega), bool(total[i + 1] > total[i])))
+        seen = [abs(p.probe[1]) / p.amplitude for p in (a, b)]
+        probe = amplitude * (seen[0] + share * (seen[1] - seen[0]))
+        stable = bool(total[i + 1] > total[i] and b.amplitude > a.amplitude)
+        found.append(LimitCycle(float(amplitude), float(omega), probe, stable))
     return found

@@ -7,11 +7,14 @@ import pytest
 from models import block, single_mass
 from scipy import linalg
 
+from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.closed_form import jenkins
+from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.nonlinear_modes import force_at_resonance, mode_response, nonlinear_mode
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.reduction.matrices import port_model_from_matrices
 
 
 def test_one_element_in_closed_form():
@@ -99,6 +102,57 @@ def test_close_modes_are_followed_from_the_stuck_mode():
     assert all(p.converged for p in found), [p.reason for p in found if not p.converged]
     assert found[0].omega == pytest.approx(stuck, rel=1e-9)
     assert found[-1].omega == pytest.approx(body.omega[0], rel=0.03)
+
+
+def two_modes(own, shapes, kt, limit):
+    """Two modes on one Jenkins element, without damping of their own."""
+    ports = {"contact": shapes[None], "load": np.array([0]), "probe": np.array([0])}
+    body = port_model_from_matrices(np.eye(2), np.diag(own**2), ports)
+    elements = Elements(np.array([kt]), np.zeros(1), np.ones(1), np.array([limit]), tangents=1)
+    return ReducedModel((body,), elements, {1: np.array([1.0])}, Damping(ratio=0.0))
+
+
+def closed_branch(own, shapes, kt, limit, displacement):
+    """Amplitude of the second mode and squared complex frequency against the contact's own
+    displacement: with the element's complex stiffness both modes are a linear eigenproblem.
+    """
+    law = jenkins(displacement, kt, limit)
+    amplitude, squared = [], []
+    for x, stiffness in zip(displacement, law.stiffness + 1j * law.damping, strict=True):
+        values, vectors = np.linalg.eig(np.diag(own**2) + stiffness * np.outer(shapes, shapes))
+        share = abs(vectors[1] / (shapes @ vectors))
+        # of the branch that ends as the second mode
+        one = int(np.argmin(abs(values - (squared[-1] if squared else own[1] ** 2))))
+        amplitude.append(x * share[one])
+        squared.append(values[one])
+    return np.array(amplitude), np.array(squared)
+
+
+def test_folds_in_amplitude_are_followed_in_closed_form():
+    """A mode above another one: as the contact lets go, their motions at it cancel, and the
+    amplitude of the mode falls before it grows again.
+    """
+    own, shapes, kt, limit = np.array([1.0, 1.2]), np.array([0.9, np.sqrt(0.19)]), 2.0, 0.5
+    x = np.geomspace(200, 0.5, 20000) * limit / kt
+    amplitude, squared = (part[::-1] for part in closed_branch(own, shapes, kt, limit, x))
+    x = x[::-1]
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(amplitude)))) + 1
+    assert len(turns) == 2
+    model = two_modes(own, shapes, kt, limit)
+    found = list(nonlinear_mode(model, np.geomspace(1.5, 40, 15), 1, H=1, samples=0))
+    assert all(p.converged for p in found)
+    folds = [p for p in found if p.fold]
+    np.testing.assert_allclose([p.amplitude for p in folds], amplitude[turns], rtol=5e-4)
+    # each motion is one of the closed form, in its order
+    moved = np.array([np.hypot(*p.w[0, 0, 1:3]) for p in found])
+    assert (np.diff(moved) > 0).all()
+    for p, size in zip(found, moved, strict=True):
+        assert p.amplitude == pytest.approx(np.interp(size, x, amplitude), rel=1e-5)
+        value = p.omega**2 * (1 + 2j * p.zeta)
+        assert value == pytest.approx(np.interp(size, x, squared), rel=1e-5)
+    # both parts between the folds, and on the far side
+    between = [p for p in found if folds[0].omega > p.omega and p.amplitude < folds[0].amplitude]
+    assert len(between) > 3 and found[-1].amplitude == pytest.approx(40.0)
 
 
 def test_bad_input_is_refused():

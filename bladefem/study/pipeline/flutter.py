@@ -173,26 +173,20 @@ def _held(
         raise InputError(
             f"aerodynamics: waves of {wave} nodal diameters under {case.load:g} N: {error}"
         ) from None
-    seen = [float(abs(p.probe[1, 0])) / p.amplitude for p in points if p.converged]
-    known = [p.amplitude for p in points if p.converged]
-
-    def at_probe(amplitude: float) -> float:
-        return amplitude * float(np.interp(amplitude, known, seen))
-
     stable = next((c for c in cycles if c.stable), None)
     if stable is None:
         raise InputError(
             f"aerodynamics: waves of {wave} nodal diameters under {case.load:g} N: flutter, no "
             "limit cycle between sticking and free dampers, expected less negative damping"
         )
-    beyond = [c.amplitude for c in cycles if not c.stable and c.amplitude > stable.amplitude]
+    beyond = [float(c.probe[0]) for c in cycles if not c.stable and c.amplitude > stable.amplitude]
     return HeldFlutter(
         case.load,
         case.mass,
         wave,
-        at_probe(stable.amplitude),
+        float(stable.probe[0]),
         stable.omega / (2 * pi),
-        at_probe(min(beyond)) if beyond else float("nan"),
+        min(beyond) if beyond else float("nan"),
         max(p.zeta for p in points if p.converged),
     )
 
@@ -204,15 +198,19 @@ def _closed_in(
     samples: int,
     damping: float,
 ) -> list[NonlinearMode]:
-    """The nonlinear mode at some amplitudes, and closer where its damping balances the rest."""
+    """The nonlinear mode at some amplitudes, and closer where its damping balances the rest; in
+    the order of its branch.
+    """
     points = list(nonlinear_mode(model, [float(a) for a in amplitudes], mode, 1, samples))
     known = [p for p in points if p.converged]
     net = np.array([p.zeta for p in known]) + damping
-    for i in np.flatnonzero(np.sign(net[1:]) != np.sign(net[:-1])):
+    found = list(known)
+    # from the end, so that the places before stay
+    for i in np.flatnonzero(np.sign(net[1:]) != np.sign(net[:-1]))[::-1]:
         between = np.geomspace(known[i].amplitude, known[i + 1].amplitude, CLOSER_AMPLITUDES + 2)
         closer = [float(a) for a in between[1:-1]]
-        points += nonlinear_mode(model, closer, mode, 1, samples)
-    return sorted(points, key=lambda p: p.amplitude)
+        found[i + 1 : i + 1] = nonlinear_mode(model, closer, mode, 1, samples, known[i])
+    return found
 
 
 def _slip_amplitude(model: ReducedModel, stuck: NonlinearMode) -> float:
