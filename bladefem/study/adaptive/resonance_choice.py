@@ -333,25 +333,56 @@ def choose_at_peak(
             poorer = _seen_from(errors, before)
             return min(poorer, (settings, peak, errors), key=lambda found: found[2].total)
         before = settings, peak, errors
-        known = {
-            name: (errors.height[name], errors.frequency[name])
-            for name, need in errors.needs.items()
-            if need <= NEGLIGIBLE_SHARE * accuracy or (far and not np.isfinite(need))
-        }
+        known = _errors_to_keep(errors, NEGLIGIBLE_SHARE * accuracy, far)
         if _near_enough(settings, errors, sufficient * accuracy):
             break
         hard = far or 2 * peak.solution.states["lift"] >= len(peak.solution.w)
-        first = _harmonics_first(errors, accuracy) if hard else ""
-        better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
-        if better is None:
+        richer = _richer_choice(family, settings, peak, errors, accuracy, fixed, hard)
+        if richer is None:
             break
-        base, point = _solution_ahead(family, settings, peak, errors, better)
-        try:
-            peak = peak_from(family, base, point, better, accuracy, fallbacks=not hard)
-        except NotSolvedError:
-            break
-        settings = better
+        settings, peak = richer
     return settings, peak, errors
+
+
+def _errors_to_keep(
+    errors: PeakErrors,
+    negligible: float,
+    far: bool,
+) -> dict[str, tuple[float, float]]:
+    """Respect to changes of height and frequency that are not judged again: negligible ones, and
+    far from the accuracy those that could not be judged.
+    """
+    return {
+        name: (errors.height[name], errors.frequency[name])
+        for name, need in errors.needs.items()
+        if need <= negligible or (far and not np.isfinite(need))
+    }
+
+
+def _richer_choice(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    errors: PeakErrors,
+    accuracy: float,
+    fixed: tuple[str, ...],
+    hard: bool,
+) -> tuple[Settings, Peak] | None:
+    """The next settings and the peak with them; None where nothing more may be chosen, or where
+    that peak was not found.
+
+    Args:
+        hard: missing harmonics come first, and Newton's method has no fallbacks.
+    """
+    first = _harmonics_first(errors, accuracy) if hard else ""
+    better = _next_settings(family, settings, peak, errors, accuracy, fixed, first)
+    if better is None:
+        return None
+    base, point = _solution_ahead(family, settings, peak, errors, better)
+    try:
+        return better, peak_from(family, base, point, better, accuracy, fallbacks=not hard)
+    except NotSolvedError:
+        return None
 
 
 def _near_enough(settings: Settings, errors: PeakErrors, limit: float) -> bool:

@@ -276,18 +276,13 @@ def curve_of(
         curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy, march)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
-    marks = Stability(np.full(len(heights), ""), np.full(len(heights), np.nan))
-    if scene.study.stability:
-        richer = richer_models(models, curve.settings)
-        marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
+    marks = _stability_marks(scene, models, curve)
     top, kept = _resonance(marches, curve, marks, scene.accuracy)
     instead = top is peak_of(curve.points) and _contradicts(kept, top, scene.accuracy)
     estimated, in_time = estimated_errors(curve), None
     if not instead:
         curve, estimated, in_time = _judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
-    rows = [_record(point) for point in curve.points]
-    columns = {name: np.array([row[name] for row in rows]) for name in rows[0]}
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     # at a maximum: from a point beside it other models find the maximum
     unseen = _unseen_errors(scene, case, models, softer, curve.settings, peak_of(curve.points))
@@ -298,14 +293,14 @@ def curve_of(
         load=case.load,
         mass=case.mass,
         settings=curve.settings,
-        **columns,
+        **_columns(curve.points),
         estimated=estimated,
         tolerated=tolerated,
         checked=checked_points(curve),
         stability=marks.verdict,
         multiplier=marks.multiplier,
         peak=top,
-        bifurcation=marks.bifurcation if len(marks.bifurcation) else np.full(len(heights), ""),
+        bifurcation=marks.bifurcation,
         unstable_peak=None if kept is None else peak_of(curve.points),
         kept=kept,
         marched_instead=instead,
@@ -318,6 +313,16 @@ def curve_of(
         layer_law=unseen.layer_law,
         layer_shift=unseen.layer_shift,
     )
+
+
+def _stability_marks(scene: Scene, models: Family, curve: Checked) -> Stability:
+    """Stability of each point; empty marks where it was not asked for."""
+    empty = np.full(len(curve.points), "")
+    if not scene.study.stability:
+        return Stability(empty, np.full(len(empty), np.nan), bifurcation=empty)
+    richer = richer_models(models, curve.settings)
+    marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
+    return marks if len(marks.bifurcation) else replace(marks, bifurcation=empty)
 
 
 def _judged_in_time(
@@ -403,6 +408,12 @@ def _contradicts(kept: KeptBand | None, top: Solution, accuracy: float) -> bool:
     if kept is None or kept.reason:
         return False
     return MarchedBand(kept.lowest, kept.highest).beyond(size(top)) > accuracy
+
+
+def _columns(points: Sequence[Solution]) -> dict[str, np.ndarray]:
+    """Columns of a curve, one value a point."""
+    rows = [_record(point) for point in points]
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
 def _record(p: Solution) -> dict[str, Any]:
