@@ -42,7 +42,7 @@ if comm.rank == 0:
         )
     excited = next(s for s in sets if s.nodal_diameter == scene.excitation.engine_order)
     if comm.size == 1:
-        from bladefem.report.run import mode_table
+        from bladefem.report.mode_table import mode_table
         from bladefem.view.modes import draw_wheel_mode
         from bladefem.view.speed import draw_nodal_diameters
 

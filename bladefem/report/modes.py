@@ -32,7 +32,7 @@ from ..view.live_curves import live_diameters
 from ..view.live_shapes import live_shapes
 from .datasets import mode_shapes
 from .headlines import Headline
-from .run import mode_table
+from .mode_table import mode_table
 from .tables import write_tables
 from .write import Page, write_report
 

@@ -16,7 +16,7 @@ from bladefem.io.run_folder import keep_given
 from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
-from bladefem.report.run import beyond_stick
+from bladefem.report.run_messages import beyond_stick
 from bladefem.report.statements import (
     ResponseAnswer,
     assumed_stiffness,

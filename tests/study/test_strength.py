@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from bladefem.report.run import _coriolis
+from bladefem.report.run_messages import coriolis_messages
 from bladefem.scene.tables import Excitation, Material, Materials, Operation, Scene
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.bodies import Bodies
@@ -66,5 +66,5 @@ def test_what_is_said_of_coriolis_forces(shift, damping, count, words):
         scene=SimpleNamespace(accuracy=0.02),
         reduced=SimpleNamespace(sector={0: SimpleNamespace(damping=damping)}),
     )
-    said = _coriolis(found)
+    said = coriolis_messages(found)
     assert len(said) == count and all(re.search(words, text) for text in said)

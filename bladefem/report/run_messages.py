@@ -1,0 +1,116 @@
+"""Sentences of a run's report: which methods were used, what they leave out, and why a number is as
+it is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..contact.state_table import quasi_static
+from ..study.pipeline.contact_cycle import ContactCycle
+from ..study.pipeline.coriolis import CORIOLIS_SHARE, has_coriolis
+from ..study.pipeline.response_remarks import load_of
+from ..study.pipeline.run_records import SolvedRun
+from ..study.pipeline.state_check import state_sentence
+from ..util.message import method, warning
+from .influences import influence_sentence
+from .linear import linear_sentence
+from .nodes import wear_sentence
+
+# relative difference of frequencies that no search resolves
+SAME_FREQUENCY = 1e-4
+MESH_ERROR_NOTE = (
+    "the estimated errors are those of modes, harmonics, samples, contact points, damper model and "
+    "of the mesh, of seats and blade; other meshes are compared by 'bladefem modes --converge' "
+    "(frequencies) and 'bladefem chart --mesh' (resonance)"
+)
+
+
+def run_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]:
+    """What the run had to say, and how far its models reach."""
+    coefficient = result.scene.contact.wear_coefficient
+    messages = [
+        *result.messages,
+        method(MESH_ERROR_NOTE),
+        _static_contact(result),
+        *coriolis_messages(result),
+        method(_states(result)),
+        method(linear_sentence(cycles)),
+        *beyond_stick(result),
+    ]
+    if result.response.influences:
+        messages.append(influence_sentence(result.response.influences))
+    if coefficient is not None:
+        messages.append(wear_sentence(cycles, coefficient))
+    return messages
+
+
+def _static_contact(result: SolvedRun) -> str:
+    """Whether the contact may be taken as quasi-static up to the last harmonic kept of the highest
+    frequency.
+    """
+    patch = next(iter(result.contact.maps.values()))[0].patch
+    highest = max(
+        curve.settings.harmonics * float(np.max(curve.frequency))
+        for curve in result.response.curves
+    )
+    found = quasi_static(patch, result.scene.material.blade, highest)
+    return method(found.sentence) if found.holds else warning(found.sentence)
+
+
+def coriolis_messages(result: SolvedRun) -> list[str]:
+    """Whether responses have Coriolis forces, and what they do."""
+    shift = result.strength.coriolis
+    if not shift > 0:
+        return []
+    share = (
+        f"Coriolis forces move the waves of mode {result.strength.mode} by {100 * shift:.2g} % of "
+        "its frequency"
+    )
+    if has_coriolis(result.reduced):
+        return [method(f"{share}; responses have them.")]
+    if shift <= CORIOLIS_SHARE * result.scene.accuracy:
+        return [method(f"{share}; they are left out of the responses.")]
+    return [
+        warning(
+            f"{share}, and are left out of the responses by operation.coriolis = false: resonances "
+            "lie that much lower or higher, and amplitudes may differ; 'bladefem modes --campbell' "
+            "has both waves."
+        )
+    ]
+
+
+def _states(result: SolvedRun) -> str:
+    """Whether the paper's table of states would do for the loads of the run and the normal motion
+    at its resonances.
+    """
+    motions = [
+        c.peak.w[:, 0, 1:]
+        for c in result.response.curves
+        if c.peak.w.shape[1] == result.mesh.dimension
+    ]
+    travel = max((float(np.abs(w).max()) for w in motions), default=0.0)
+    return state_sentence(
+        result.scene, result.contact.problem, list(result.contact.maps), travel or 1e-6
+    )
+
+
+def beyond_stick(result: SolvedRun) -> list[str]:
+    """Why resonances lie above that of full stick, where the static load leaves points open."""
+    stuck = result.response.limits[1].peak_frequency
+    opened = {
+        load
+        for load, maps in result.contact.maps.items()
+        if any((one.force <= 0).any() for one in maps)
+    }
+    above = [
+        load_of(curve)
+        for curve in result.response.curves
+        if curve.load in opened and curve.peak_frequency > (1 + SAME_FREQUENCY) * stuck
+    ]
+    if not above:
+        return []
+    return [
+        f"resonances above that of full stick under {', '.join(above)}: contact points that the "
+        "static load leaves open close in vibration, and count as open in full stick"
+    ]

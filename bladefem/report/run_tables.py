@@ -1,0 +1,154 @@
+"""Tables of a run's report: mesh, modes, stresses, contact, responses, wheel."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+import numpy as np
+import pandas as pd
+
+from geometry.quality import quality_rows
+
+from ..study.modes.comparison import family_table
+from ..study.modes.stress import Strength
+from ..study.modes.survey import excited_set
+from ..study.pipeline.contact_cycle import ContactCycle
+from ..study.pipeline.loads import design_table
+from ..study.pipeline.run_records import SolvedRun
+from ..study.pipeline.stability import UNIQUE
+from .best_load import best_load_table
+from .fatigue import utilisation_table
+from .flow import flow_tables
+from .influences import influence_table
+from .mode_table import mode_table
+from .nodes import wear_table
+from .pressure import pressure_table
+from .resonance_table import resonance_table
+from .response_points import linear_points, points_of
+from .wheel import blade_table, pattern_table
+
+
+def run_tables(result: SolvedRun, cycles: list[ContactCycle]) -> dict[str, pd.DataFrame]:
+    """All tables, "section/name", SI columns.
+
+    Args:
+        cycles: of each load's resonance, for the wear.
+    """
+    patches = list(result.contact.problem.patches)
+    coefficient = result.scene.contact.wear_coefficient
+    tables = {**_study_tables(result), **flow_tables(result), **_wheel_tables(result)}
+    if coefficient is not None:
+        tables["contact/wear"] = wear_table(patches, cycles, coefficient)
+    return tables
+
+
+def _wheel_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
+    """Tables of the whole wheel, where blades differ."""
+    if result.wheel is None:
+        return {}
+    return {
+        "wheel/whole_wheel": pattern_table(result.wheel),
+        "wheel/blades": blade_table(result.wheel),
+    }
+
+
+def _study_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
+    """Those of every study: mesh, modes, contact and responses."""
+    curves = result.response.curves
+    return {
+        "mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
+        "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
+        "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
+        "modes/stresses": _stresses(result.strength),
+        **utilisation_table(result),
+        "contact/pressure": pressure_table(result.contact.maps),
+        **_own_load(result),
+        **_best_load(result),
+        **_damper_masses(result),
+        "response/summary": _summary(result),
+        **resonance_table(curves),
+        "response/points": _joined(
+            [*map(points_of, curves), *map(linear_points, result.response.limits)]
+        ),
+    }
+
+
+def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
+    """Response points of all curves; the linear limits have one motion each."""
+    points = pd.concat(parts, ignore_index=True)
+    return points.fillna({"stability": UNIQUE}) if "stability" in points else points
+
+
+def _summary(result: SolvedRun) -> pd.DataFrame:
+    """The design table, with the alternating stress at each resonance."""
+    table = pd.DataFrame(design_table(result.response.curves, result.response.limits))
+    table.insert(
+        table.columns.get_loc("reduction") + 1,
+        "alternating_stress",
+        _alternating(result, table["peak_amplitude"].to_numpy()),
+    )
+    return table
+
+
+def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:
+    """(rows,) alternating stress [Pa] of the design table: of the whole motion where that was
+    computed, in proportion to the amplitude where a march contradicts it, of the mode alone at
+    the other loads, without damper and stuck.
+    """
+    stress = result.strength.alternating * amplitudes
+    for number, found in (result.damped or {}).items():
+        curve = result.response.curves[number]
+        marched = curve.peak_amplitude / curve.balance_amplitude
+        stress[1 + number] = marched * found.largest
+    return stress
+
+
+def _stresses(found: Strength) -> pd.DataFrame:
+    """Where the blade is stressed most, by rotation and by the mode studied."""
+    rows = [
+        ("rotation", found.steady, found.steady_at),
+        (f"mode {found.mode}, 1 mm at the probe", 1e-3 * found.alternating, found.alternating_at),
+    ]
+    return pd.DataFrame(
+        [
+            {"state": name, "von_mises_gauss": size, **dict(zip("xyz", place, strict=True))}
+            for name, size, place in rows
+            if size > 0
+        ]
+    )
+
+
+def _own_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
+    """The load that the damper's own mass makes at the operating speed, where it makes any."""
+    own = result.contact.own
+    return (
+        {}
+        if own is None
+        else {
+            "contact/own_load": pd.DataFrame(
+                {
+                    "mass": [result.contact.problem.mass],
+                    "speed": [result.scene.operation.speed],
+                    "load": [own],
+                }
+            )
+        }
+    )
+
+
+def _best_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
+    """What the exact search for the best load found, where there was one."""
+    best = result.response.best
+    if not best:
+        return {}
+    found = {"response/best_load": best_load_table(best)}
+    if result.response.influences:
+        lowest = min((b for b in best if not b.reason), key=lambda b: b.amplitude)
+        found["response/influences"] = influence_table(result.response.influences, lowest)
+    return found
+
+
+def _damper_masses(result: SolvedRun) -> dict[str, pd.DataFrame]:
+    """The damper that makes each load, where friction takes part in the seating."""
+    masses = result.contact.masses
+    return {"contact/damper_mass": pd.DataFrame(map(asdict, masses))} if masses else {}
