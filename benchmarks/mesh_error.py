@@ -34,7 +34,7 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.loads import Curve
-from bladefem.study.pipeline.stages import build_mesh
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from geometry.export import write_msh
 
 COMMON = ["study.own_load=false", "study.stability=false", "study.influences=false"]

@@ -62,12 +62,10 @@ def on_ranks(folder: Path) -> None:
     """The row of one number of ranks, written by rank 0."""
     from bladefem.fem.compat import MPI
     from bladefem.study.pipeline.bodies import Bodies
-    from bladefem.study.pipeline.stages import (
-        contact_patches,
-        reduce_sector,
-        sector_of,
-        wheel_modes,
-    )
+    from bladefem.study.pipeline.damper_contact import contact_patches
+    from bladefem.study.pipeline.normal_modes import wheel_modes
+    from bladefem.study.pipeline.reduced_sector import reduce_sector
+    from geometry.mesh import sector_of
 
     comm = MPI.COMM_WORLD
     scene, mesh = pickle.loads((folder / "mesh.pkl").read_bytes())

@@ -26,8 +26,9 @@ from bladefem.study.pipeline import case_models, pipeline
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.normal_modes import harmonic_diameters
+from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.stage_inputs import stage_key
-from bladefem.study.pipeline.stages import harmonic_diameters, reduce_sector
 from bladefem.util.progress import without_progress
 
 LAYERS = ("40", "400", "4000", "10000", "40000", "100000", "rigid", "default")

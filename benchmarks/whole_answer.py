@@ -66,16 +66,12 @@ from bladefem.study.chart.cpu_clock import Clock, running_clock
 from bladefem.study.chart.rows import parabola_resonance
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
+from bladefem.study.pipeline.damper_contact import contact_patches
 from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.seated_loads import seat_every_load
-from bladefem.study.pipeline.stability import (
-    UNSTABLE,
-    model_in_time,
-    richer_models,
-    stability_of,
-)
+from bladefem.study.pipeline.stability import UNSTABLE, model_in_time, richer_models, stability_of
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
-from bladefem.study.pipeline.stages import build_mesh, contact_patches
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs" / "figures"

@@ -20,7 +20,7 @@ from mpi4py import MPI
 
 import bladefem
 from bladefem.contact.seating import solve_seating
-from bladefem.study.pipeline.stages import contact_patches
+from bladefem.study.pipeline.damper_contact import contact_patches
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"

@@ -26,5 +26,6 @@ def test_examples_of(name):
 
 def test_public_names_have_examples():
     """Those that a newcomer types first."""
-    for name in ("scene.toml", "scene.units", "study.pipeline.stages", "report.opened"):
+    mesh_and_modes = ("study.pipeline.scene_mesh", "study.pipeline.normal_modes")
+    for name in ("scene.toml", "scene.units", *mesh_and_modes, "report.opened"):
         assert f"bladefem.{name}" in MODULES

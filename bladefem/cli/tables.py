@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ..data import ModeSet, PortModel, PressureMap
     from ..study.modes.survey import Survey
     from ..study.pipeline.loads import Curve
+    from ..study.pipeline.reduced_sector import Reduced
     from ..study.pipeline.run_records import Response, Run, SolvedRun
-    from ..study.pipeline.stages import Reduced
 
 
 # letters of the line below a head; help texts in a last column are longer

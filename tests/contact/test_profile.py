@@ -28,7 +28,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.scene.tables import Contact, Material, Scene
-from bladefem.study.pipeline.stages import seat_damper
+from bladefem.study.pipeline.damper_contact import seat_damper
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 ALPHA = np.radians(40)

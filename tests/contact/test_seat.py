@@ -16,7 +16,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
 from bladefem.scene.tables import Material, Materials
-from bladefem.study.pipeline.stages import contact_patches
+from bladefem.study.pipeline.damper_contact import contact_patches
 
 ALPHA = np.radians(40)
 SPEED = 800.0  # rad/s

@@ -10,7 +10,7 @@ from bladefem.fem.groups import group_size, shared_out
 from bladefem.fem.memory import modal_solve_memory
 from bladefem.scene.tables import Scene
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import wheel_modes
+from bladefem.study.pipeline.normal_modes import wheel_modes
 
 pytestmark = pytest.mark.mpi
 

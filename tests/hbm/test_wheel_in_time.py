@@ -22,8 +22,10 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.assemble_model import joint_model
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
+from bladefem.study.pipeline.damper_contact import seat_damper
+from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.run_records import Seating
-from bladefem.study.pipeline.stages import build_mesh, reduce_sector, seat_damper
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 BLADES = 4

@@ -13,13 +13,11 @@ from bladefem.scene.kinds import kind_named
 from bladefem.scene.toml import load_scene
 from bladefem.study.modes.clamped_aerofoil import clamped_blade
 from bladefem.study.modes.stress import mode_strength
-from bladefem.study.pipeline import stages
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stage_inputs import (
-    all_declared,
-    declared_fields,
-    stage_key,
-)
+from bladefem.study.pipeline.damper_contact import condense_contact
+from bladefem.study.pipeline.normal_modes import excited_modes, find_modes
+from bladefem.study.pipeline.reduced_sector import reduce_sector
+from bladefem.study.pipeline.stage_inputs import all_declared, declared_fields, stage_key
 from geometry.builders import build_here
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -53,23 +51,21 @@ def plane():
     mesh = build_here(scene)
     bodies = Bodies(scene, mesh)
     patches = [make_patch(mesh, name) for name in ("this", "next")]
-    modes = stages.find_modes(bodies)
+    modes = find_modes(bodies)
     return SimpleNamespace(scene=scene, mesh=mesh, bodies=bodies, patches=patches, modes=modes)
 
 
 STAGES = {
     "mesh": lambda scene, known: build_here(scene),
     "modes": lambda scene, known: (
-        stages.find_modes(Bodies(scene, known.mesh)),
+        find_modes(Bodies(scene, known.mesh)),
         clamped_blade(Bodies(scene, known.mesh)),
     ),
     "stress": lambda scene, known: mode_strength(
-        Bodies(scene, known.mesh), stages.excited_modes(scene, known.mesh, known.modes)
+        Bodies(scene, known.mesh), excited_modes(scene, known.mesh, known.modes)
     ),
-    "contact": lambda scene, known: stages.condense_contact(
-        Bodies(scene, known.mesh), known.patches
-    ),
-    "reduction": lambda scene, known: stages.reduce_sector(
+    "contact": lambda scene, known: condense_contact(Bodies(scene, known.mesh), known.patches),
+    "reduction": lambda scene, known: reduce_sector(
         Bodies(scene, known.mesh), known.patches, [0], 5
     ),
 }

@@ -20,7 +20,9 @@ from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import body_mesh, pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.body_mesh import softened_change
-from bladefem.study.pipeline.stages import build_mesh, find_modes, reduce_sector
+from bladefem.study.pipeline.normal_modes import find_modes
+from bladefem.study.pipeline.reduced_sector import reduce_sector
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))

@@ -28,7 +28,7 @@ from bladefem.study.chart.methods import (
     tangential_model,
 )
 from bladefem.study.chart.rows import Bench, Job, chart_rows, parabola_resonance
-from bladefem.study.pipeline.stages import build_mesh
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.view.chart import draw_errors
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"

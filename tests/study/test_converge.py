@@ -30,7 +30,8 @@ from bladefem.study.modes.mesh_convergence import (
     richardson,
 )
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import build_mesh, find_modes
+from bladefem.study.pipeline.normal_modes import find_modes
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from geometry.export import write_msh
 
 

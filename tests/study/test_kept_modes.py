@@ -6,7 +6,9 @@ import numpy as np
 
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import build_mesh, find_modes, reduce_sector
+from bladefem.study.pipeline.normal_modes import find_modes
+from bladefem.study.pipeline.reduced_sector import reduce_sector
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 

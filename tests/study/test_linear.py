@@ -33,7 +33,7 @@ from bladefem.study.modes.linear_response_report import (
     stress_table,
 )
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import wheel_modes
+from bladefem.study.pipeline.normal_modes import wheel_modes
 from geometry.mesh import Mesh
 
 COUNT, SMALL = 5, (2, 1, 1)

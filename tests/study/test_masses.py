@@ -6,12 +6,9 @@ import numpy as np
 
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import (
-    build_mesh,
-    contact_patches,
-    reduce_sector,
-    with_damper_mass,
-)
+from bladefem.study.pipeline.damper_contact import contact_patches
+from bladefem.study.pipeline.reduced_sector import reduce_sector, with_damper_mass
+from bladefem.study.pipeline.scene_mesh import build_mesh
 
 
 def receptance(model, omega):

@@ -16,7 +16,7 @@ from bladefem.fem.modes import modes
 from bladefem.scene.part_materials import part_materials
 from bladefem.scene.tables import Imported, Material, Operation, Scene
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import find_modes
+from bladefem.study.pipeline.normal_modes import find_modes
 from geometry.export import write_msh
 from geometry.imported import read_mesh
 

@@ -23,7 +23,8 @@ from bladefem.study.modes.mesh_transfer import (
 )
 from bladefem.study.modes.survey import clamped_blade
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import build_mesh, find_modes
+from bladefem.study.pipeline.normal_modes import find_modes
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from geometry.mesh import Mesh
 
 

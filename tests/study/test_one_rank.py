@@ -7,13 +7,10 @@ from bladefem import load_scene
 from bladefem.fem.compat import MPI
 from bladefem.reduction.other_diameters import spanned_models
 from bladefem.study.pipeline.bodies import Bodies, on_one_rank
-from bladefem.study.pipeline.stages import (
-    KEPT_MODES,
-    build_mesh,
-    contact_patches,
-    find_modes,
-    reduce_sector,
-)
+from bladefem.study.pipeline.damper_contact import contact_patches
+from bladefem.study.pipeline.normal_modes import KEPT_MODES, find_modes
+from bladefem.study.pipeline.reduced_sector import reduce_sector
+from bladefem.study.pipeline.scene_mesh import build_mesh
 
 pytestmark = pytest.mark.mpi
 COARSE = ["mesh.size=14 mm", "mesh.seat_elements=2", "aerofoil.fillet=0 mm"]

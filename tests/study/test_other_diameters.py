@@ -14,14 +14,16 @@ from bladefem.study.adaptive.family import family_member
 from bladefem.study.adaptive.settings import first_settings
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, other_diameters
+from bladefem.study.pipeline.damper_contact import seat_damper
 from bladefem.study.pipeline.other_diameters import (
     ClassVerdict,
     class_verdicts,
     sentence_of_classes,
 )
+from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.run_records import Seating
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.stability import Disturbances
-from bladefem.study.pipeline.stages import build_mesh, reduce_sector, seat_damper
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 MODES = 20

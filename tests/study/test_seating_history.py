@@ -11,9 +11,10 @@ from bladefem.contact.interface_elements import friction_elements
 from bladefem.errors import InputError
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump_scene, load_scene, vary
+from bladefem.study.pipeline.damper_contact import contact_patches
 from bladefem.study.pipeline.history import history_sentence, refuse_jamming
 from bladefem.study.pipeline.pipeline import run
-from bladefem.study.pipeline.stages import build_mesh, contact_patches
+from bladefem.study.pipeline.scene_mesh import build_mesh
 
 PLANE = "scenes/plane.toml"
 

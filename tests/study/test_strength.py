@@ -12,7 +12,7 @@ from bladefem.report.run_messages import coriolis_messages
 from bladefem.scene.tables import Excitation, Material, Materials, Operation, Scene
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import excited_modes, find_modes
+from bladefem.study.pipeline.normal_modes import excited_modes, find_modes
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "fem"))
 from structured import box

@@ -21,7 +21,7 @@ from bladefem.hbm.sweep import sweep
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.stages import find_modes
+from bladefem.study.pipeline.normal_modes import find_modes
 from bladefem.view.contact import draw_pressure
 from bladefem.view.mesh import draw_mesh
 from bladefem.view.modes import draw_mode_sheet

@@ -26,15 +26,10 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.study.pipeline.assemble_model import LoadCase, joint_model
 from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.damper_contact import condense_contact, contact_patches, on_layer
+from bladefem.study.pipeline.reduced_sector import Reduced, reduce_sector
+from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.stage_inputs import stage_key
-from bladefem.study.pipeline.stages import (
-    Reduced,
-    build_mesh,
-    condense_contact,
-    contact_patches,
-    on_layer,
-    reduce_sector,
-)
 
 
 @dataclass(frozen=True)

@@ -33,16 +33,12 @@ from ..adaptive.settings import Settings
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import EXACT_HARMONICS, family_of_case, load_cases
 from ..pipeline.coriolis import with_coriolis
+from ..pipeline.damper_contact import contact_patches, on_layer, seat_damper
 from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
+from ..pipeline.normal_modes import harmonic_diameters
+from ..pipeline.reduced_sector import reduce_sector
 from ..pipeline.run_records import Seating
-from ..pipeline.stages import (
-    build_mesh,
-    contact_patches,
-    harmonic_diameters,
-    on_layer,
-    reduce_sector,
-    seat_damper,
-)
+from ..pipeline.scene_mesh import build_mesh
 from .cpu_clock import running_clock
 
 # of the scene's own element sizes, when none are given

@@ -18,7 +18,7 @@ from ..adaptive.settings import first_for, restarted_settings, scene_line
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
 from ..pipeline.pipeline import run
-from ..pipeline.stages import Reduced
+from ..pipeline.reduced_sector import Reduced
 from .chart import Chart, check_budget, method_chart
 from .meshes import mesh_table, mesh_variants
 

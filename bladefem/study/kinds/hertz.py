@@ -27,7 +27,7 @@ from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...util.communicator import Communicator
-from ..pipeline.stages import build_mesh
+from ..pipeline.scene_mesh import build_mesh
 from .punch import held_port_flexibility
 
 # contact radius over the expected one, at most

@@ -32,7 +32,7 @@ from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ...util.arrays import RealArray
 from ...util.communicator import Communicator
-from ..pipeline.stages import build_mesh
+from ..pipeline.scene_mesh import build_mesh
 
 if TYPE_CHECKING:
     import scipy.sparse as sp

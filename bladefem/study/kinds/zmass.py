@@ -30,8 +30,8 @@ from ...errors import InputError
 from ...io.stage_cache import cached_stage
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
+from ..pipeline.scene_mesh import build_mesh
 from ..pipeline.stage_inputs import stage_key
-from ..pipeline.stages import build_mesh
 
 # largest of a frequency ratio
 MAX_DENOMINATOR = 1000

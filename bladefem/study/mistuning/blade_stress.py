@@ -31,8 +31,8 @@ from ..pipeline.damped_motion import (
     stress_of_motion,
 )
 from ..pipeline.flow import family_modes, flowing_modes, scene_flow
+from ..pipeline.normal_modes import MODES_SHOWN, wheel_modes
 from ..pipeline.ports import Ports, blade_ports
-from ..pipeline.stages import MODES_SHOWN, wheel_modes
 
 # name of the modes that bodies keep
 SHAPES_KEY = "modes of all nodal diameters"

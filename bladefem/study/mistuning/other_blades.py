@@ -31,7 +31,7 @@ from ...scene.tables import Scene
 from ...wheel.model import Pattern
 from ..modes.comparison import blade_root
 from ..pipeline.bodies import Bodies, blade_parts
-from ..pipeline.stages import build_mesh
+from ..pipeline.scene_mesh import build_mesh
 
 if TYPE_CHECKING:
     from ...fem.held_part import HeldPart

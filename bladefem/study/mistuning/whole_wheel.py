@@ -25,7 +25,7 @@ from ..pipeline.bodies import Bodies
 from ..pipeline.contact_cycle import element_labels
 from ..pipeline.coriolis import with_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
-from ..pipeline.stages import Reduced, reduce_sector, with_damper_mass
+from ..pipeline.reduced_sector import Reduced, reduce_sector, with_damper_mass
 from .other_blades import foot_of
 from .validate import read_orders
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...data import ModeSet
 from ..pipeline.bodies import Bodies, is_wheel
-from ..pipeline.stages import MODES_SHOWN
+from ..pipeline.normal_modes import MODES_SHOWN
 from .comparison import blade_root
 
 

@@ -33,7 +33,8 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..pipeline.bodies import Bodies, blade_dofs
-from ..pipeline.stages import build_mesh, find_modes
+from ..pipeline.normal_modes import find_modes
+from ..pipeline.scene_mesh import build_mesh
 from .comparison import mac_of
 from .mesh_transfer import nodal_volumes, transfer_fields
 

@@ -25,9 +25,9 @@ from ...util.message import method
 from ...util.progress import Progress, without_progress
 from ..pipeline import pipeline
 from ..pipeline.bodies import Bodies, is_wheel
+from ..pipeline.normal_modes import MODES_SHOWN, excited_modes, wheel_modes
 from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
-from ..pipeline.stages import MODES_SHOWN, excited_modes, wheel_modes
 from ..pipeline.validate_mesh import check_blade, refuse_loads
 from .campbell import Campbell, campbell_tables
 from .clamped_aerofoil import clamped_blade

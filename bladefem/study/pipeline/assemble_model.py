@@ -19,7 +19,7 @@ from ...hbm.model import Damping, ReducedModel, in_series
 from ...reduction.assemble import pair_models, recombine_contact, wheel_models
 from ...scene.tables import Scene
 from .flow import flowing_sides, scene_flow
-from .stages import Reduced
+from .reduced_sector import Reduced
 
 # of [damper] axial: a stop
 AXIALLY_HELD = "held"

@@ -24,7 +24,7 @@ from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
 from .bodies import Bodies
 from .ports import blade_ports
-from .stages import Reduced
+from .reduced_sector import Reduced
 
 # deviation of the modes seen by the reduction from those of the stage, beyond which they are not
 # the same ones

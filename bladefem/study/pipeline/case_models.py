@@ -33,9 +33,10 @@ from .changed_cases import seated_case
 from .contact_cycle import element_labels
 from .coriolis import with_coriolis
 from .liftoff import naming_the_load
+from .normal_modes import harmonic_diameters
+from .reduced_sector import Reduced, reduce_sector, with_damper_mass
 from .run_records import Seating
 from .stage_inputs import stage_key
-from .stages import Reduced, harmonic_diameters, reduce_sector, with_damper_mass
 
 # higher ones borrow the nodal diameter next to their own
 EXACT_HARMONICS = 3

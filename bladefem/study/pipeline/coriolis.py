@@ -18,7 +18,8 @@ from ...hbm.model import Damping
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
 from .bodies import Bodies, rotation_of
-from .stages import MODES_SHOWN, Reduced, excited_modes
+from .normal_modes import MODES_SHOWN, excited_modes
+from .reduced_sector import Reduced
 
 # of the accuracy: shift of a frequency that responses may leave out
 CORIOLIS_SHARE = 0.1

@@ -29,10 +29,10 @@ from .bodies import Bodies
 from .case_models import load_cases
 from .contact_cycle import element_labels
 from .flow import Flow, family_numbers, port_shapes, scene_flow
+from .reduced_sector import Reduced, reduce_sector, with_damper_mass
 from .run_records import ReducedRun
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
-from .stages import Reduced, reduce_sector, with_damper_mass
 
 # amplitudes of each load, from sticking contacts to where friction does nearly nothing, over the
 # amplitude at which all contacts together begin to slip

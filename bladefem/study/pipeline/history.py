@@ -25,7 +25,7 @@ from ...errors import InputError
 from ...scene.material_table import operating_materials
 from ...scene.tables import Scene
 from .bodies import Bodies
-from .stages import seat_clearance
+from .damper_contact import seat_clearance
 
 FRICTIONLESS = "frictionless"
 

@@ -27,12 +27,13 @@ from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
 from .flutter import find_flutter, flutter_sentences
 from .history import refuse_jamming
+from .normal_modes import excited_modes, find_modes
 from .response_stage import run_response
 from .run_records import ModalRun, ReducedRun, Run, SeatedRun, SolvedRun
+from .scene_mesh import build_mesh
 from .seated_loads import seat_every_load
 from .stage_inputs import stage_key
 from .stage_runner import Folder, StageClock, StageRunner
-from .stages import build_mesh, excited_modes, find_modes
 from .validate_mesh import check_blade, found_patches
 
 STAGES = ("mesh", "modes", "contact", "reduction", "response")

@@ -28,13 +28,13 @@ from .history import FRICTIONLESS
 from .linear_limits import linear_limits
 from .loads import Curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
+from .reduced_sector import with_damper_mass
 from .response_remarks import best_load_remarks, load_of, response_remarks, stress_message
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
 from .stability import Disturbances, judged_disturbances
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
-from .stages import with_damper_mass
 from .utilisation import utilisation_message
 
 

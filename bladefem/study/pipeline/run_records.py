@@ -28,7 +28,7 @@ from .history import DamperMass
 from .linear_limits import Limit
 from .loads import Curve
 from .other_diameters import ClassVerdict
-from .stages import Reduced
+from .reduced_sector import Reduced
 
 if TYPE_CHECKING:
     from ..mistuning.pattern_response import PatternResponse

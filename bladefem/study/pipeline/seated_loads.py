@@ -16,6 +16,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...util.message import warning
 from .bodies import Bodies, on_one_rank
+from .damper_contact import condense_contact, on_layer
 from .history import (
     FRICTIONLESS,
     coarse_history,
@@ -28,7 +29,6 @@ from .loads import default_loads
 from .run_records import Seating
 from .stage_inputs import stage_key
 from .stage_runner import StageClock, StageRunner
-from .stages import condense_contact, on_layer
 
 
 def seat_every_load(

@@ -12,8 +12,8 @@ from ...errors import InputError, suggestion
 from ...hbm.model import Damping
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
+from .damper_contact import contact_patches
 from .ports import named_nodes
-from .stages import contact_patches
 
 
 def found_patches(
