@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from geometry.mesh import Mesh
@@ -17,10 +15,6 @@ from ...scene.kinds import kind_named
 from ...scene.material_table import operating_materials
 from ...scene.tables import Scene
 from .bodies import Bodies
-
-# dolfinx is slow to load: the functions below import it when they run
-if TYPE_CHECKING:
-    pass
 
 
 def contact_patches(mesh: Mesh) -> list[Patch]:

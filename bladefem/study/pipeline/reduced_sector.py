@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,10 +17,6 @@ from ...util.communicator import Communicator
 from .bodies import Bodies, is_wheel, on_one_rank, rotation_of
 from .normal_modes import KEPT_MODES, cost_of_diameter, eigensolver
 from .ports import Ports, blade_ports, damper_ports
-
-# dolfinx is slow to load: the functions below import it when they run
-if TYPE_CHECKING:
-    pass
 
 # of the elastic damper, its six rigid ones included
 DAMPER_MODES = 16

@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from geometry.mesh import Mesh
 
 from ...io.stage_cache import on_root
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
-
-# dolfinx is slow to load: the functions below import it when they run
-if TYPE_CHECKING:
-    pass
 
 
 def build_mesh(scene: Scene, comm: Communicator | None = None) -> Mesh:
