@@ -10,9 +10,10 @@ from bladefem.data import Elements
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import peak as peak_module
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.hbm.optimum import Variation, lowest_peak, optimum
+from bladefem.hbm.optimum import lowest_peak, optimum
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak, with_slope
+from bladefem.hbm.peak_levels import Variation
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve

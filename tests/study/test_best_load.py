@@ -79,7 +79,7 @@ def test_a_search_near_a_known_load_looks_farther_where_that_was_wrong(best):
 
 @pytest.mark.parametrize("failures", [1, 2])
 def test_a_step_to_a_load_without_a_solved_peak_is_shortened(best, monkeypatch, failures):
-    solve_level = optimum_module._solve_level
+    solve_level = optimum_module.solve_level
     tried = []
 
     def sometimes(search, value, near):
@@ -88,7 +88,7 @@ def test_a_step_to_a_load_without_a_solved_peak_is_shortened(best, monkeypatch, 
             raise NotSolvedError("no peak")
         return solve_level(search, value, near)
 
-    monkeypatch.setattr(optimum_module, "_solve_level", sometimes)
+    monkeypatch.setattr(optimum_module, "solve_level", sometimes)
     found = find_best_load(scene(), case_at, family, SETTINGS, None)
     assert found.reason == "" and len(tried) > failures
     assert found.amplitude == pytest.approx(best.amplitude, rel=3 * best.tolerance)
@@ -98,7 +98,7 @@ def test_a_search_without_any_solved_neighbour_says_so(monkeypatch):
     def never(search, value, near):
         raise NotSolvedError("no peak at all")
 
-    monkeypatch.setattr(optimum_module, "_solve_level", never)
+    monkeypatch.setattr(optimum_module, "solve_level", never)
     assert "no peak at all" in find_best_load(scene(), case_at, family, SETTINGS, None).reason
 
 

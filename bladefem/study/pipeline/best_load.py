@@ -19,8 +19,9 @@ from scipy.optimize import brentq
 from ...errors import NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.node_gradients import node_gradients
-from ...hbm.optimum import Optimum, Variation, lowest_peak
+from ...hbm.optimum import Optimum, lowest_peak
 from ...hbm.peak import Peak, with_slope
+from ...hbm.peak_levels import Variation
 from ...scene.tables import Scene
 from ..adaptive.choice import default_band, solver_options
 from ..adaptive.family import Family, family_member, joined_elements, with_excited_harmonics
