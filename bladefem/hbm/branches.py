@@ -17,42 +17,35 @@ import numpy as np
 
 from ..errors import NotSolvedError
 from ..friction.fourier import to_real
-from .continuation import PathPoint, follow
+from .band_path import (
+    MAX_FOLDS,
+    BandPath,
+    count_folds,
+    follow_both_ways,
+    follow_path,
+    lies_on_paths,
+)
+from .continuation import PathPoint
 from .linear.condensation import condense
 from .model import ReducedModel
-from .peak import find_peak
+from .path_maxima import close_in_maxima, path_maxima
 from .slow_sweep import DOWN, UP, reached_by, visited_pieces
 from .solution import Solution, size
 from .solve import solve
 from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULT_OPTIONS, Options
 
-# first and longest arc-length step, as shares of the band
-ARC_STEPS = (0.005, 0.1)
-# steps with which a local maximum is closed in
-PEAK_STEP = 1e-4
 # points of all paths of a band: so many times unknowns, within these bounds
 POINT_BUDGET = 3e5
 MIN_POINTS = 300
 MAX_POINTS = 1500
 # paths of a band in addition to those from its ends
 MAX_PATHS = 6
-# relative distance of displacements up to which a motion lies on a path, between two of its points
-SAME_MOTION = 0.03
 # residual of points of a path, relative: a looser one lets a path go on beyond a fold, 17 % above
 # the peak at 2e-5
 PATH_TOLERANCE = 1e-9
 # frequencies of the band where motions off the paths are looked for
 PROBED_FREQUENCIES = 7
-# refinements of one local maximum
-MAX_REFINEMENTS = 12
-# height of a local maximum over the highest of its path below which it is not closed in
-SMALL_MAXIMUM = 0.02
-# local maxima of a path that are closed in, the highest ones: a maze of folds has dozens
-MAX_CLOSED_IN = 8
-# folds of one path, and of all before no further one is begun: a damper that lifts off everywhere
-# and strikes back has a maze of internal resonances, which leads nowhere
-MAX_FOLDS = 24
 
 
 @dataclass(frozen=True)
@@ -94,15 +87,6 @@ class Branches:
         ]
 
 
-@dataclass
-class _Path:
-    """A path under way: its points in order, and whether it starts at an end of the band."""
-
-    points: list[PathPoint]
-    # "low", "high" or "" of the first and the last point
-    ends: tuple[str, str]
-
-
 def find_branches(
     model: ReducedModel,
     band: tuple[float, float],
@@ -121,7 +105,7 @@ def find_branches(
     """
     options = replace(options, tolerance=min(options.tolerance, PATH_TOLERANCE))
     notes: list[str] = []
-    paths: list[_Path] = []
+    paths: list[BandPath] = []
     # points that stick may have been solved with fewer harmonics
     solved = [
         replace(p, harmonics=H, samples=samples, w=match_harmonics(p.w, H))
@@ -136,24 +120,20 @@ def find_branches(
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
         at_end = start is solved[0] or start is solved[-1]
-        full = len(paths) >= MAX_PATHS or _folds(paths) >= MAX_FOLDS
-        if budget <= 0 or (full and not at_end) or _on_paths(paths, start):
+        full = len(paths) >= MAX_PATHS or count_folds(paths) >= MAX_FOLDS
+        if budget <= 0 or (full and not at_end) or lies_on_paths(paths, start):
             continue
-        path = _followed(model, start, band, forward, budget, notes, options)
+        path = follow_path(model, start, band, forward, budget, notes, options)
         if not at_end:
-            path = _both_ways(model, start, band, path, budget, notes, options)
+            path = follow_both_ways(model, start, band, path, budget, notes, options)
         budget -= len(path.points)
         paths.append(path)
     if budget <= 0:
         notes.append(f"paths ended after {limit} points: there may be further motions")
     for path in paths:
-        _close_in(model, path, band, peak, options)
-    left_over = _runs([_on_paths(paths, p) for p in solved], solved)
+        close_in_maxima(model, path, band, peak, options)
+    left_over = _runs([lies_on_paths(paths, p) for p in solved], solved)
     return _sorted_out(paths, left_over, options.probe, notes)
-
-
-def _folds(paths: Sequence[_Path]) -> int:
-    return sum(point.fold for path in paths for point in path.points)
 
 
 def _runs(on_path: Sequence[bool], solved: Sequence[Solution]) -> list[list[Solution]]:
@@ -192,239 +172,8 @@ def _further(
                 yield point
 
 
-def _followed(
-    model: ReducedModel,
-    start: Solution,
-    band: tuple[float, float],
-    forward: bool,
-    budget: int,
-    notes: list[str],
-    options: Options,
-) -> _Path:
-    """The path from a solution until it leaves the band, closes on itself, or the budget ends."""
-    points: list[PathPoint] = []
-    folds = 0
-    options = replace(options, frugal=False)
-    bounds = min(band[0], start.omega), max(band[1], start.omega)
-    try:
-        for point in follow(
-            model,
-            "omega",
-            start,
-            bounds,
-            forward=forward,
-            steps=ARC_STEPS,
-            options=options,
-            crossings=False,
-        ):
-            points.append(point)
-            if point.restarted:
-                notes.append(
-                    f"a path was begun again at {point.solution.frequency:.6g} Hz: "
-                    f"{point.restarted}"
-                )
-            folds += point.fold
-            if folds > MAX_FOLDS:
-                notes.append(
-                    f"a path was left at {point.solution.frequency:.6g} Hz after {MAX_FOLDS} "
-                    "folds: there may be further motions"
-                )
-                break
-            if len(points) >= budget or _closed(points, band):
-                break
-    except NotSolvedError as error:
-        notes.append(str(error))
-    return _Path(points, (_end(start.omega, band), _end(points[-1].value, band) if points else ""))
-
-
-def _both_ways(
-    model: ReducedModel,
-    start: Solution,
-    band: tuple[float, float],
-    path: _Path,
-    budget: int,
-    notes: list[str],
-    options: Options,
-) -> _Path:
-    """The path continued beyond its start in the other direction, unless it closed on itself."""
-    if _closed(path.points, band):
-        return path
-    back = _followed(model, start, band, False, budget - len(path.points), notes, options)
-    turned = (
-        [
-            replace(late, forward=not late.forward, fold=early.fold)
-            for late, early in pairwise([*back.points[::-1], back.points[0]])
-        ]
-        if back.points
-        else []
-    )
-    return _Path([*turned[:-1], *path.points], (back.ends[1], path.ends[1]))
-
-
-def _end(omega: float, band: tuple[float, float]) -> str:
-    """Which end of the band a frequency lies at or beyond."""
-    margin = 1e-6 * (band[1] - band[0])
-    if omega <= band[0] + margin:
-        return "low"
-    return "high" if omega >= band[1] - margin else ""
-
-
-def _closed(points: Sequence[PathPoint], band: tuple[float, float]) -> bool:
-    """The path has come round to its start in the same direction."""
-    if len(points) < 10 or points[0].forward != points[-1].forward:
-        return False
-    one, two, three = points[0], points[-2], points[-1]
-    if not min(two.value, three.value) <= one.value <= max(two.value, three.value):
-        return False
-    return _near(two.solution, three.solution, one.solution)
-
-
-def _near(
-    left: Solution,
-    right: Solution,
-    point: Solution,
-) -> bool:
-    """Whether a point lies on the chord between two others, in displacements."""
-    H = max(left.harmonics, point.harmonics)
-    a, b, c = (match_harmonics(p.w, H) for p in (left, right, point))
-    width = right.omega - left.omega
-    share = np.clip((point.omega - left.omega) / width, 0, 1) if width else 0.0
-    between = (1 - share) * a + share * b
-    # the chord of a curved path lies off it by a share of its own length
-    off = SAME_MOTION * max(np.linalg.norm(a), np.linalg.norm(b)) + 0.1 * np.linalg.norm(b - a)
-    # a stuck contact may rest anywhere
-    return bool(np.linalg.norm((c - between)[:, :, 1:]) <= off)
-
-
-def _on_paths(paths: Sequence[_Path], point: Solution) -> bool:
-    for path in paths:
-        for left, right in pairwise(path.points):
-            low, high = sorted((left.value, right.value))
-            if low <= point.omega <= high and _near(left.solution, right.solution, point):
-                return True
-    return False
-
-
-def _close_in(
-    model: ReducedModel,
-    path: _Path,
-    band: tuple[float, float],
-    peak: float,
-    options: Options,
-) -> None:
-    """Further points round the highest local maxima, put into the path where they belong."""
-    heights = [size(p.solution, options.probe) for p in path.points]
-    found = _maxima_to_close_in(heights, peak)
-    highest = sorted(found, key=lambda i: -heights[i])[:MAX_CLOSED_IN]
-    # from the end on: points that are put in move those behind them
-    for i in sorted(highest, reverse=True):
-        three = path.points[i - 1 : i + 2]
-        path.points[i - 1 : i + 2] = _by_slope(model, three, peak, options) or _finer(
-            model, three, band, peak, options
-        )
-
-
-def _maxima_to_close_in(heights: Sequence[float], peak: float) -> list[int]:
-    """Numbers of the local maxima that are not small, and from which the path falls by more than
-    the relative accuracy of a peak.
-    """
-    top = max(heights, default=0.0)
-    found = []
-    for i in range(1, len(heights) - 1):
-        before, here, after = heights[i - 1 : i + 2]
-        if here < max(before, after) or here < SMALL_MAXIMUM * top:
-            continue
-        if here - min(before, after) >= peak * here:
-            found.append(i)
-    return found
-
-
-def _by_slope(
-    model: ReducedModel,
-    three: Sequence[PathPoint],
-    peak: float,
-    options: Options,
-) -> list[PathPoint] | None:
-    """Three points with the maximum between them found by its slope, which takes fewer points than
-    short steps; None where that leaves the path, or where the frequency turns back in between.
-    """
-    first, middle, last = three
-    turns = (middle.value - first.value) * (last.value - middle.value) <= 0
-    if turns or not first.forward == middle.forward == last.forward:
-        return None
-    point = middle.solution
-    simply = replace(options, fallbacks=False, frugal=False)
-    try:
-        found = find_peak(
-            model,
-            point.omega,
-            point.harmonics,
-            point.samples,
-            near=point,
-            tolerance=peak,
-            options=simply,
-        )
-    except NotSolvedError:
-        return None
-    before, after = (
-        (first, middle)
-        if (found.omega - middle.value) * (last.value - middle.value) < 0
-        else (middle, last)
-    )
-    low, high = sorted((before.value, after.value))
-    inside = low <= found.omega <= high
-    if not inside or not _near(before.solution, after.solution, found.solution):
-        return None
-    top = replace(middle, value=found.omega, solution=found.solution, fold=False)
-    if found.omega == middle.value or found.height <= size(point, options.probe):
-        return list(three)
-    return [first, top, middle, last] if before is first else [first, middle, top, last]
-
-
-def _finer(
-    model: ReducedModel,
-    three: Sequence[PathPoint],
-    band: tuple[float, float],
-    peak: float,
-    options: Options,
-) -> list[PathPoint]:
-    """Three points with a maximum inside, and what lies between them by shorter steps."""
-    probe = options.probe
-    first, _, last = three
-    length = abs(three[1].value - first.value) + abs(last.value - three[1].value)
-    step = max(length / (band[1] - band[0]) / 8, PEAK_STEP)
-    options = replace(options, frugal=False)
-    found = [first]
-    try:
-        for point in follow(
-            model,
-            "omega",
-            first.solution,
-            (0.99 * band[0], 1.01 * band[1]),
-            forward=first.forward,
-            steps=(step, step),
-            options=options,
-            crossings=False,
-        ):
-            if len(found) > 4 * MAX_REFINEMENTS:
-                break
-            if point.value != first.value:
-                found.append(point)
-            beyond = (point.value - last.value) * (1 if last.forward else -1) >= 0
-            falls = len(found) > 2 and size(point.solution, probe) < size(
-                found[-2].solution, probe
-            ) * (1 - peak)
-            if point.forward == last.forward and beyond and falls:
-                break
-    except NotSolvedError:
-        return list(three)
-    if max(size(p.solution, probe) for p in found) < size(three[1].solution, probe):
-        return list(three)
-    return [*found, last]
-
-
 def _sorted_out(
-    paths: Sequence[_Path],
+    paths: Sequence[BandPath],
     left_over: Sequence[list[Solution]],
     probe: int,
     notes: list[str],
@@ -445,7 +194,7 @@ def _sorted_out(
         for end, number in zip(path.ends, (first, len(pieces) - 1), strict=True):
             if end:
                 ends.setdefault(end, number)
-        for point in _local_maxima(path, probe):
+        for point in path_maxima(path, probe):
             own = (n for n in range(first, len(pieces)) if any(p is point for p in pieces[n]))
             maxima.append((point, next(own)))
     frequencies = [np.array([p.omega for p in piece]) for piece in pieces]
@@ -469,16 +218,6 @@ def _sorted_out(
     resonances.sort(key=lambda r: -r.height)
     pieces.extend(left_over)
     return Branches(tuple(map(tuple, pieces)), tuple(resonances), tuple(dict.fromkeys(notes)))
-
-
-def _local_maxima(path: _Path, probe: int) -> list[Solution]:
-    """Points of a path that are higher than the one before and not lower than the one after."""
-    heights = [size(p.solution, probe) for p in path.points]
-    return [
-        path.points[i].solution
-        for i in range(1, len(heights) - 1)
-        if heights[i] > heights[i - 1] and heights[i] >= heights[i + 1]
-    ]
 
 
 def _pieces(points: Sequence[PathPoint]) -> list[list[Solution]]:

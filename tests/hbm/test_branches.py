@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 from models import FOLDING, folding_pair, rebounding
 
+from bladefem.hbm import band_path
 from bladefem.hbm import branches as branches_module
+from bladefem.hbm import path_maxima as maxima_module
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.branches import find_branches
 from bladefem.hbm.model import Damping
@@ -125,7 +127,7 @@ def test_motions_that_no_path_reached_are_kept(folding, monkeypatch):
 
 
 def test_a_path_through_a_maze_of_folds_is_left(folding, monkeypatch):
-    monkeypatch.setattr(branches_module, "MAX_FOLDS", 0)
+    monkeypatch.setattr(band_path, "MAX_FOLDS", 0)
     swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
     found = find_branches(folding, BAND, swept, 3, 128)
     assert any("folds" in note for note in found.notes)
@@ -146,7 +148,7 @@ def test_maxima_are_closed_in_by_their_slope(folding, monkeypatch):
     """Short steps along the path take twice as many points, and find no higher maximum."""
     known = list(response(folding, np.linspace(*BAND, 13), 7, 256))
     by_slope = find_branches(folding, BAND, known, 7, 256, peak=1e-4)
-    monkeypatch.setattr(branches_module, "_by_slope", lambda *arguments: None)
+    monkeypatch.setattr(maxima_module, "_by_slope", lambda *arguments: None)
     by_steps = find_branches(folding, BAND, known, 7, 256, peak=1e-4)
     assert 3 * len(by_slope.points) < 2 * len(by_steps.points)
     assert len(by_slope.resonances) == len(by_steps.resonances)
@@ -160,21 +162,21 @@ def test_only_the_highest_maxima_of_a_path_are_closed_in(folding, monkeypatch):
     """A path with more maxima than are worth it: the highest are closed in, from the end on."""
     heights = [0.01, 1.0, 0.01, 3.0, 0.01, 2.0, 0.01, 1e-4, 0.0, 2.5, 2.4999, 2.5]
     # not one of a fraction of the highest, nor one from which the path hardly falls
-    found = branches_module._maxima_to_close_in(heights, 1e-2)
+    found = maxima_module.maxima_to_close_in(heights, 1e-2)
     assert found == [1, 3, 5, 9]
-    assert branches_module._maxima_to_close_in([], 1e-2) == []
+    assert maxima_module.maxima_to_close_in([], 1e-2) == []
     path = SimpleNamespace(
         points=[
             SimpleNamespace(solution=height, value=float(i)) for i, height in enumerate(heights)
         ]
     )
     closed = []
-    monkeypatch.setattr(branches_module, "size", lambda height, probe: height)
-    monkeypatch.setattr(branches_module, "MAX_CLOSED_IN", 2)
+    monkeypatch.setattr(maxima_module, "size", lambda height, probe: height)
+    monkeypatch.setattr(maxima_module, "MAX_CLOSED_IN", 2)
     monkeypatch.setattr(
-        branches_module,
+        maxima_module,
         "_by_slope",
         lambda model, three, peak, options: closed.append(three[1].value) or list(three),
     )
-    branches_module._close_in(folding, path, BAND, 1e-2, DEFAULT_OPTIONS)
+    maxima_module.close_in_maxima(folding, path, BAND, 1e-2, DEFAULT_OPTIONS)
     assert closed == [9.0, 3.0]
