@@ -58,6 +58,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.scene.tables import Mistuning, Scene
 from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.check_points import heights_of, peak_of
 from bladefem.study.adaptive.choice import covered_band, default_band, solver_options
 from bladefem.study.adaptive.family import Family, family_member
 from bladefem.study.adaptive.indicators import moved_solution
@@ -67,10 +68,16 @@ from bladefem.study.chart.rows import parabola_resonance
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
 from bladefem.study.pipeline.damper_contact import contact_patches
+from bladefem.study.pipeline.highest_stable import highest_lasting
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.seated_loads import seat_every_load
-from bladefem.study.pipeline.stability import UNSTABLE, model_in_time, richer_models, stability_of
+from bladefem.study.pipeline.stability import (
+    judged_above,
+    model_in_time,
+    richer_models,
+    stability_of,
+)
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
 
 ROOT = Path(__file__).parents[1]
@@ -224,22 +231,18 @@ def by_choice(known: Prepared, k: int) -> Answer:
 
 
 def by_settings(settings: Settings, known: Prepared, k: int) -> Answer:
-    """A sweep with given settings, and its highest point that is not unstable: all are judged as
+    """A sweep with given settings, and its highest point judged not unstable: all are judged as
     those of a run, unstable ones again with more harmonics.
     """
     scene, family = known.scene, known.families[k]
     model = family_member(family, settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, scene.accuracy)
-    marks = stability_of(model_in_time(family, settings), points, richer_models(family, settings))
-    top = highest_lasting(points, marks.verdict)
+    in_time, richer = model_in_time(family, settings), richer_models(family, settings)
+    marks = stability_of(in_time, points, richer)
+    marks = judged_above(in_time, points, richer, marks, 0.0)
+    number = highest_lasting(heights_of(points), marks.verdict)
+    top = peak_of(points) if number is None else points[number]
     return Answer(size(top), top.frequency, asking(model, settings, top))
-
-
-def highest_lasting(points: Sequence[Solution], verdicts: np.ndarray) -> Solution:
-    """The highest solved point that is not unstable; the highest of all where each of them is."""
-    solved = [(p, v) for p, v in zip(points, verdicts, strict=True) if p.converged]
-    lasting = [p for p, verdict in solved if verdict != UNSTABLE]
-    return max(lasting or [p for p, _ in solved], key=size)
 
 
 def by_loop(settings: Settings, known: Prepared, k: int) -> Answer:

@@ -9,13 +9,13 @@ import pandas as pd
 
 from geometry.quality import quality_rows
 
+from ..hbm.stability import UNIQUE
 from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.loads import design_table
 from ..study.pipeline.run_records import SolvedRun
-from ..study.pipeline.stability import UNIQUE
 from .best_load import best_load_table
 from .fatigue import utilisation_table
 from .flow import flow_tables

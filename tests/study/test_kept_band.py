@@ -12,11 +12,11 @@ from bladefem.hbm.ring_march import PERIODS_AT_ONCE
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.time_model import time_system
+from bladefem.study.pipeline import judged_resonance
 from bladefem.study.pipeline import kept_band as module
-from bladefem.study.pipeline import loads
 from bladefem.study.pipeline.kept_band import kept_band
 from bladefem.study.pipeline.loads import Curve
-from bladefem.study.pipeline.stability import in_one_body
+from bladefem.study.pipeline.stability import Stability, in_one_body
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
 
 STEPS = 1000
@@ -117,10 +117,9 @@ def test_a_march_contradicts_a_balance_whose_amplitude_lies_outside_of_its_band(
     """By more than the accuracy; 247 um under 96 N on an imported wedge go to 408 to 455."""
     point = SimpleNamespace(probe=np.array([[0.0], [1.0]]))
     band = module.KeptBand(380.0, lowest, highest, 200)
-    assert loads._contradicts(band, point, 0.05) == contradicts
+    assert judged_resonance._contradicts(band, point, 0.05) == contradicts
     unknown = module.KeptBand(380.0, np.nan, np.nan, 0, "too long")
-    assert not loads._contradicts(unknown, point, 0.05)
-    assert not loads._contradicts(None, point, 0.05)
+    assert not judged_resonance._contradicts(unknown, point, 0.05)
 
 
 @pytest.mark.parametrize(
@@ -134,18 +133,28 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
     ]
     for point in points:
         point.converged = True
-    marks = SimpleNamespace(verdict=np.array(["stable", "stable", "unstable"]))
+    marks = Stability(np.array(["stable", "stable", "unstable"]), np.ones(3))
     reason = "too long" if np.isnan(kept_to) else ""
     band = module.KeptBand(2.0, kept_to, kept_to, 200, reason)
     curve = SimpleNamespace(points=points, settings=None)
+    scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
+    models = {"model_in_time": None, "richer_models": [], "stability_of": marks}
+    for name, value in models.items():
+        monkeypatch.setattr(judged_resonance, name, lambda *_, value=value: value)
+    asked = []
+    monkeypatch.setattr(
+        judged_resonance, "judged_above", lambda *args: asked.append(args[-1]) or marks
+    )
     done = SimpleNamespace(models=None, band=lambda *_: band)
-    top, kept = loads._resonance(done, curve, marks, accuracy=0.05)
-    assert size(top) == pytest.approx(given) and kept is band
+    found = judged_resonance.judged_resonance(done, curve, scene)
+    assert size(found.point) == pytest.approx(given) and found.kept is band
+    # motions are judged only above what the blade keeps to, where that is another amplitude
+    assert asked == ([kept_to] if kept_to in (0.7, 0.95, 1.3) else [])
     # where that is not marched by steps at this size
-    monkeypatch.setattr(loads, "kept_of_family", lambda *_: band)
+    monkeypatch.setattr(judged_resonance, "kept_of_family", lambda *_: band)
     none = SimpleNamespace(models=None, band=lambda *_: None)
-    top, kept = loads._resonance(none, curve, marks, accuracy=0.05)
-    assert size(top) == pytest.approx(given) and kept is band
+    found = judged_resonance.judged_resonance(none, curve, scene)
+    assert size(found.point) == pytest.approx(given) and found.kept is band
 
 
 def marches_that_grow(point, instants_that_hold):

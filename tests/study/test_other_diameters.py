@@ -23,7 +23,7 @@ from bladefem.study.pipeline.other_diameters import (
 from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.scene_mesh import build_mesh
-from bladefem.study.pipeline.stability import Disturbances
+from bladefem.study.pipeline.stability_remarks import Disturbances
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 MODES = 20

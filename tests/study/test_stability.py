@@ -23,10 +23,9 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.loads import curve_of
-from bladefem.study.pipeline.stability import (
-    in_one_body,
+from bladefem.study.pipeline.stability import in_one_body, stability_of
+from bladefem.study.pipeline.stability_remarks import (
     ripple_sentence,
-    stability_of,
     stability_sentence,
     unstable_sentence,
 )
@@ -115,7 +114,7 @@ def rippling(kept):
     """A curve of one unstable point of 1 mm."""
     top = SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1)
     return SimpleNamespace(
-        load=50.0, frequency=np.array([100.0]), bifurcation=np.array(["torus"]), peak=top,
+        load=50.0, frequency=np.array([100.0]), amplitude=np.array([1e-3]), bifurcation=np.array(["torus"]), peak=top,
         unstable_peak=top, kept=kept, peak_amplitude=1e-3, peak_frequency=100.0,
         keeps_unstable=True, marched_instead=False,
     )  # fmt: skip

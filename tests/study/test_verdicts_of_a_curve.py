@@ -16,15 +16,15 @@ from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import stability
+from bladefem.study.pipeline.highest_stable import highest_lasting, next_to_judge
 from bladefem.study.pipeline.kept_band import KeptBand, kept_band
 from bladefem.study.pipeline.response_remarks import search_sentence
-from bladefem.study.pipeline.stability import (
+from bladefem.study.pipeline.stability import RicherModel, judged_above, model_in_time, stability_of
+from bladefem.study.pipeline.stability_remarks import (
     Disturbances,
-    RicherModel,
     judged_disturbances,
-    model_in_time,
-    stability_of,
     stability_sentence,
+    unjudged_sentence,
 )
 
 
@@ -84,7 +84,7 @@ def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(mo
     top = int(np.argmax(heights))
     assert alone.verdict[top] == everything.verdict[top]
     judged = alone.verdict != UNKNOWN
-    assert 1 <= judged.sum() <= 1 + stability.POINTS_JUDGED_IN_ADDITION
+    assert judged.sum() == 1
     said = stability_sentence([(alone.verdict, alone.multiplier)])
     assert f"{(~judged).sum()} not judged (of curves whose verdicts" in said
 
@@ -108,7 +108,6 @@ def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
 
     monkeypatch.setattr(stability, "stability_verdict", verdict)
     monkeypatch.setattr(stability, "CONFIRMED_MOTIONS", 1)
-    monkeypatch.setattr(stability, "POINTS_JUDGED_IN_ADDITION", 0)
     told = stability_of(model, points, [RicherModel(model, 15, 256)])
     assert asked == [points[i].omega for i in order[:2]]
     assert told.verdict[order[0]] == STABLE
@@ -136,7 +135,7 @@ def test_the_highest_motion_that_is_not_unstable_is_judged_again_too(monkeypatch
 
     monkeypatch.setattr(stability, "stability_verdict", verdict)
     richer = [RicherModel(model, 15, 256), RicherModel(model, 31, 512)]
-    told = stability_of(model, points, richer)
+    told = judged_above(model, points, richer, stability_of(model, points, richer), 0.0)
     assert told.verdict[order[0]] == UNSTABLE and told.multiplier[order[0]] == 1.1
     assert [told.verdict[i] for i in order[1:]] == [STABLE] * 2
     # the richest motion decides, and lower points are left as they are
@@ -202,3 +201,74 @@ def test_what_a_sweep_left_open_reaches_the_remarks(monkeypatch):
     assert said.startswith("load 36 N: the sweep ended after 3 points")
     assert said.endswith("; a; b; and 1 more of the kind")
     assert search_sentence(SimpleNamespace(load=36.0, mass=None, notes=())) == ""
+
+
+def judge(branch, heights, stable, most=99):
+    """Verdicts on a curve by the search alone, from that of its highest point on."""
+    verdicts = np.full(len(heights), UNKNOWN, dtype=object)
+    judged = []
+    i = int(np.argmax(heights))
+    while i is not None and len(judged) < most:
+        verdicts[i] = STABLE if stable[i] else UNSTABLE
+        judged.append(i)
+        i = next_to_judge(heights, branch, verdicts, judged)
+    return judged, highest_lasting(heights, verdicts)
+
+
+def test_the_highest_motion_that_lasts_is_found_by_bisection():
+    """A peak of 41 points with 20 unstable ones, and a lower piece whose top is stable or not."""
+    x = np.linspace(-1, 1, 41)
+    heights = np.concatenate([1 / (0.05 + x**2), 0.2 / (0.05 + x**2)])
+    branch = np.repeat([1, 2], 41)
+    for width, lower in ((0.5, True), (0.2, False), (0.9, False)):
+        stable = np.concatenate([abs(x) > width, lower | (abs(x) > 0.1)])
+        judged, top = judge(branch, heights, stable)
+        assert top == max(np.flatnonzero(stable), key=lambda i: heights[i])
+        assert len(judged) <= 14
+    judged, top = judge(branch, heights, np.zeros(82, bool))
+    assert top is None and len(judged) <= 20
+
+
+def test_no_motion_is_taken_to_last_that_was_not_judged(monkeypatch):
+    """Eight verdicts from the highest point down left the ninth, unstable too, as the answer."""
+    model = bouncing()
+    points = list(response(model, np.linspace(0.9, 1.4, 31), 7, 128))
+    heights = np.array([abs(p.probe[1, 0]) for p in points])
+    limit = np.sort(heights)[-20]
+
+    def verdict(of, motion, *limits):
+        high = abs(motion.probe[1, 0]) >= limit
+        return Verdict(UNSTABLE, 1.1) if high else Verdict(STABLE, 0.9)
+
+    monkeypatch.setattr(stability, "stability_verdict", verdict)
+    monkeypatch.setattr(stability, "CURVE_OPERATIONS", 0.0)
+    alone = stability_of(model, points)
+    told = judged_above(model, points, [], alone, 0.0)
+    top = highest_lasting(heights, told.verdict)
+    assert heights[top] == heights[heights < limit].max()
+    assert (told.verdict != UNKNOWN).sum() <= 12
+    # one that the blade is known to keep beside them: nothing lower is asked for
+    least = np.sort(heights)[-10]
+    told = judged_above(model, points, [], alone, least)
+    assert (told.verdict != UNKNOWN).sum() <= 7 and highest_lasting(heights, told.verdict) is None
+
+
+def test_a_motion_that_was_not_judged_is_no_lasting_one():
+    heights = np.array([3.0, 2.0, 1.0])
+    assert highest_lasting(heights, np.array([UNSTABLE, UNKNOWN, STABLE])) == 2
+    assert highest_lasting(heights, np.array([UNSTABLE, UNKNOWN, UNKNOWN])) is None
+    judged = [0, 1, 2]
+    branch = np.ones(3, int)
+    verdicts = np.array([UNSTABLE, UNKNOWN, UNSTABLE])
+    assert next_to_judge(heights, branch, verdicts, judged) is None
+    # a curve says so where that motion is its resonance
+    curve = SimpleNamespace(
+        load=7.0,
+        frequency=np.array([1.0, 1.0, 2.0]),
+        amplitude=heights,
+        stability=np.array([UNKNOWN, STABLE, STABLE]),
+        peak=SimpleNamespace(frequency=1.0, probe=np.array([[0.0], [3.0]])),
+    )
+    assert "under 7 N the motion at the resonance was not judged" in unjudged_sentence([curve])
+    curve.peak.probe[1] = 2.0
+    assert unjudged_sentence([curve]) == ""

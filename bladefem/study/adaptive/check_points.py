@@ -11,7 +11,7 @@ import numpy as np
 
 from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution, size
-from ...hbm.stability import AFFORDABLE_OPERATIONS, UNSTABLE, stability_verdict
+from ...hbm.stability import AFFORDABLE_OPERATIONS, STABLE, UNIQUE, UNSTABLE, stability_verdict
 from ...hbm.truncation_indicator import truncation_indicator
 from .family import Family, family_member
 from .indicators import richer_settings
@@ -112,15 +112,14 @@ def peak_of(points: Sequence[Solution]) -> Solution:
 
 
 def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
-    """The highest converged point that is not unstable; the highest of all where none is known to
-    be otherwise.
+    """The highest converged point above which all are unstable; the highest of all where that is
+    not known to be otherwise.
     """
     good = sorted((p for p in points if p.converged), key=size, reverse=True)
     if model.directions == model.elements.tangents:
         return good[0]
-    judged = (
-        p
-        for p in good[:MAX_JUDGED_POINTS]
-        if stability_verdict(model, p, AFFORDABLE_OPERATIONS).verdict != UNSTABLE
-    )
-    return next(judged, good[0])
+    for point in good[:MAX_JUDGED_POINTS]:
+        verdict = stability_verdict(model, point, AFFORDABLE_OPERATIONS).verdict
+        if verdict != UNSTABLE:
+            return point if verdict in (STABLE, UNIQUE) else good[0]
+    return good[0]

@@ -5,7 +5,7 @@ load.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, TypeAlias
 
@@ -20,8 +20,7 @@ from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import Checked, checked_points, estimated_errors
-from ..adaptive.choice_in_time import MarchedBand
+from ..adaptive.choice import checked_points, estimated_errors
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
 from ..adaptive.layer_change import layer_change
@@ -30,12 +29,12 @@ from ..adaptive.settings import Settings, restarted_settings
 from ..adaptive.stiff_layer import stiff_layer_change
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
-from .error_in_time import Marches, error_in_time
-from .kept_band import KeptBand, kept_of_family
+from .error_in_time import Marches
+from .judged_resonance import judged_in_time, judged_resonance
+from .kept_band import KeptBand
 from .liftoff import naming_the_load
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
-from .stability import UNSTABLE, Stability, model_in_time, richer_models, stability_of
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
@@ -276,12 +275,11 @@ def curve_of(
         curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy, march)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
-    marks = _stability_marks(scene, models, curve)
-    top, kept = _resonance(marches, curve, marks, scene.accuracy)
-    instead = top is peak_of(curve.points) and _contradicts(kept, top, scene.accuracy)
+    judged = judged_resonance(marches, curve, scene)
+    marks, top = judged.marks, judged.point
     estimated, in_time = estimated_errors(curve), None
-    if not instead:
-        curve, estimated, in_time = _judged_in_time(scene, marches, curve, top)
+    if not judged.contradicted:
+        curve, estimated, in_time = judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     # at a maximum: from a point beside it other models find the maximum
@@ -301,9 +299,9 @@ def curve_of(
         multiplier=marks.multiplier,
         peak=top,
         bifurcation=marks.bifurcation,
-        unstable_peak=None if kept is None else peak_of(curve.points),
-        kept=kept,
-        marched_instead=instead,
+        unstable_peak=None if judged.kept is None else peak_of(curve.points),
+        kept=judged.kept,
+        marched_instead=judged.contradicted,
         in_time=in_time,
         interval=interval,
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
@@ -313,36 +311,6 @@ def curve_of(
         layer_law=unseen.layer_law,
         layer_shift=unseen.layer_shift,
     )
-
-
-def _stability_marks(scene: Scene, models: Family, curve: Checked) -> Stability:
-    """Stability of each point; empty marks where it was not asked for."""
-    empty = np.full(len(curve.points), "")
-    if not scene.study.stability:
-        return Stability(empty, np.full(len(empty), np.nan), bifurcation=empty)
-    richer = richer_models(models, curve.settings)
-    marks = stability_of(model_in_time(models, curve.settings), curve.points, richer)
-    return marks if len(marks.bifurcation) else replace(marks, bifurcation=empty)
-
-
-def _judged_in_time(
-    scene: Scene,
-    marches: Marches,
-    curve: Checked,
-    top: Solution,
-) -> tuple[Checked, RealArray, KeptBand | None]:
-    """The curve with the error of its resonance by a march where that tells it, the estimated error
-    of each point, and the march.
-    """
-    estimated = estimated_errors(curve)
-    if not scene.study.stability:
-        return curve, estimated, None
-    judged = error_in_time(marches, curve, top, scene.accuracy)
-    if judged is None:
-        return curve, estimated, None
-    estimated[[p is top for p in curve.points]] = judged.error
-    settings = replace(curve.settings, error=judged.error)
-    return replace(curve, settings=settings), estimated, judged.band
 
 
 def _unseen_errors(
@@ -374,40 +342,6 @@ def _unseen_errors(
         layer,
         shift,
     )
-
-
-def _resonance(
-    marches: Marches,
-    curve: Checked,
-    marks: Stability,
-    accuracy: float,
-) -> tuple[Solution, KeptBand | None]:
-    """The point that is given as the resonance, and what the blade does at the highest one where
-    that is unstable.
-
-    An unstable one gives way to the highest that is not where the blade is known to keep to less
-    than that: else the blade moves most next to the unstable one.
-    """
-    highest = peak_of(curve.points)
-    unstable = {id(p) for p, v in zip(curve.points, marks.verdict, strict=True) if v == UNSTABLE}
-    if id(highest) not in unstable:
-        return highest, None
-    kept = marches.band(curve.settings, highest)
-    if kept is None:
-        kept = kept_of_family(marches.models, curve.settings, highest)
-    lasting = [p for p in curve.points if p.converged and id(p) not in unstable]
-    known = not (kept.reason or kept.holds(size(highest), accuracy))
-    lower = max(lasting, key=size, default=highest)
-    return (lower if known and kept.highest < size(lower) else highest), kept
-
-
-def _contradicts(kept: KeptBand | None, top: Solution, accuracy: float) -> bool:
-    """What the blade keeps to is known, and not the amplitude of the motion that it was marched
-    from.
-    """
-    if kept is None or kept.reason:
-        return False
-    return MarchedBand(kept.lowest, kept.highest).beyond(size(top)) > accuracy
 
 
 def _columns(points: Sequence[Solution]) -> dict[str, np.ndarray]:

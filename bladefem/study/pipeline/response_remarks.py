@@ -14,11 +14,12 @@ from .damped_motion import DampedStress
 from .load_interval import interval_sentence
 from .loads import Curve
 from .resonance_list import reach_sentence
-from .stability import (
+from .stability_remarks import (
     Disturbances,
     folded_sentence,
     ripple_sentence,
     stability_sentence,
+    unjudged_sentence,
     unstable_sentence,
 )
 
@@ -68,6 +69,7 @@ def response_remarks(
     remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
     unstable = (unstable_sentence(c, scene.accuracy) for c in curves)
     remarks.extend(warning(text) for text in unstable if text)
+    remarks.extend(map(warning, filter(None, [unjudged_sentence(curves)])))
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
         remarks.append(interval_sentence([c.load for c in curves], intervals))

@@ -32,7 +32,7 @@ from .reduced_sector import with_damper_mass
 from .response_remarks import best_load_remarks, load_of, response_remarks, stress_message
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
-from .stability import Disturbances, judged_disturbances
+from .stability_remarks import Disturbances, judged_disturbances
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
 from .utilisation import utilisation_message

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,18 +21,16 @@ from ...hbm.solver.newton import DEFAULT_OPTIONS
 from ...hbm.stability import (
     MAX_OPERATIONS,
     STABLE,
-    UNIQUE,
     UNKNOWN,
     UNSTABLE,
     Verdict,
     stability_verdict,
     verdict_operations,
 )
+from ..adaptive.check_points import heights_of
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import Settings
-
-if TYPE_CHECKING:
-    from .loads import Curve
+from .highest_stable import highest_lasting, next_to_judge
 
 # local maxima of a curve that are judged first
 MAX_JUDGED_MAXIMA = 4
@@ -41,8 +38,9 @@ MAX_JUDGED_MAXIMA = 4
 CURVE_OPERATIONS = 1.2e10
 # of solving a point again with JUDGED_HARMONICS; more take as many times more as their square
 RICHER_OPERATIONS = 5e8
-# points that are judged in addition, as long as the highest one that is not unstable is not judged
-POINTS_JUDGED_IN_ADDITION = 8
+# points that are judged in addition, until the highest one that is not unstable is known: a curve
+# with thirty points takes six, one of seventeen pieces whose upper nine are unstable forty
+POINTS_JUDGED_IN_ADDITION = 40
 # with which points of one harmonic are judged
 JUDGED_HARMONICS = 7
 JUDGED_SAMPLES = 128
@@ -94,10 +92,10 @@ def stability_of(
     """Verdicts on solutions of the balance of one model, in the order of a curve.
 
     Every point is judged where CURVE_OPERATIONS allow it. Else the highest point is, and as far as
-    they allow the other local maxima, its neighbours, and points spread evenly over the curve; at
-    last whichever point is then the highest of those that are not unstable. Unstable ones are
-    judged again with more harmonics, from the highest down, as far as CONFIRMING_OPERATIONS allow
-    it and until CONFIRMED_MOTIONS of them stay unstable; so is the highest that is not.
+    they allow the other local maxima, its neighbours, and points spread evenly over the curve.
+    Unstable ones are judged again with more harmonics, from the highest down, as far as
+    CONFIRMING_OPERATIONS allow it and until CONFIRMED_MOTIONS of them stay unstable; so is the
+    highest point in any case.
     """
     found = [Verdict(UNKNOWN, reason="it was left out for its cost") for _ in points]
     motions = list(points)
@@ -114,24 +112,60 @@ def stability_of(
         judged.add(i)
         budget -= costs[i]
     again = _judge_again(found, motions, richer)
-    for _ in range(POINTS_JUDGED_IN_ADDITION):
-        lasting = [i for i in range(len(points)) if found[i].verdict != UNSTABLE]
-        top = max(lasting, key=lambda i: size(points[i]) * points[i].converged, default=None)
-        if top is None or top in again:
-            break
-        if top not in judged:
-            motions[top] = judged_motion(model, points[top])
-            found[top] = stability_verdict(model, motions[top])
-        stayed = sum(found[i].verdict == UNSTABLE for i in again)
-        if found[top].verdict != UNSTABLE or stayed < CONFIRMED_MOTIONS:
-            found[top], _ = judged_again(found[top], motions[top], richer)
-        judged.add(top)
-        again.add(top)
+    top = maxima[0] if maxima else None
+    if top is not None and top not in again:
+        found[top], _ = judged_again(found[top], motions[top], richer)
     reasons = [v.reason for v, p in zip(found, points, strict=True) if p.converged and v.reason]
+    return _marks(found, reasons[0] if len(reasons) == len(points) else "")
+
+
+def judged_above(
+    model: ReducedModel,
+    points: Sequence[Solution],
+    richer: Sequence[RicherModel],
+    marks: Stability,
+    least: float,
+) -> Stability:
+    """The verdicts on a curve with more of them, until the highest motion above an amplitude is
+    known that is not unstable, or that there is none: by bisection along each piece of the curve
+    between unstable motions and lower ones, with at most POINTS_JUDGED_IN_ADDITION verdicts.
+
+    Args:
+        marks: what `stability_of` gives.
+        least: the amplitude [m].
+    """
+    branch = np.array([point.branch for point in points])
+    heights = heights_of(points)
+    found = [
+        Verdict(*each)
+        for each in zip(marks.verdict, marks.multiplier, marks.bifurcation, strict=True)
+    ]
+    judged = set(np.flatnonzero(marks.verdict != UNKNOWN).tolist())
+    confirmed: set[int] = set()
+    stayed = 0
+    for _ in range(POINTS_JUDGED_IN_ADDITION):
+        verdicts = np.array([v.verdict for v in found])
+        asked = next_to_judge(heights, branch, verdicts, judged, least)
+        asked = highest_lasting(heights, verdicts) if asked is None else asked
+        if asked is None or asked in confirmed or heights[asked] <= least:
+            break
+        motion = judged_motion(model, points[asked])
+        if asked not in judged:
+            found[asked] = stability_verdict(model, motion)
+        # a motion that lasts by few harmonics is the answer: it has to last by more of them
+        if found[asked].verdict != UNSTABLE or stayed < CONFIRMED_MOTIONS:
+            found[asked], _ = judged_again(found[asked], motion, richer)
+        stayed += found[asked].verdict == UNSTABLE
+        judged.add(asked)
+        confirmed.add(asked)
+    return _marks(found, marks.reason)
+
+
+def _marks(found: Sequence[Verdict], reason: str) -> Stability:
     return Stability(
         np.array([v.verdict for v in found]),
         np.array([v.multiplier for v in found]),
-        reasons[0] if len(reasons) == len(points) else "",
+        reason,
         np.array([v.bifurcation for v in found], dtype="<U15"),
     )
 
@@ -304,146 +338,3 @@ def in_one_body(model: ReducedModel) -> ReducedModel:
 
 def _without_residual(body: PortModel) -> PortModel:
     return replace(body, shapes=body.shapes.real, residual=0 * body.residual.real)
-
-
-@dataclass(frozen=True)
-class Disturbances:
-    """Those that the points of a travelling wave were judged against."""
-
-    # after which they repeat, as the wave does; 1 where all move in phase, or no wave can be judged
-    blades: int = 1
-    # nodal diameters that they are made of, and how many the wheel has; none without a wheel
-    diameters: tuple[int, ...] = ()
-    possible: int = 0
-
-    @property
-    def sentence(self) -> str:
-        """What was looked at, and what was not; "" where nothing is left."""
-        if self.blades == 1:
-            return ""
-        found = f"disturbances that repeat after {self.blades} blades, as the wave does, were"
-        if not self.diameters:
-            return f"{found} looked at, not those of other nodal diameters"
-        listed = ", ".join(map(str, self.diameters))
-        others = self.possible - len(self.diameters)
-        return (
-            f"{found} looked at (nodal diameters {listed}), not those of the other {others} nodal "
-            "diameters"
-        )
-
-
-def judged_disturbances(
-    models: Family,
-    settings: Settings,
-    engine_order: int = 0,
-    sectors: int = 0,
-) -> Disturbances:
-    """What the verdicts on a family of models look at.
-
-    Args:
-        sectors: of the wheel; 0 without one.
-    """
-    try:
-        blades = blades_of_wave(model_in_time(models, settings))
-    except InputError:
-        return Disturbances()
-    if not sectors:
-        return Disturbances(blades)
-    turned = ((h * engine_order) % sectors for h in range(blades))
-    diameters = sorted({min(n, sectors - n) for n in turned})
-    return Disturbances(blades, tuple(diameters), sectors // 2 + 1)
-
-
-def stability_sentence(
-    parts: Sequence[tuple[np.ndarray, np.ndarray]],
-    judged: Disturbances = Disturbances(),
-) -> str:
-    """What was found on all curves, for the report.
-
-    Args:
-        parts: verdicts and multipliers of each curve.
-        judged: what they looked at.
-    """
-    verdict, largest = (np.concatenate(column) for column in zip(*parts, strict=True))
-    counts = {name: int((verdict == name).sum()) for name in (UNIQUE, STABLE, UNSTABLE, UNKNOWN)}
-    if counts[UNIQUE]:
-        return (
-            "stability: normal loads are prescribed, so that each periodic motion is the only "
-            "one, and stable"
-        )
-    if counts[UNKNOWN] == len(verdict):
-        return (
-            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave that "
-            "repeats after few blades, and not too many contact nodes that slip)"
-        )
-    worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
-    left_out = ""
-    if counts[UNKNOWN]:
-        left_out = (
-            " (of curves whose verdicts would cost more than their points, the local maxima, the "
-            "neighbours of the highest and points spread evenly are judged)"
-        )
-    wave = f"; {judged.sentence}" if judged.sentence else ""
-    return (
-        f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
-        f"{counts[UNKNOWN]} not judged{left_out}{wave}"
-    )
-
-
-def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
-    """The resonances that are unstable, but left for a motion of the same amplitude within an
-    accuracy, or "".
-
-    A rigid damper on its contacts has no damping at its own frequencies of some kilohertz: there
-    small ripples grow, and the blade hardly takes note of them.
-    """
-    moved = [
-        max(abs(end / size(c.unstable_peak) - 1) for end in (c.kept.lowest, c.kept.highest))
-        for c in curves
-        if c.unstable_peak is not None and c.kept is not None and _rippled(c, accuracy)
-    ]
-    if not moved:
-        return ""
-    loads = ", ".join(f"{c.load:g} N" for c in curves if _rippled(c, accuracy))
-    return (
-        f"under {loads} the motion at the resonance is unstable to a ripple; marched in time from "
-        f"there the amplitude stays within {100 * max(moved):.1f} % of the one given"
-    )
-
-
-def _rippled(curve: Curve, accuracy: float) -> bool:
-    if not curve.keeps_unstable or curve.kept is None:
-        return False
-    return curve.kept.holds(size(curve.peak), accuracy)
-
-
-def folded_sentence(curves: Sequence[Curve]) -> str:
-    """The curves with several motions at one frequency, or ""."""
-    pieces = {f"{c.load:g} N": int(c.branch.max(initial=0)) for c in curves}
-    each = ", ".join(f"{load} ({count} pieces)" for load, count in pieces.items() if count > 1)
-    return f"several motions at one frequency, pieces between folds: {each}" if each else ""
-
-
-def unstable_sentence(curve: Curve, accuracy: float) -> str:
-    """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
-    top = curve.unstable_peak
-    if top is None or _rippled(curve, accuracy):
-        return ""
-    at = int(np.flatnonzero(curve.frequency == top.frequency)[0])
-    named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
-    lost = (
-        f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
-        f"{top.frequency:.5g} Hz, is unstable{named}"
-    )
-    if curve.marched_instead:
-        lost += f"; the amplitude given, {1e6 * curve.peak_amplitude:.4g} um, is of a march"
-    elif curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
-        lost += "; it is given as the resonance"
-    elif curve.keeps_unstable:
-        lost += "; it is given as the resonance, being the larger amplitude"
-    else:
-        lost += (
-            "; the resonance given is the highest one that is not, "
-            f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
-        )
-    return lost if curve.kept is None else f"{lost}; {curve.kept.sentence}"

@@ -1,0 +1,92 @@
+"""Which motion of a curve is given as its resonance: the highest, if it lasts, or what a march from
+there leaves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...hbm.solution import Solution, size
+from ...hbm.stability import UNSTABLE
+from ...scene.tables import Scene
+from ...util.arrays import RealArray
+from ..adaptive.check_points import heights_of
+from ..adaptive.choice import Checked, estimated_errors
+from ..adaptive.choice_in_time import MarchedBand
+from .error_in_time import Marches, error_in_time
+from .highest_stable import highest_lasting
+from .kept_band import KeptBand, kept_of_family
+from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
+
+
+@dataclass(frozen=True)
+class JudgedResonance:
+    """The point that is given as the resonance of a curve, and how it was judged."""
+
+    point: Solution
+    # of all points of the curve
+    marks: Stability
+    # what the blade does at the highest point where that is unstable
+    kept: KeptBand | None = None
+    # the highest point is given, and the amplitudes that the blade keeps to are others
+    contradicted: bool = False
+
+
+def judged_resonance(marches: Marches, curve: Checked, scene: Scene) -> JudgedResonance:
+    """Judge a curve, and march from its highest point where that is unstable.
+
+    That one gives way to the highest that was judged and is not, where the blade is known to keep
+    to less than that: else the blade moves most next to the unstable one.
+    """
+    heights = heights_of(curve.points)
+    place = int(heights.argmax())
+    highest = curve.points[place]
+    if not scene.study.stability:
+        empty = np.full(len(heights), "")
+        unasked = Stability(empty, np.full(len(heights), np.nan), bifurcation=empty)
+        return JudgedResonance(highest, unasked)
+    models, settings = marches.models, curve.settings
+    model = model_in_time(models, settings)
+    richer = richer_models(models, settings)
+    marks = stability_of(model, curve.points, richer)
+    if marks.verdict[place] != UNSTABLE:
+        return JudgedResonance(highest, marks)
+    kept = marches.band(settings, highest) or kept_of_family(models, settings, highest)
+    if kept.reason or kept.holds(size(highest), scene.accuracy):
+        return JudgedResonance(highest, marks, kept, _contradicts(kept, highest, scene.accuracy))
+    marks = judged_above(model, curve.points, richer, marks, kept.highest)
+    lower = highest_lasting(heights, marks.verdict)
+    if lower is None or heights[lower] <= kept.highest:
+        return JudgedResonance(highest, marks, kept, _contradicts(kept, highest, scene.accuracy))
+    return JudgedResonance(curve.points[lower], marks, kept)
+
+
+def _contradicts(kept: KeptBand, top: Solution, accuracy: float) -> bool:
+    """What the blade keeps to is known, and not the amplitude of the motion that it was marched
+    from.
+    """
+    if kept.reason:
+        return False
+    return MarchedBand(kept.lowest, kept.highest).beyond(size(top)) > accuracy
+
+
+def judged_in_time(
+    scene: Scene,
+    marches: Marches,
+    curve: Checked,
+    top: Solution,
+) -> tuple[Checked, RealArray, KeptBand | None]:
+    """The curve with the error of its resonance by a march where that tells it, the estimated error
+    of each point, and the march.
+    """
+    estimated = estimated_errors(curve)
+    if not scene.study.stability:
+        return curve, estimated, None
+    judged = error_in_time(marches, curve, top, scene.accuracy)
+    if judged is None:
+        return curve, estimated, None
+    estimated[[p is top for p in curve.points]] = judged.error
+    settings = replace(curve.settings, error=judged.error)
+    return replace(curve, settings=settings), estimated, judged.band

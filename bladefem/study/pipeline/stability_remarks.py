@@ -1,0 +1,182 @@
+"""What is said of the stability of the motions of curves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import InputError
+from ...hbm.sector_modes import blades_of_wave
+from ...hbm.solution import Solution, size
+from ...hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
+from ..adaptive.family import Family
+from ..adaptive.settings import Settings
+from .stability import model_in_time
+
+if TYPE_CHECKING:
+    from .loads import Curve
+
+
+@dataclass(frozen=True)
+class Disturbances:
+    """Those that the points of a travelling wave were judged against."""
+
+    # after which they repeat, as the wave does; 1 where all move in phase, or no wave can be judged
+    blades: int = 1
+    # nodal diameters that they are made of, and how many the wheel has; none without a wheel
+    diameters: tuple[int, ...] = ()
+    possible: int = 0
+
+    @property
+    def sentence(self) -> str:
+        """What was looked at, and what was not; "" where nothing is left."""
+        if self.blades == 1:
+            return ""
+        found = f"disturbances that repeat after {self.blades} blades, as the wave does, were"
+        if not self.diameters:
+            return f"{found} looked at, not those of other nodal diameters"
+        listed = ", ".join(map(str, self.diameters))
+        others = self.possible - len(self.diameters)
+        return (
+            f"{found} looked at (nodal diameters {listed}), not those of the other {others} nodal "
+            "diameters"
+        )
+
+
+def judged_disturbances(
+    models: Family,
+    settings: Settings,
+    engine_order: int = 0,
+    sectors: int = 0,
+) -> Disturbances:
+    """What the verdicts on a family of models look at.
+
+    Args:
+        sectors: of the wheel; 0 without one.
+    """
+    try:
+        blades = blades_of_wave(model_in_time(models, settings))
+    except InputError:
+        return Disturbances()
+    if not sectors:
+        return Disturbances(blades)
+    turned = ((h * engine_order) % sectors for h in range(blades))
+    diameters = sorted({min(n, sectors - n) for n in turned})
+    return Disturbances(blades, tuple(diameters), sectors // 2 + 1)
+
+
+def stability_sentence(
+    parts: Sequence[tuple[np.ndarray, np.ndarray]],
+    judged: Disturbances = Disturbances(),
+) -> str:
+    """What was found on all curves, for the report.
+
+    Args:
+        parts: verdicts and multipliers of each curve.
+        judged: what they looked at.
+    """
+    verdict, largest = (np.concatenate(column) for column in zip(*parts, strict=True))
+    counts = {name: int((verdict == name).sum()) for name in (UNIQUE, STABLE, UNSTABLE, UNKNOWN)}
+    if counts[UNIQUE]:
+        return (
+            "stability: normal loads are prescribed, so that each periodic motion is the only "
+            "one, and stable"
+        )
+    if counts[UNKNOWN] == len(verdict):
+        return (
+            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave that "
+            "repeats after few blades, and not too many contact nodes that slip)"
+        )
+    worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
+    left_out = ""
+    if counts[UNKNOWN]:
+        left_out = (
+            " (of curves whose verdicts would cost more than their points, the local maxima, the "
+            "neighbours of the highest and points spread evenly are judged)"
+        )
+    wave = f"; {judged.sentence}" if judged.sentence else ""
+    return (
+        f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
+        f"{counts[UNKNOWN]} not judged{left_out}{wave}"
+    )
+
+
+def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
+    """The resonances that are unstable, but left for a motion of the same amplitude within an
+    accuracy, or "".
+
+    A rigid damper on its contacts has no damping at its own frequencies of some kilohertz: there
+    small ripples grow, and the blade hardly takes note of them.
+    """
+    moved = [
+        max(abs(end / size(c.unstable_peak) - 1) for end in (c.kept.lowest, c.kept.highest))
+        for c in curves
+        if c.unstable_peak is not None and c.kept is not None and _rippled(c, accuracy)
+    ]
+    if not moved:
+        return ""
+    loads = ", ".join(f"{c.load:g} N" for c in curves if _rippled(c, accuracy))
+    return (
+        f"under {loads} the motion at the resonance is unstable to a ripple; marched in time from "
+        f"there the amplitude stays within {100 * max(moved):.1f} % of the one given"
+    )
+
+
+def _rippled(curve: Curve, accuracy: float) -> bool:
+    if not curve.keeps_unstable or curve.kept is None:
+        return False
+    return curve.kept.holds(size(curve.peak), accuracy)
+
+
+def folded_sentence(curves: Sequence[Curve]) -> str:
+    """The curves with several motions at one frequency, or ""."""
+    pieces = {f"{c.load:g} N": int(c.branch.max(initial=0)) for c in curves}
+    each = ", ".join(f"{load} ({count} pieces)" for load, count in pieces.items() if count > 1)
+    return f"several motions at one frequency, pieces between folds: {each}" if each else ""
+
+
+def unstable_sentence(curve: Curve, accuracy: float) -> str:
+    """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
+    top = curve.unstable_peak
+    if top is None or _rippled(curve, accuracy):
+        return ""
+    at = _place(curve, top)
+    named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
+    lost = (
+        f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
+        f"{top.frequency:.5g} Hz, is unstable{named}"
+    )
+    if curve.marched_instead:
+        lost += f"; the amplitude given, {1e6 * curve.peak_amplitude:.4g} um, is of a march"
+    elif curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
+        lost += "; it is given as the resonance"
+    elif curve.keeps_unstable:
+        lost += "; it is given as the resonance, being the larger amplitude"
+    else:
+        lost += (
+            "; the resonance given is the highest one that is not, "
+            f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
+        )
+    return lost if curve.kept is None else f"{lost}; {curve.kept.sentence}"
+
+
+def unjudged_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances whose motion could not be judged, among others that were, or ""."""
+    asked = [c for c in curves if (c.stability != UNKNOWN).any()]
+    unknown = [c for c in asked if c.stability[_place(c, c.peak)] == UNKNOWN]
+    if not unknown:
+        return ""
+    loads = ", ".join(f"{c.load:g} N" for c in unknown)
+    return (
+        f"under {loads} the motion at the resonance was not judged: it may be unstable, and the "
+        "blade leave it for another"
+    )
+
+
+def _place(curve: Curve, point: Solution) -> int:
+    """Number of a point of a curve; of several at one frequency the one of that height."""
+    at = np.flatnonzero(curve.frequency == point.frequency)
+    return int(at[abs(curve.amplitude[at] - size(point)).argmin()])
