@@ -15,6 +15,9 @@ from ..study.pipeline.best_load import BestLoad
 MIN_FRICTION_REDUCTION = 0.05
 # of the ends of the range of a search: a load nearer to one lies at it
 AT_END = 0.01
+# parts of the error of a load that the balances of the search do not show: they are those of the
+# nearest load that was studied
+UNSEEN_PARTS = ("halved", "body_mesh", "layer_law")
 
 
 def best_load_table(found: Sequence[BestLoad]) -> pd.DataFrame:
@@ -35,19 +38,50 @@ def best_load_table(found: Sequence[BestLoad]) -> pd.DataFrame:
 
 
 def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | None:
-    """The best of all masses as a row of the design table; None where no search succeeded."""
+    """The best of all masses as a row of the design table; None where no search succeeded.
+
+    Its stress is in proportion to the amplitude as under the nearest load that was studied, and
+    its error has what meshes and the layer's law change there.
+    """
     good = searched[searched["amplitude"].notna()]
     if good.empty:
         return None
     row = good.loc[good["amplitude"].idxmin()]
     best = row.rename({"amplitude": "peak_amplitude", "frequency": "peak_frequency"})
-    if "alternating_stress" in summary:
-        nearest = (summary["load"] / best["load"] - 1).abs().idxmin()
-        per_metre = (summary["alternating_stress"] / summary["peak_amplitude"])[nearest]
-        best = pd.concat(
-            [best, pd.Series({"alternating_stress": per_metre * best["peak_amplitude"]})]
-        )
-    return best
+    near = _nearest_studied(best, summary)
+    if near is None:
+        return best
+    added = {name: near[name] for name in UNSEEN_PARTS if name in near}
+    if "error" in best:
+        unseen = sum(part for part in added.values() if np.isfinite(part))
+        best["error"] = best["error"] + unseen
+    if "alternating_stress" in near:
+        per_metre = near["alternating_stress"] / near["peak_amplitude"]
+        added["alternating_stress"] = per_metre * best["peak_amplitude"]
+    return pd.concat([best, pd.Series(added, dtype=float)])
+
+
+def _nearest_studied(best: pd.Series, summary: pd.DataFrame) -> pd.Series | None:
+    """The row of the nearest finite load, of the same damper where several are studied."""
+    rows = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
+    if "mass" in rows and np.isfinite(best.get("mass", np.nan)):
+        rows = rows[np.isclose(rows["mass"], best["mass"])]
+    if rows.empty:
+        return None
+    return rows.loc[np.log(rows["load"] / best["load"]).abs().idxmin()]
+
+
+def error_words(row: pd.Series) -> str:
+    """ "± 3 % (model and mesh)": the estimated error of a resonance amplitude, and whether the mesh
+    has a part in it.
+    """
+    error = row.get("error", np.nan)
+    if np.isnan(error):
+        return "not estimated"
+    if np.isinf(error):
+        return "error unknown: richer models were not solved"
+    parts = "model and mesh" if np.isfinite(row.get("body_mesh", np.nan)) else "model; mesh apart"
+    return f"± {max(100 * error, 0.01):.2g} % ({parts})"
 
 
 def flat_range(best: pd.Series) -> str:

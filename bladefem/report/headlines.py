@@ -1,7 +1,8 @@
 """Headline numbers of a response study, each with how sure it is.
 
-The errors that a run estimates are those of modes, harmonics, samples, contact points and damper
-model at the resonance; how finely the loads and frequencies were studied adds its own.
+The errors that a run estimates are those of modes, harmonics, samples, contact points, damper
+model and, where it is estimated, of the mesh at the resonance; how finely the loads and frequencies
+were studied adds its own.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from .best_load import found_best
+from .best_load import error_words, found_best
 from .statements import ResponseAnswer
 
 # what an answer says in place of a number that the data cannot carry
@@ -83,7 +84,7 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
     best = finite.loc[finite["peak_amplitude"].idxmin()]
     low, high = _bracket(finite, best)
     return {
-        "amplitude": _error_text(best.get("error", np.nan)),
+        "amplitude": error_words(best),
         "frequency": _frequency_text(best, points),
         "load": _between_text(low, high, "N"),
         "own load": "by equilibrium, no model error",
@@ -93,14 +94,15 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
 
 def _of_search(best: pd.Series) -> dict[str, str]:
     """How sure the exact search is; the load by where the amplitude stays within the accuracy."""
-    error = best["error"] + best["tolerance"]
+    total = best.copy()
+    total["error"] += best["tolerance"]
     low, high = (
         None if np.isnan(best[name]) else float(best[name])
         for name in ("tolerated_from", "tolerated_to")
     )
     known = low is not None and high is not None
     return {
-        "amplitude": _error_text(error),
+        "amplitude": error_words(total),
         "load": _flatness_text(low, high),
         "mass": _mass_text(low, high, best["load"]) if known else "as the optimum load",
     }
@@ -115,15 +117,6 @@ def _flatness_text(low: float | None, high: float | None) -> str:
     if high is not None:
         return f"below {high:.4g} N; how far down was not found"
     return "how flat the optimum is was not found"
-
-
-def _error_text(error: float) -> str:
-    """The estimated model error of the resonance amplitude."""
-    if np.isnan(error):
-        return "not estimated"
-    if np.isinf(error):
-        return "error unknown: richer models were not solved"
-    return f"± {max(100 * error, 0.01):.2g} % (model; mesh apart)"
 
 
 def _bracket(finite: pd.DataFrame, best: pd.Series) -> tuple[float | None, float | None]:

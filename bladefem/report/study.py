@@ -16,6 +16,7 @@ from ..scene.units import parse, show
 from ..study.pipeline.loads import design_table
 from ..study.pipeline.run_records import Response
 from ..view.study import draw_study
+from .best_load import error_words
 from .headlines import Headline
 from .tables import write_tables
 from .write import Page, write_report
@@ -65,8 +66,6 @@ def _report(
 ) -> tuple[Path, Path]:
     """``report_study.html`` and ``.md``: the best value first, all of them in one table."""
     best = table.loc[table["peak_amplitude"].idxmin()]
-    error = best.get("error", float("nan"))
-    known = 0 <= error < float("inf")
     numbers = [
         Headline(
             f"best {name}",
@@ -77,7 +76,7 @@ def _report(
         Headline(
             "resonance amplitude there",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
-            f"± {100 * error:.2g} % (model; mesh apart)" if known else "error unknown",
+            error_words(best),
             f"{best['reduction']:.4g} times below the blade without damper",
         ),
         Headline(

@@ -10,6 +10,7 @@ import pandas as pd
 
 from ..scene.tables import Scene
 from ..view.study_map import draw_band, draw_map
+from .best_load import error_words
 from .headlines import Headline
 from .study import UNPRINTED, Variant, end_words, load_words, place_of_value, study_tables
 from .tables import write_tables
@@ -48,7 +49,7 @@ def write_map(
         Headline(
             "resonance amplitude there",
             f"{1e6 * top['peak_amplitude']:.4g} µm",
-            _error_of(top),
+            error_words(top),
             load_words(top["load"], loads),
         )
     )
@@ -124,13 +125,6 @@ def _tables(
             best = best.drop(columns=name)
         best.insert(number + 1, name, [text[number] for text in texts])
     return best.drop(columns="value"), loads
-
-
-def _error_of(row: pd.Series) -> str:
-    error = row.get("error", np.nan)
-    if not np.isfinite(error):
-        return "error unknown"
-    return f"± {100 * error:.2g} % (model; mesh apart)"
 
 
 def _page(

@@ -169,6 +169,28 @@ def test_a_searched_optimum_says_how_flat_it_is(low, high, said):
     assert numbers[0].uncertainty == said
 
 
+def test_the_error_of_a_searched_optimum_has_that_of_the_mesh():
+    """The search has one mesh: what finer ones change is told by the nearest load studied, not by
+    the blade without damper, however far that load is.
+    """
+    rows = {"load": [0.0, 500.0, 3000.0, np.inf], "peak_amplitude": [1e-3, 1e-5, 9e-5, 9e-4]}
+    rows |= {"peak_frequency": [400.0, 450.0, 460.0, 465.0], "error": [0.0, 0.1, 0.3, 0.0]}
+    rows |= {"halved": [0.0, np.nan, 0.2, 0.0], "body_mesh": [0.0, 0.08, 0.05, 0.0]}
+    rows |= {"layer_law": [0.0, 0.01, np.nan, 0.0]}
+    rows |= {"alternating_stress": [1e8, 2e7, 2e7, 1e8]}
+    summary = pd.DataFrame(rows)
+    row = {"load": 170.0, "amplitude": 9e-6, "frequency": 448.0, "error": 0.01, "tolerance": 1e-3}
+    row |= {"tolerated_from": 150.0, "tolerated_to": 190.0, "reason": ""}
+    searched = pd.DataFrame([row])
+    numbers = headlines(
+        response_answer(summary, None, None, None, searched), summary, None, searched
+    )
+    (amplitude,) = [one for one in numbers if one.what == "resonance amplitude there"]
+    assert amplitude.uncertainty == "± 10 % (model and mesh)"
+    (stress,) = [one for one in numbers if "stress" in one.what]
+    assert stress.value == "18 MPa"
+
+
 def test_a_speed_that_does_not_drive_the_resonance_is_named():
     """Engine order 9 needs 60 f / 9 rpm."""
     summary = pd.DataFrame(

@@ -78,7 +78,8 @@ def test_the_part_of_the_layer_is_told_where_it_is_the_larger():
 def test_an_error_by_the_mesh_of_the_bodies_says_so():
     (above,) = resonance_warnings([curve(192.8, 0.071, body_mesh=0.049)], 0.05)
     assert above.endswith(
-        "4.9 % under 192.8 N are the estimated error of the mesh of the bodies, expected a finer one"
+        "4.9 % under 192.8 N are the estimated error of the mesh of the bodies, which a finer one "
+        "lowers (mesh.size, mesh.scale)"
     )
 
 

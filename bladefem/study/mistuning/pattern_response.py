@@ -167,8 +167,8 @@ def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
             f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
             f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
             f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
-            f"stress is {1e-6 * r.stress.largest:.4g} MPa at ({place}) mm, by its mesh "
-            f"{r.stress.mesh_error:.1%} uncertain there"
+            f"stress is {1e-6 * r.stress.largest:.4g} MPa at ({place}) mm, estimated error of the "
+            f"mesh there {100 * r.stress.mesh_error:.2g} %"
         )
         if not r.peak.closed_in:
             text += "; the highest point is an end of the band, the resonance may be higher"

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...scene.tables import Scene
+from ...scene.units import show
 from ...util.message import method, warning
 from ..adaptive.settings import Settings
 from .best_load import BestLoad
@@ -30,14 +31,16 @@ MAX_NOTES = 3
 # fields of a curve that are parts of its estimated error, and what lowers them
 LARGEST_PARTS = {
     "halved": (
-        "what half as many contact points change, expected a finer contact mesh "
+        "what half as many contact points change, which a finer contact mesh lowers "
         "(mesh.seat_elements, mesh.contact_size)"
     ),
-    "body_mesh": "the estimated error of the mesh of the bodies, expected a finer one",
+    "body_mesh": (
+        "the estimated error of the mesh of the bodies, which a finer one lowers (mesh.size, "
+        "mesh.scale)"
+    ),
     "layer_law": (
         "what the tangent of a layer that stiffens leaves out, or the softer layer that stands for "
-        "a stiff one where contacts lift off, expected a linear, softer one (contact.kn_area) to "
-        "compare with"
+        "a stiff one where contacts lift off; compare with a linear, softer layer (contact.kn_area)"
     ),
 }
 
@@ -213,15 +216,13 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
     """How the best load was found, or why it was not."""
     for b in best:
         damper = "" if b.mass is None else f" of a damper of {1e3 * b.mass:.4g} g"
+        lowest, highest = (show(bound, "N") for bound in b.searched)
         if b.reason:
-            yield (
-                f"best load{damper}: not found between {b.searched[0]:.3g} and {b.searched[1]:.3g} "
-                f"N, since {b.reason}"
-            )
+            yield (f"best load{damper}: not found between {lowest} and {highest}, since {b.reason}")
             continue
         yield (
-            f"best load{damper}: {b.load:.4g} N by exact search between {b.searched[0]:.3g} and "
-            f"{b.searched[1]:.3g} N, {len(b.tried)} loads and {b.points} points; no load near it "
+            f"best load{damper}: {b.load:.4g} N by exact search between {lowest} and {highest}, "
+            f"{len(b.tried)} loads and {b.points} points; no load near it "
             f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; {b.settings.sentence()}"
         )
 
@@ -233,9 +234,9 @@ def stress_message(curves: list[Curve], stressed: dict[int, DampedStress]) -> st
     place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
     text = (
         f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
-        f"at ({place}) mm, of all modes, harmonics and damper forces; by its mesh "
-        f"{found.mesh_error:.1%} uncertain there"
+        f"at ({place}) mm, of all modes, harmonics and damper forces; estimated error of the mesh "
+        f"there {100 * found.mesh_error:.2g} %"
     )
     if found.mesh_error <= TRUSTED_STRESS:
         return text
-    return warning(f"{text}: a sharp edge or too coarse a mesh, so no stress to sign")
+    return warning(f"{text}: too large to rely on, at a sharp edge or on too coarse a mesh")
