@@ -19,9 +19,7 @@ _EXAMPLES = """examples:
   bladefem mesh scenes/wedge.toml --view mesh.png           mesh and picture in seconds
   bladefem modes scenes/wedge.toml --set operation.speed="9000 rpm"
   bladefem run scenes/wedge.toml -o runs/wedge              everything, with report and figures
-  bladefem run runs/wedge --set contact.mu=0.2              again from a run folder: finished
-  stages are kept
-
+  bladefem run runs/wedge --set contact.mu=0.2              again: finished stages are kept
   bladefem modes scenes/wedge.toml -- -eps_monitor          options of PETSc and SLEPc
 
 exit codes: 0 done, 1 not solved, 2 bad input, 130 interrupted, 143 ended by SIGTERM"""
@@ -66,7 +64,7 @@ _COMMANDS = {
         commands.response,
     ),
     "study": (
-        "the same for several values of one or two parameters, or for scattered ones",
+        "runs for several values of one or two fields, or for scattered ones, side by side",
         "bladefem study scenes/wedge.toml --vary damper.angle='30, 40, 50 deg'\n"
         "  bladefem study scenes/wedge.toml --vary damper.angle='50, 60 deg' --vary "
         "contact.mu='0.2, 0.3'\n"
@@ -85,12 +83,12 @@ _COMMANDS = {
         backbone.backbone,
     ),
     "chart": (
-        "time against error of methods and models, with the automatic choice",
+        "chart of CPU time against error, for methods, models and the automatic choice",
         "bladefem chart scenes/plane.toml --budget 60",
         commands.chart,
     ),
     "report": (
-        "figures, tables and report of a run",
+        "figures, tables and report of a run folder; what is missing is computed",
         "bladefem report runs/wedge",
         commands.report,
     ),
@@ -173,7 +171,8 @@ def _scene_arguments(name: str, sub: argparse.ArgumentParser) -> None:
         default=[],
         metavar="KEY=VALUE",
         dest="overrides",
-        help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated",
+        help="another value for one field, such as aerofoil.twist='25 deg'; may be repeated; "
+        "'bladefem check SCENE' lists the fields",
     )
     if name == "check":
         return
@@ -192,7 +191,7 @@ def _chart_arguments(sub: argparse.ArgumentParser) -> None:
         type=float,
         default=120.0,
         metavar="SECONDS",
-        help="CPU time for the variants; what would exceed it is left out and named",
+        help="CPU time for the variants (%(default)g); what would exceed it is left out and named",
     )
     sub.add_argument(
         "--reference", action="store_true", help="the built-in reference blade instead"
@@ -248,8 +247,8 @@ def _modes_arguments(sub: argparse.ArgumentParser) -> None:
         metavar="N",
         type=int,
         default=1,
-        help="first modes that are drawn large, next to that of excitation.mode (1); 0: tables "
-        "only",
+        help="first modes that are drawn large (%(default)s), in addition to that of "
+        "excitation.mode; 0: tables only",
     )
 
 
@@ -264,7 +263,7 @@ def _add_command(
         name,
         help=what,
         description=f"{what[0].upper()}{what[1:]}.",
-        epilog=f"example:\n  {example}",
+        epilog=f"{'examples' if chr(10) in example else 'example'}:\n  {example}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     sub.set_defaults(function=function, output=None, quiet=False)

@@ -147,7 +147,11 @@ class Contact:
         "left out",
     )
     points: int | None = quantity(
-        None, "1", 1, 5000, "friction elements on each patch; all mesh nodes when left out"
+        None,
+        "1",
+        1,
+        5000,
+        "friction elements on each patch; chosen by error indicators when left out",
     )
     bedded: bool = quantity(
         True, help="seats have worn until they fit at the operating speed; false: as drawn"
@@ -400,16 +404,29 @@ class Model:
     accuracy.
     """
 
-    modes: int | None = quantity(None, "1", 1, 500, "modes kept in each nodal diameter")
-    harmonics: int | None = quantity(None, "1", 1, 99, "harmonics of the balance")
+    modes: int | None = quantity(
+        None,
+        "1",
+        1,
+        500,
+        "modes kept in each nodal diameter; chosen by error indicators when left out",
+    )
+    harmonics: int | None = quantity(
+        None, "1", 1, 99, "harmonics of the balance; chosen by error indicators when left out"
+    )
     samples: int | None = quantity(
         None,
         "1",
         0,
         65536,
-        "time samples a period; 0: changes of contact state are located exactly (plane blades)",
+        "time samples a period; chosen by error indicators when left out; 0: changes of contact "
+        "state are located exactly (plane blades)",
     )
-    damper: str | None = quantity(None, choices=("mass", "rigid", "elastic"), help="damper model")
+    damper: str | None = quantity(
+        None,
+        choices=("mass", "rigid", "elastic"),
+        help="damper model; chosen by error indicators when left out",
+    )
     static: str = quantity(
         "coupled",
         choices=("coupled", "uncoupled"),

@@ -455,7 +455,7 @@ def test_help_has_an_example(command, capsys):
         parser().parse_args([command, "--help"])
     assert (
         stop.value.code == 0
-        and f"bladefem {command}" in capsys.readouterr().out.split("example:")[1]
+        and f"bladefem {command}" in capsys.readouterr().out.split("example", 1)[1]
     )
 
 
