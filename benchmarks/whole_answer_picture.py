@@ -95,6 +95,11 @@ def write_advice(rows: pd.DataFrame, loads: pd.DataFrame, accuracy: float, file:
     file.write_text("\n".join(lines) + "\n")
 
 
+def _percent(share: float) -> str:
+    """ "2.5 %", "130 %"."""
+    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+
+
 def answer_table(rows: pd.DataFrame) -> str:
     """The ways of a scene as a table of Markdown, cheapest first."""
     lines = [
@@ -104,7 +109,7 @@ def answer_table(rows: pd.DataFrame) -> str:
     for _, row in rows.sort_values("time").iterrows():
         if row["converged"]:
             numbers = [row[f"error_{of}"] for of in ("amplitude", "frequency", "phasor")]
-            told = [f"{100 * x:.2g} %" for x in (*numbers, row["median"])]
+            told = [_percent(x) for x in (*numbers, row["median"])]
         else:
             lost = str(row["reason"]).startswith("left out")
             told = ["left out" if lost else "not solved", "", "", ""]
