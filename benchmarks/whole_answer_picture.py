@@ -97,7 +97,8 @@ def write_advice(rows: pd.DataFrame, loads: pd.DataFrame, accuracy: float, file:
 
 def _percent(share: float) -> str:
     """ "2.5 %", "130 %"."""
-    return f"{100 * share:.2g} %" if share < 0.995 else f"{100 * share:.0f} %"
+    two_digits = f"{100 * share:.2g}"
+    return f"{float(two_digits):.0f} %" if share >= 0.995 else f"{two_digits} %"
 
 
 def answer_table(rows: pd.DataFrame) -> str:
