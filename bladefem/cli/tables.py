@@ -142,7 +142,10 @@ def _convergence_table(summary: pd.DataFrame) -> str:
 
 
 def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
-    """Force and pressure of each face, for each load."""
+    """Force and pressure of each seat, for each load."""
+    # pandas is slow to load
+    from ..report.tables import SEATS
+
     rows = []
     for load, seats in maps.items():
         for seat in seats:
@@ -150,7 +153,7 @@ def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
             rows.append(
                 [
                     show(load, "N"),
-                    seat.patch.name,
+                    SEATS.get(seat.patch.name, seat.patch.name),
                     len(seat.force),
                     f"{seat.force.sum():.6g}",
                     f"{seat.pressure.max() / 1e6:.4g}",
@@ -159,7 +162,7 @@ def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
                 ]
             )
     return plain_table(
-        rows, ["load", "face", "nodes", "force [N]", "peak [MPa]", "pressed [%]", "complementarity"]
+        rows, ["load", "seat", "nodes", "force [N]", "peak [MPa]", "pressed [%]", "complementarity"]
     )
 
 

@@ -18,9 +18,10 @@ from ..view.contact import save_faces_vtu
 from ..view.hysteresis import draw_seat_loops
 from ..view.wear import draw_work
 from .linear import linear_columns
+from .tables import SEATS
 
 # contact pairs in words, as the pictures of pressure have them
-SEAT_WORDS = {"this": "right seat", "next": "left seat"}
+SEAT_WORDS = {patch: f"{side} seat" for patch, side in SEATS.items()}
 
 
 def cycles_of(result: SolvedRun) -> list[ContactCycle]:

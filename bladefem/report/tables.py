@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,8 +24,12 @@ class Column(NamedTuple):
     # from SI to the shown unit
     factor: float = 1.0
     digits: int = 5
+    # what people call a value, where that is another word
+    words: Mapping[str, str] = MappingProxyType({})
 
 
+# patches by the blade's faces that they lie on, seat_right and seat_left
+SEATS = {"this": "right", "next": "left"}
 RPM = 60 / (2 * np.pi)
 COLUMNS = {
     "load": Column("normal load", "N"),
@@ -142,7 +147,7 @@ COLUMNS = {
     "sum": Column("sum of shares", "1", "%", 100.0, 4),
     "excitation": Column("excitation", "Hz"),
     "margin": Column("margin", "1", "%", 100.0, 3),
-    "patch": Column("seat"),
+    "patch": Column("seat", words=SEATS),
     "force": Column("normal force", "N"),
     "area": Column("area", "m^2", "mm²", 1e6),
     "pressure": Column("pressure", "Pa", "MPa", 1e-6, 4),
@@ -251,13 +256,13 @@ def column_head(column: Column) -> str:
 
 
 def cell_text(value: Any, column: Column) -> str:
-    """One entry: words as they are, numbers in the shown unit."""
+    """One entry: words as people say them, numbers in the shown unit."""
     if isinstance(value, bool | np.bool_):
         return "yes" if value else "no"
     if isinstance(value, int | np.integer) and column.factor == 1.0:
         return str(value)
     if not isinstance(value, float | int | np.floating | np.integer):
-        return "" if value is None else str(value)
+        return "" if value is None else column.words.get(str(value), str(value))
     if np.isinf(value):
         return "∞" if value > 0 else "-∞"
     return "" if np.isnan(value) else f"{value * column.factor:.{column.digits}g}"

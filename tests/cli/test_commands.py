@@ -173,7 +173,7 @@ def test_commands_run_the_pipeline_as_far_as_needed(command, until, pipeline, tm
 SHOWN = {
     "mesh": ["worst Jacobian", "0.31", "body blade, cells"],
     "modes": ["812.40", "2000.00", "2.0e-12"],
-    "contact": ["40 N", "this", "4 ", "25.0", "1.0e-14"],
+    "contact": ["40 N", "right", "4 ", "25.0", "1.0e-14"],
     "reduce": ["sector, nodal diameter 9", "159.2", "damper", "port dofs"],
     "report": ["best of these loads: 50 N"],
     "response": [

@@ -327,6 +327,12 @@ def test_unknown_errors_are_said_to_be_unknown(error, said):
     assert said in found[1].uncertainty
 
 
+def test_seats_are_called_right_and_left_in_tables():
+    """As the fields of a scene call them; files of data keep the names of the contact pairs."""
+    table = pd.DataFrame({"patch": ["this", "next", "contact"], "force": [1.0, 2.0, 3.0]})
+    assert list(readable_texts(table)["seat"]) == ["right", "left", "contact"]
+
+
 def test_roundoff_is_no_number_on_a_page():
     table = pd.DataFrame(
         {"centre_x": [0.25], "centre_y": [7.6e-18], "centre_z": [np.nan], "residual": [3e-16]}
