@@ -21,6 +21,7 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...util.newton import iterate_newton
 from ..parameter_derivatives import residual_rate
+from ..parameters import parameter_value
 from .newton import Options, newton
 from .newton_krylov import Memory
 from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
@@ -145,7 +146,9 @@ def advance_path(
         found = _around_corner(task, spot, share)
         if found is not None:
             return found, share, found.sign != spot.sign
-    raise NotSolvedError(f"path in {task.name} stopped at x = {spot.x:.6g}: {reason}")
+    value = parameter_value(task.name, spot.x)
+    unit = " rad/s" if task.name == "omega" else ""
+    raise NotSolvedError(f"the path stopped at {task.name} = {value:.6g}{unit}: {reason}")
 
 
 # unit direction in displacements over their size, and in the parameter over its width
