@@ -20,8 +20,9 @@ from scipy.spatial import cKDTree
 from bladefem.errors import InputError
 from bladefem.util.arrays import RealArray
 
+from .imported_check import STEP_SUFFIXES
 from .numbered_faces import NumberedFaces, face_corners, numbered_faces
-from .raw_mesh import RawMesh, read_raw
+from .raw_mesh import SUFFIX_READERS, RawMesh, read_raw
 from .step_file import coarse_step
 from .topology import CORNERS, DIMENSION, FAMILY, NODES
 
@@ -120,6 +121,7 @@ def look_at(file: str | Path) -> Look:
     Raises:
         InputError: the file cannot be read, or holds no solids.
     """
+    _check_kind(Path(file))
     drawing = is_drawing(Path(file))
     raw = coarse_step(file) if drawing else read_raw(Path(file))
     solid = [cells for word, cells in raw.blocks if DIMENSION.get(FAMILY.get(word, "")) == 3]
@@ -162,9 +164,18 @@ def _flat_words(raw: RawMesh) -> list[str]:
     return [f"{count} {word}" for word, count in _cell_counts(raw).items()]
 
 
+def _check_kind(file: Path) -> None:
+    """Refuse a file that is not there, or of which there is no reader."""
+    if not file.is_file():
+        raise InputError(f"{file}: there is no such file")
+    known = sorted((*SUFFIX_READERS, *STEP_SUFFIXES))
+    if file.suffix.lower() not in known:
+        raise InputError(f"{file}: unknown kind of mesh; known are {', '.join(known)}")
+
+
 def is_drawing(file: Path) -> bool:
     """Whether a file is a STEP file, by its ending."""
-    return file.suffix.lower() in (".step", ".stp")
+    return file.suffix.lower() in STEP_SUFFIXES
 
 
 def starting_scene(look: Look, folder: Path | None = None) -> str:

@@ -75,7 +75,8 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
                 f"{path.parent}: a folder without {FOLDER_SCENE}, expected a scene file or the "
                 f"folder of an earlier run{_nearby_scenes(path)}"
             ) from None
-        raise InputError(f"{path}: there is no such scene file{_nearby_scenes(path)}") from None
+        wanted = "scene file" if path.suffix else "scene file or run folder"
+        raise InputError(f"{path}: there is no such {wanted}{_nearby_scenes(path)}") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
     except RecursionError:

@@ -166,6 +166,7 @@ def test_files_that_are_no_scenes(tmp_path):
         (".", "cannot be read"),
         ("nowhere/x.toml", "no such scene file$"),
         ("project.toml", "no such scene file$"),
+        ("runs/nowhere", "no such scene file or run folder$"),
     ):
         with pytest.raises(InputError, match=message):
             load_scene(tmp_path / name)
