@@ -121,7 +121,10 @@ COMMANDS = [
     (["modes", str(WEDGE), "--campbell", "-5, 100 rpm"], "expected speeds of at least 0 rpm"),
     (["modes", str(WEDGE), "--converge", "6 mm, 6 mm, 4 mm"], "a size is given twice"),
     (["look", str(WEDGE.parents[2] / "scenes" / "own_blade.step"), "--view", "x.doc"], "x.doc"),
-    (["look", str(WEDGE)], "wedge.toml: unknown kind of mesh; known are .bdf"),
+    (
+        ["look", str(WEDGE)],
+        "wedge.toml: unknown kind of mesh; known are .bdf, .cdb, .inp, .med, .msh, .nas, .step",
+    ),
     (["look", "nowhere.inp"], "bladefem: nowhere.inp: there is no such file"),
 ]
 

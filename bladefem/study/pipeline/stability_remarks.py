@@ -87,8 +87,9 @@ def stability_sentence(
         )
     if counts[UNKNOWN] == len(verdict):
         return (
-            "stability is unknown: no point could be judged (it takes Coulomb's law, a wave that "
-            "repeats after few blades, and not too many contact nodes that slip)"
+            "stability is unknown: no point could be judged; it takes Coulomb's law, a wave that "
+            "repeats after few blades, no more of them than model.harmonics where that is given, "
+            "and not too many contact nodes that slip"
         )
     worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
     left_out = ""
