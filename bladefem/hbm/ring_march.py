@@ -42,12 +42,16 @@ class RingMarch:
     motion: np.ndarray
     # the forces of each step were found
     settled: bool
+    # steps are short enough for forces that are linear in them; else they are constant
+    resolved: bool
+    # operations that all periods would have taken, roughly
+    operations: float
 
 
 def march_operations(
     model: ReducedModel, periods: int, instants: int = INSTANTS_PER_PERIOD
 ) -> float:
-    """Of a march, roughly.
+    """Of a march of soft layers, roughly: one of stiff layers takes up to 20 times as many.
 
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
@@ -69,6 +73,7 @@ def march_ring(
     periods: int,
     instants: int = INSTANTS_PER_PERIOD,
     enough: Callable[[np.ndarray], bool] = _never,
+    most: float = np.inf,
 ) -> RingMarch:
     """March from a solution whose modal amplitudes are disturbed.
 
@@ -77,6 +82,8 @@ def march_ring(
         periods: of the excitation, at most.
         enough: whether the motion (periods, r, instants) so far will do; asked every
             PERIODS_AT_ONCE.
+        most: operations; where the first period shows that all would take more, no more are
+            marched.
 
     Raises:
         InputError: normal loads are prescribed, a friction law is not Coulomb's, or the wave does
@@ -89,20 +96,36 @@ def march_ring(
     r = model.once("ring", lambda: sector_modes(model)).blades
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
-    start = _start(model, point, disturbance, S)
+    resolved, start = _start(model, point, disturbance, S)
     motion = np.empty((periods, S, r))
+    work = np.zeros(1)
+    m, M = model.once("ring", lambda: sector_modes(model)).contact.shape
+    of_bodies = 8.0 * periods * S * M * (M + m)
+    operations = of_bodies
     settled, done = True, 0
     while settled and done < periods:
-        settled = bool(_march(*start, motion[done : done + PERIODS_AT_ONCE]))
-        done = min(done + PERIODS_AT_ONCE, periods)
-        if enough(motion[:done].transpose(0, 2, 1)):
+        # the first period tells what the others take
+        following = min(done - done % PERIODS_AT_ONCE + PERIODS_AT_ONCE, periods) if done else 1
+        settled = bool(_march(*start, motion[done:following], work))
+        done = following
+        operations = of_bodies + work[0] * periods / done
+        if operations > most:
             break
-    return RingMarch(motion[:done].transpose(0, 2, 1), settled)
+        whole = done % PERIODS_AT_ONCE == 0 or done == periods
+        if whole and enough(motion[:done].transpose(0, 2, 1)):
+            break
+    return RingMarch(motion[:done].transpose(0, 2, 1), settled, resolved, operations)
 
 
-def _start(model: ReducedModel, point: Solution, disturbance: float, S: int) -> tuple[Any, ...]:
-    """What `_march` takes before the motion: state and forces of a solution whose modal amplitudes
-    are disturbed, which it changes, and the steps of the bodies at S instants a period.
+def _start(
+    model: ReducedModel,
+    point: Solution,
+    disturbance: float,
+    S: int,
+) -> tuple[bool, tuple[Any, ...]]:
+    """Whether steps at S instants a period are short enough for forces that are linear in them, and
+    what `_march` takes before the motion: state and forces of a solution whose modal amplitudes are
+    disturbed, which it changes, and the steps of the bodies.
     """
     system = model.once("ring", lambda: sector_modes(model))
     r, M = system.blades, len(system.stiffness)
@@ -117,12 +140,13 @@ def _start(model: ReducedModel, point: Solution, disturbance: float, S: int) -> 
     dt = 2 * np.pi / point.omega / S
     springs = np.tile(model.springs.ravel(), r)
     bodies = (system.stiffness_matrix, system.contact.T, system.residual)
-    E, G0, G1 = linear_steps(system, dt, mean=dt > longest_linear_step(*bodies, springs))
+    resolved = dt <= longest_linear_step(*bodies, springs)
+    E, G0, G1 = linear_steps(system, dt, mean=not resolved)
     e = model.elements
     w = free[0] + system.contact @ y[:M] - system.residual @ (forces - preload)
     F = system.residual + system.contact @ G1[:M] @ system.contact.T
     probes = len(system.probe) // r
-    return (
+    return resolved, (
         y,
         _three(forces, e.tangents),
         w,
@@ -210,7 +234,7 @@ def _modal_start(
 
 
 @njit(**KERNEL)
-def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motion):
+def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motion, work):
     """Fill motion (periods, S, r); False where the forces of a step were not found.
 
     Args:
@@ -222,6 +246,7 @@ def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motio
         table: (n, 3) kt, kn, mu; load: (S, n) normal load at zero displacement.
         preload: (m,) forces under which nothing moves; free: (S, m) motion without contact forces.
         probe: readings (r, M), flexibility (r, m) and free motion (S, r).
+        work: (1,) takes the operations of the contact forces.
     """
     E, before, after = steps
     U, by_mode = readings
@@ -244,7 +269,8 @@ def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motio
         _add_product(E, y, moved)
         _add_product(before, modal, moved)
         c = free[j] + np.dot(U, moved[:M])
-        if not contact_forces(c, F, w, f, change, extra, table, load[k % S], load[j], preload):
+        loads = load[k % S], load[j]
+        if not contact_forces(c, F, w, f, change, extra, table, loads[0], loads[1], preload, work):
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False

@@ -22,6 +22,8 @@ SWEEPS = 60
 # change of a force in a sweep that counts as none, over the largest force
 SETTLED = 1e-6
 
+# of the friction law and the step of one node
+NODE_OPERATIONS = 300.0
 # Newton steps of all nodes together, and halvings of one
 NEWTON_STEPS = 40
 HALVINGS = 10
@@ -30,7 +32,7 @@ DECREASE = 1e-4
 
 
 @njit(**KERNEL)
-def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, preload):
+def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, preload, work):
     """Forces at the end of a step, of w = c - F extra: f, extra and w are those before, and then
     those after. False where they were not found.
 
@@ -43,6 +45,7 @@ def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, pre
         w: (m,) relative displacements; f: (n, 3) contact forces; extra: (m,) those less preload.
         table: (n, 3) kt, kn, mu; load0, load1: (n,) normal loads at zero displacement before and
             after the step.
+        work: (1,) takes the operations.
     """
     m = len(c)
     d = m // len(f)
@@ -54,14 +57,14 @@ def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, pre
         for a in range(d):
             f[i, a] += change[i, a]
             extra[i * d + a] += change[i, a]
-    found = _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest)
+    found = _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest, work)
     if not found:
         # from the forces before the step: sweeps that do not settle lead away
         for i in range(len(f)):
             for a in range(d):
                 f[i, a] = old[0][i, a]
         found = _together(
-            c, flexibility[0], w, f, extra, table, load0, load1, preload, old, largest
+            c, flexibility[0], w, f, extra, table, load0, load1, preload, old, largest, work
         )
     for i in range(len(f)):
         for a in range(d):
@@ -70,7 +73,7 @@ def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, pre
 
 
 @njit(**INNER_KERNEL)
-def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest):
+def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest, work):
     """Sweeps over the nodes, each with a Newton step of its own; False where they do not settle.
 
     Displacements follow each force that changes: nodes that are open, most of them where a damper
@@ -78,7 +81,8 @@ def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, lar
     """
     F, columns, pressed = flexibility
     n = len(f)
-    d = len(c) // n
+    m = len(c)
+    d = m // n
     B = np.zeros((3, 3))
     gap = np.zeros(3)
     tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
@@ -96,6 +100,7 @@ def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, lar
             loads = (load0[i] + table[i, 1] * old[1][first], load1[i])
             _violation(w, f[i], first, d, old[1], old[0][i], (table[i], loads), B, gap, tangents)
             _own_step(F, first, d, B, gap)
+            work[0] += NODE_OPERATIONS + 2.0 * d * m
             for a in range(d):
                 f[i, a] += gap[a]
                 extra[first + a] = f[i, a] - preload[first + a]
@@ -150,7 +155,7 @@ def _own_step(F, first, d, B, gap):
 
 
 @njit(**INNER_KERNEL)
-def _together(c, F, w, f, extra, table, load0, load1, preload, old, largest):
+def _together(c, F, w, f, extra, table, load0, load1, preload, old, largest, work):
     """Newton steps of all nodes at once, shortened until the violation falls; False where it does
     not vanish.
     """
@@ -176,6 +181,7 @@ def _together(c, F, w, f, extra, table, load0, load1, preload, old, largest):
                     A[i * d + a] += B[i, a, k] * F[i * d + k]
                 A[i * d + a, i * d + a] += 1.0
         _solve_small(A, gap)
+        work[0] += m**3 + 2.0 * d * m**2
         step = gap.copy()
         share = 1.0
         for halving in range(HALVINGS + 1):
@@ -186,6 +192,7 @@ def _together(c, F, w, f, extra, table, load0, load1, preload, old, largest):
                 for a in range(d):
                     f[i, a] = start[i, a] + share * step[i * d + a]
             found = _violations(c, F, w, f, extra, table, load0, load1, preload, old, B, gap)
+            work[0] += 2.0 * m**2
             if found < (1.0 - DECREASE * share) * size:
                 break
             share /= 2.0

@@ -60,3 +60,13 @@ def test_a_share_of_the_period_has_the_multipliers_of_all_of_it():
     part = _handed_on(system, flow_map(contacts, nodes, dt, S // system.blades))
     shared = np.sort(abs(linalg.eigvals(part)) ** system.blades)
     np.testing.assert_allclose(shared[-12:], whole[-12:], rtol=1e-8)
+
+
+def test_a_march_that_its_first_period_shows_to_be_too_long_is_left():
+    """Contact forces of stiff layers take many sweeps, which no size tells."""
+    model = bouncing()
+    point = solve(model, 1.3, 7, 256)
+    whole = march_ring(model, point, 0.0, 50)
+    left = march_ring(model, point, 0.0, 50, most=whole.operations / 2)
+    assert len(left.motion) == 1 and left.operations == pytest.approx(whole.operations, rel=0.3)
+    assert len(march_ring(model, point, 0.0, 50, most=2 * whole.operations).motion) == 50

@@ -64,7 +64,11 @@ def test_nodes_that_open_or_close_in_a_step_are_found_from_the_rest():
     c[::3] = after
     extra = f.ravel() - preload
     flexibility = F, np.ascontiguousarray(F.T), F @ preload
-    assert contact_forces(c, flexibility, w, f, np.zeros_like(f), extra, table, load, load, preload)
+    work = np.zeros(1)
+    assert contact_forces(
+        c, flexibility, w, f, np.zeros_like(f), extra, table, load, load, preload, work
+    )
+    assert work[0] > 0
     law = {"c": c + F @ preload, "F": F, "table": table, "load": load}
     np.testing.assert_allclose(f, wanted(f, start, law), atol=1e-5 * f.max())
     np.testing.assert_allclose(w, c - F @ extra, atol=1e-12)
@@ -79,5 +83,5 @@ def contact_forces_of(case, w, f, extra):
     F = case["F"]
     flexibility = F, np.ascontiguousarray(F.T), F @ zero
     return contact_forces(
-        case["c"], flexibility, w, f, change, extra, case["table"], load, load, zero
+        case["c"], flexibility, w, f, change, extra, case["table"], load, load, zero, np.zeros(1)
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,6 +13,7 @@ from bladefem.hbm.ring_march import PERIODS_AT_ONCE
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.time_model import time_system
+from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import judged_resonance
 from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline.kept_band import kept_band
@@ -160,7 +162,7 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
 def marches_that_grow(point, instants_that_hold):
     """A march whose motion grows fivefold unless it has so many instants."""
 
-    def march(model, point, disturbance, periods, instants, enough):
+    def march(model, point, disturbance, periods, instants, enough, most):
         growth = 1.0 if instants >= instants_that_hold else 5.0
         return marched(np.full(periods, growth * size(point)), instants, enough)
 
@@ -174,7 +176,7 @@ def marched(heights, instants, enough):
     for done in range(PERIODS_AT_ONCE, len(heights) + 1, PERIODS_AT_ONCE):
         if enough(motion[:done]):
             break
-    return SimpleNamespace(motion=motion[:done], settled=True)
+    return SimpleNamespace(motion=motion[:done], settled=True, resolved=True, operations=1.0)
 
 
 PERIODS = np.arange(200)
@@ -194,11 +196,10 @@ PERIODS = np.arange(200)
 def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, periods):
     model = rebounding(10.0, 0.1, 0.04)
     point = solve(model, 3.0, 15, 1024)
-    monkeypatch.setattr(module, "march_operations", lambda *_: 1.0)
     monkeypatch.setattr(
         module,
         "march_ring",
-        lambda model, point, disturbance, periods, instants, enough: marched(
+        lambda model, point, disturbance, periods, instants, enough, most: marched(
             size(point) * heights[:periods], instants, enough
         ),
     )
@@ -209,15 +210,61 @@ def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, periods):
     assert found.lowest == pytest.approx(kept.min(), rel=2e-3)
 
 
-@pytest.mark.parametrize(("holds", "ratio"), [(256, 1.0), (512, 1.0), (1024, 5.0)])
+@pytest.mark.parametrize(("holds", "ratio"), [(256, 1.0), (512, 1.0), (1024, 1.0), (2048, 5.0)])
 def test_growth_where_contacts_lift_off_is_marched_with_more_instants(monkeypatch, holds, ratio):
     """Impacts in steps that are too long gain energy: they are no motion of the blade."""
     model = rebounding(10.0, 0.1, 0.04)
     point = solve(model, 3.0, 15, 1024)
     assert point.states["lift"] > 0
-    monkeypatch.setattr(module, "march_operations", lambda *_: 1.0)
     monkeypatch.setattr(module, "march_ring", marches_that_grow(point, holds))
     found = module.band_by_steps(model, point)
     assert found.highest == pytest.approx(ratio * size(point))
     # where the motion stays as it is three parts will do
     assert found.periods == 75
+
+
+@pytest.mark.parametrize(
+    ("ends", "lowest", "highest", "asked"),
+    [
+        # 256 instants lead away, more do not
+        ((0.9, 0.98), 0.98, 0.98, [256, 512]),
+        # two agree
+        ((0.9, 0.905), 0.905, 0.905, [256, 512]),
+        # none do: what the blade keeps to lies between them as far as is known
+        ((0.7, 0.9, 0.95), 0.9, 0.95, [256, 512, 1024]),
+        # the first holds
+        ((0.99,), 0.99, 0.99, [256]),
+    ],
+)
+def test_steps_too_long_for_the_bodies_are_halved(monkeypatch, ends, lowest, highest, asked):
+    """With 256 instants a stiff layer's blade seemed to fall to 398 um of 525."""
+    model = rebounding(10.0, 0.1, 0.04)
+    point = solve(model, 3.0, 15, 1024)
+    seen = []
+
+    def march(model, point, disturbance, periods, instants, enough, most):
+        heights = np.full(periods, ends[len(seen)] * size(point))
+        seen.append(instants)
+        found = marched(heights, instants, enough)
+        return SimpleNamespace(**vars(found) | {"resolved": False})
+
+    monkeypatch.setattr(module, "march_ring", march)
+    found = module.band_by_steps(model, point)
+    assert seen == asked
+    assert found.lowest == pytest.approx(lowest * size(point), rel=1e-6)
+    assert found.highest == pytest.approx(highest * size(point), rel=1e-6)
+
+
+def test_fewer_points_are_marched_where_all_take_too_long(monkeypatch):
+    tried = []
+
+    def kept(models, settings, point, fewer):
+        tried.append(fewer.points)
+        return module.KeptBand(1.0, 1.0, 1.0, 100, points=fewer.points, too_long=fewer.points > 8)
+
+    monkeypatch.setattr(module, "_kept_with", kept)
+    monkeypatch.setattr(module, "model_in_time", lambda *_: None)
+    monkeypatch.setattr(module, "affordable_march", lambda _: True)
+    settings = replace(first_for(3), points=32)
+    assert module.kept_of_family(None, settings, None).points == 8
+    assert tried == [32, 16, 8]

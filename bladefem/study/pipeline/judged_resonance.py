@@ -53,7 +53,9 @@ def judged_resonance(marches: Marches, curve: Checked, scene: Scene) -> JudgedRe
     marks = stability_of(model, curve.points, richer)
     if marks.verdict[place] != UNSTABLE:
         return JudgedResonance(highest, marks)
-    kept = marches.band(settings, highest) or kept_of_family(models, settings, highest)
+    kept = marches.band(settings, highest)
+    if kept is None or kept.too_long:
+        kept = kept_of_family(models, settings, highest)
     if kept.reason or kept.holds(size(highest), scene.accuracy):
         return JudgedResonance(highest, marks, kept, _contradicts(kept, highest, scene.accuracy))
     marks = judged_above(model, curve.points, richer, marks, kept.highest)
