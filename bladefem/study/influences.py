@@ -348,25 +348,24 @@ class _Study:
         name = parameter.name
         load = self.best.load
         width = 2 * WIDE_STEP
+        amplitude = self.by_parameter(base, name, load)
         below, above = (
             np.array([self.by_load(peak, peak.value), self.by_parameter(peak, name, peak.value)])
             for peak in sides
         )
-        bend, mixed = (above - below) / width
-        # a height that has no minimum there by these differences tells nothing
-        moved_load = -mixed / bend if bend > 0 else np.nan
+        here = np.array([self.by_load(base, load), amplitude])
+        moved_load = best_load_rate(below, here, above)
         low, high = (
             self.peak(name, float(np.exp(step)), load, base) for step in (-WIDE_STEP, WIDE_STEP)
         )
         by_load = np.log(sides[1].omega / sides[0].omega) / width
         moved = np.log(high.omega / low.omega) / width + by_load * moved_load
-        amplitude = self.by_parameter(base, name, load)
         rates = np.array([moved_load, amplitude, moved])
         centre = np.log([load, base.height, base.solution.frequency])
         ends = np.log([parameter.low, parameter.high])
         return Influence(
             parameter,
-            load=float(moved_load),
+            load=moved_load,
             amplitude=amplitude,
             frequency=float(moved),
             predicted=np.exp(centre + ends[:, None] * rates),
@@ -401,6 +400,29 @@ class _Study:
         )
         reason = f"{name} times {factor:.3g}: {found.reason}" if found.reason else ""
         return np.array([found.load, found.amplitude, found.frequency]), reason
+
+
+def best_load_rate(below: np.ndarray, here: np.ndarray, above: np.ndarray) -> float:
+    """Derivative of ln best load by the logarithm of a parameter, by differences of first
+    derivatives of ln height.
+
+    Over both steps; over one of them where the height is not convex over the other, since it is
+    another motion's there: next to the best load of an imported wedge an internal resonance splits
+    the peak on one side, and both steps together had the wrong sign.
+
+    Args:
+        below, here, above: (2,) derivatives by ln load and by the parameter, one WIDE_STEP of ln
+            load below the best load, there and above it.
+
+    Returns:
+        NaN where the height is convex over neither step: there it has no minimum to follow.
+    """
+    steps = here - below, above - here
+    convex = [step for step in steps if step[0] > 0]
+    if not convex:
+        return np.nan
+    bend, mixed = np.sum(convex, axis=0)
+    return float(-mixed / bend)
 
 
 def _log_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:

@@ -12,7 +12,13 @@ from bladefem.scene.tables import Contact, Scene, Seat
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
-from bladefem.study.influences import Parameter, influences, parameters_of, seat_friction_range
+from bladefem.study.influences import (
+    Parameter,
+    best_load_rate,
+    influences,
+    parameters_of,
+    seat_friction_range,
+)
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import find_best_load
 
@@ -79,6 +85,19 @@ def test_derivatives_of_sampled_friction_are_those_of_exact_friction(found):
     loads = {one.parameter.name: one.load for one in again}
     for one in exact:
         assert loads[one.parameter.name] == pytest.approx(one.load, rel=0.1, abs=0.02)
+
+
+def test_the_best_load_is_followed_where_the_height_is_convex():
+    """ln height 2 (l - r p)^2 by ln load l and parameter p: the minimum moves by r. On the side of
+    another motion its derivatives are not taken.
+    """
+    rate, step = -0.08, 0.14
+    below, here, above = (np.array([4.0 * at, -4.0 * rate * at]) for at in (-step, 0.0, step))
+    assert best_load_rate(below, here, above) == pytest.approx(rate)
+    other = np.array([0.02, -0.38])
+    assert best_load_rate(other, here, above) == pytest.approx(rate)
+    assert best_load_rate(below, here, -other) == pytest.approx(rate)
+    assert np.isnan(best_load_rate(other, here, -other))
 
 
 def test_the_largest_influence_comes_first(found):
