@@ -91,7 +91,7 @@ def test_the_sentence_names_the_diameters():
     stable = ClassVerdict((1, 8, 10, 17), 0.98), ClassVerdict((2, 7, 11, 16), 1.0)
     said = sentence_of_classes("80 N", stable, own)
     assert "80 N" in said and "1, 2, 7, 8, 10, 11, 16, 17, and is stable" in said
-    assert said.endswith("not looked at: 3, 4, 5, 6, 12, 13, 14, 15")
+    assert said.endswith("not considered: 3, 4, 5, 6, 12, 13, 14, 15")
     lost = sentence_of_classes("80 N", (*stable, ClassVerdict((3, 6, 12, 15), 1.2, 5000.0)), own)
     assert "is left by those of 3, 6, 12, 15 (multiplier 1.2, mostly in modes near 5000 Hz)" in lost
     assert sentence_of_classes("80 N", (), own) == ""

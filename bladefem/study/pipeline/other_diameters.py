@@ -140,7 +140,7 @@ def sentence_of_classes(
     looked = sorted({n for verdict in verdicts for n in verdict.diameters})
     listed = ", ".join(map(str, looked))
     left = set(range(judged.possible)) - {*looked, *judged.diameters}
-    others = f"; not looked at: {', '.join(map(str, sorted(left)))}" if left else ""
+    others = f"; not considered: {', '.join(map(str, sorted(left)))}" if left else ""
     start = f"under {load} the resonance was also judged against disturbances of nodal diameters"
     lost = [verdict for verdict in verdicts if verdict.unstable]
     if not lost:

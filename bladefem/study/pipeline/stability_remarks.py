@@ -37,11 +37,11 @@ class Disturbances:
             return ""
         found = f"disturbances that repeat after {self.blades} blades, as the wave does, were"
         if not self.diameters:
-            return f"{found} looked at, not those of other nodal diameters"
+            return f"{found} considered, not those of other nodal diameters"
         listed = ", ".join(map(str, self.diameters))
         others = self.possible - len(self.diameters)
         return (
-            f"{found} looked at (nodal diameters {listed}), not those of the other {others} nodal "
+            f"{found} considered (nodal diameters {listed}), not those of the other {others} nodal "
             "diameters"
         )
 
@@ -95,8 +95,8 @@ def stability_sentence(
     left_out = ""
     if counts[UNKNOWN]:
         left_out = (
-            " (of curves whose verdicts would cost more than their points, the local maxima, the "
-            "neighbours of the highest and points spread evenly are judged)"
+            " (where the verdicts on a curve would cost more than its points, only the local maxima, "
+            "the neighbours of the highest and points spread evenly are judged)"
         )
     wave = f"; {judged.sentence}" if judged.sentence else ""
     return (
