@@ -95,8 +95,8 @@ def stability_sentence(
     left_out = ""
     if counts[UNKNOWN]:
         left_out = (
-            " (where the verdicts on a curve would cost more than its points, only the local maxima, "
-            "the neighbours of the highest and points spread evenly are judged)"
+            " (where the verdicts on a curve would cost more than its points, only the local "
+            "maxima, the neighbours of the highest and points spread evenly are judged)"
         )
     wave = f"; {judged.sentence}" if judged.sentence else ""
     return (
