@@ -46,10 +46,16 @@ def follow_path(
     budget: int,
     notes: list[str],
     options: Options,
+    most_folds: int | None = None,
 ) -> BandPath:
-    """The path from a solution until it leaves the band, closes on itself, or the budget ends."""
+    """The path from a solution until it leaves the band, closes on itself, or the budget ends.
+
+    Args:
+        most_folds: with which it is left; MAX_FOLDS when None.
+    """
     points: list[PathPoint] = []
     folds = 0
+    most = MAX_FOLDS if most_folds is None else most_folds
     options = replace(options, frugal=False)
     bounds = min(band[0], start.omega), max(band[1], start.omega)
     try:
@@ -70,9 +76,9 @@ def follow_path(
                     f"{point.restarted}"
                 )
             folds += point.fold
-            if folds > MAX_FOLDS:
+            if folds > most:
                 notes.append(
-                    f"a path was left at {point.solution.frequency:.6g} Hz after {MAX_FOLDS} "
+                    f"a path was left at {point.solution.frequency:.6g} Hz after {most} "
                     "folds: there may be further motions"
                 )
                 break
@@ -94,11 +100,13 @@ def follow_both_ways(
     budget: int,
     notes: list[str],
     options: Options,
+    most_folds: int | None = None,
 ) -> BandPath:
     """The path continued beyond its start in the other direction, unless it closed on itself."""
     if _closed(path.points, band):
         return path
-    back = follow_path(model, start, band, False, budget - len(path.points), notes, options)
+    left = budget - len(path.points)
+    back = follow_path(model, start, band, False, left, notes, options, most_folds)
     turned = (
         [
             replace(late, forward=not late.forward, fold=early.fold)

@@ -96,12 +96,14 @@ def find_branches(
     *,
     peak: float = 1e-3,
     options: Options = DEFAULT_OPTIONS,
+    most_folds: int | None = None,
 ) -> Branches:
     """Paths through a band of circular frequencies [rad/s], from its ends and from known motions.
 
     Args:
         known: solutions in the band, such as those of a sweep.
         peak: relative accuracy of each local maximum.
+        most_folds: of one path, and of all before no further one is begun; MAX_FOLDS when None.
     """
     options = replace(options, tolerance=min(options.tolerance, PATH_TOLERANCE))
     notes: list[str] = []
@@ -120,12 +122,13 @@ def find_branches(
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
         at_end = start is solved[0] or start is solved[-1]
-        full = len(paths) >= MAX_PATHS or count_folds(paths) >= MAX_FOLDS
+        most = MAX_FOLDS if most_folds is None else most_folds
+        full = len(paths) >= MAX_PATHS or count_folds(paths) >= most
         if budget <= 0 or (full and not at_end) or lies_on_paths(paths, start):
             continue
-        path = follow_path(model, start, band, forward, budget, notes, options)
+        path = follow_path(model, start, band, forward, budget, notes, options, most_folds)
         if not at_end:
-            path = follow_both_ways(model, start, band, path, budget, notes, options)
+            path = follow_both_ways(model, start, band, path, budget, notes, options, most_folds)
         budget -= len(path.points)
         paths.append(path)
     if budget <= 0:

@@ -156,6 +156,7 @@ def sweep(
     notes: list[str] | None = None,
     paths: bool = True,
     known: Sequence[Solution] = (),
+    most_folds: int | None = None,
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need.
 
@@ -176,6 +177,8 @@ def sweep(
         paths: whether the response is followed round folds; otherwise one motion is looked for.
         known: converged points of the band, of this model with these harmonics and samples, which
             are not solved again; they come first.
+        most_folds: after which paths are left, and no more begun; those of
+            :func:`bladefem.hbm.branches.find_branches` when None.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -196,7 +199,9 @@ def sweep(
     if not followed:
         return
     points = list(solved.values())
-    found = find_branches(model, band, points, H, samples, peak=peak, options=options)
+    found = find_branches(
+        model, band, points, H, samples, peak=peak, options=options, most_folds=most_folds
+    )
     notes.extend(found.notes)
     yield from found.points
     yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)

@@ -13,6 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from bladefem.errors import NotSolvedError
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.solution import size
 from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
@@ -107,3 +108,40 @@ def test_flanks_are_judged_by_a_model_as_large_as_that_of_the_peak(monkeypatch):
     found = curve_module._checked_flanks(None, first_for(4), points, top, errors)
     assert len(found) > 1 and len(asked) == len(found) - 1
     assert all(point is top for point in asked)
+
+
+@pytest.mark.parametrize("found", [True, False])
+def test_many_folds_are_looked_at_with_more_samples(found, monkeypatch):
+    """Ground faces under 580 N: 20 pieces between folds with few samples and points, one with more.
+
+    Where the resonance with them is not found the curve is swept to its end as it was.
+    """
+    asked = []
+    covered = curve_module.covered_band
+
+    def counted(model, settings, *args):
+        asked.append((settings.samples, args[-1] if len(args) == 8 else None))
+        return covered(model, settings, *args)
+
+    monkeypatch.setattr(curve_module, "covered_band", counted)
+    monkeypatch.setattr(curve_module, "MANY_FOLDS", 1)
+    if not found:
+        monkeypatch.setattr(curve_module, "peak_from", _refusing(curve_module.peak_from))
+    _, curve = curve_of_seed(53)
+    few = asked[-2][0]
+    assert few < curve_module.FOLDED_SAMPLES and asked[-2] == (few, 1)
+    wanted = curve_module.FOLDED_SAMPLES if found else few
+    assert asked[-1] == (wanted, None)
+    assert curve.settings.samples == wanted
+    assert {p.samples for p in curve.points if p.converged} == {wanted}
+
+
+def _refusing(peak_from):
+    """The search for a peak, which does not find that with FOLDED_SAMPLES."""
+
+    def search(family, old, point, new, *args, **given):
+        if new.samples == curve_module.FOLDED_SAMPLES:
+            raise NotSolvedError("not found")
+        return peak_from(family, old, point, new, *args, **given)
+
+    return search

@@ -321,6 +321,7 @@ def covered_band(
     paths: bool | None = None,
     notes: list[str] | None = None,
     known: Sequence[Solution] = (),
+    most_folds: int | None = None,
 ) -> list[Solution]:
     """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
     point lies inside.
@@ -330,6 +331,8 @@ def covered_band(
         paths: whether the response is followed round folds; where accuracy is below 1 if left out.
         notes: takes what the last sweep could not do, in sentences.
         known: points of this model with these settings and solver options, not to be solved again.
+        most_folds: after which the response is no longer followed; None for as many as a sweep
+            follows by itself.
 
     Raises:
         NotSolvedError: no point converged.
@@ -338,7 +341,9 @@ def covered_band(
     limits = _halfway(model, mode)
     for _ in range(1 if band and not widen else MAX_BAND_WIDENINGS):
         left_open: list[str] = []
-        points = response_points(model, settings, swept, accuracy, paths, left_open, known)
+        points = response_points(
+            model, settings, swept, accuracy, paths, left_open, known, most_folds
+        )
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
         if good[0] < top < good[-1]:
@@ -382,6 +387,7 @@ def response_points(
     paths: bool | None = None,
     notes: list[str] | None = None,
     known: Sequence[Solution] = (),
+    most_folds: int | None = None,
 ) -> list[Solution]:
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
@@ -391,6 +397,8 @@ def response_points(
 
     Args:
         known: points of this model with these settings and solver options, not to be solved again.
+        most_folds: after which the response is no longer followed; None for as many as a sweep
+            follows by itself.
 
     Raises:
         NotSolvedError: no point converged.
@@ -408,6 +416,7 @@ def response_points(
         notes=notes,
         paths=not rough if paths is None else paths,
         known=[p for p in known if p.converged and ends[0] <= p.omega <= ends[1]],
+        most_folds=most_folds,
     )
     options = solver_options(accuracy)
     points = list(swept(options=replace(options, fallbacks=not rough)))

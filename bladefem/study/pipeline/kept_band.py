@@ -38,6 +38,8 @@ MAX_STEPS = 4e6
 # the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
 # 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N
 MAX_MARCH = 1e11
+# and of those that its first periods show to be needed, some 10 s
+MAX_COUNTED = 6e10
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
@@ -221,9 +223,9 @@ def _band_with(
     are linear in them.
     """
     enough = partial(_known_enough, point, instants)
-    march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants, enough, MAX_MARCH)
-    if march.operations > MAX_MARCH:
-        reason = f"a march takes {march.operations:.1g} operations, at most {MAX_MARCH:.0e}"
+    march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants, enough, MAX_COUNTED)
+    if march.operations > MAX_COUNTED:
+        reason = f"a march takes {march.operations:.1g} operations, at most {MAX_COUNTED:.0e}"
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
     if not (march.settled and np.isfinite(march.motion).all()):
         reason = "the contact forces of a step of the march were not found"
