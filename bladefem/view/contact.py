@@ -176,7 +176,13 @@ def draw_pressure(
         if not line:
             add_colourbar(axes, peak, PRESSURE_COLOURS, "contact pressure [MPa]")
         label_outer(axes, line)
-        figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+        # an entry that only one of the faces has is in the legend as well
+        entries = {
+            label: handle
+            for ax in axes.flat
+            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+        }
+        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
         return figure
 
@@ -238,7 +244,10 @@ def draw_face(
     colour_pressure(ax, xy, seat, Normalize(0, peak))
     open_nodes = seat.force <= 0
     ax.plot(*xy[~open_nodes].T, ".", color="#ffffff", ms=1.5, alpha=0.5)
-    ax.plot(*xy[open_nodes].T, "o", mfc="none", mec="#888888", ms=2.5, mew=0.5, label="open node")
+    if open_nodes.any():
+        ax.plot(
+            *xy[open_nodes].T, "o", mfc="none", mec="#888888", ms=2.5, mew=0.5, label="open node"
+        )
     centre = 1e3 * unfold(seat.patch, resultant(seat).centre[None])[0]
     ax.plot(
         *xy[np.argmax(pressure)], "^", mfc="white", mec="black", ms=7, label="peak", clip_on=False

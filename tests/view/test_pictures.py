@@ -2,6 +2,8 @@
 geometry.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -250,6 +252,16 @@ def test_pressure_numbers_and_picture(folder):
     draw_pressure(seats, folder / "pressure.png")
     draw_pressure(synthetic.line_seats(), folder / "line.png")
     assert min(ink(folder / name) for name in ("pressure.png", "line.png")) > 0.05
+
+
+@pytest.mark.parametrize("some_open", [False, True])
+def test_open_nodes_are_in_the_legend_where_there_are_some(some_open):
+    """On whichever of the faces they are."""
+    pressed, other = (replace(one, force=np.ones(len(one.force))) for one in synthetic.seats())
+    if some_open:
+        other = replace(other, force=np.arange(len(other.force)) - 3.0)
+    texts = draw_pressure([pressed, other]).legends[0].get_texts()
+    assert ("open node" in [text.get_text() for text in texts]) == some_open
 
 
 def test_pressure_for_paraview(folder):
