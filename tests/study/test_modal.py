@@ -2,6 +2,8 @@
 between meshes.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -240,5 +242,11 @@ def test_wheel_modes_are_called_after_the_clamped_aerofoil():
     pure, named = (family_table(modes, whole.mesh, clamped) for clamped in (None, held))
     assert named["family"][0] == "first flap" and named["mac"][0] > pure["mac"][0]
     assert not named["family"].str.contains("coupled, coupled").any()
+    # a mesh from elsewhere that names the seats, and not the sides of the aerofoil
+    sides = ("pressure_side", "suction_side")
+    faces = {name: face for name, face in whole.mesh.faces.items() if name not in sides}
+    unnamed = family_table(modes, replace(whole.mesh, faces=faces))
+    assert list(unnamed["family"][:3]) == list(pure["family"][:3])
+    assert unnamed["aerofoil_share"].max() < 0.999
     root = whole.mesh.points[:, 0] <= blade_root(whole.mesh)
     assert abs(held.shapes[:, root]).max() == 0 and held.frequencies[0] > modes.frequencies[0]

@@ -71,13 +71,37 @@ def blade_root(mesh: Mesh) -> float:
     """Height x [m] where the bending part starts: of a wheel the foot of the aerofoil, else the
     clamped face.
     """
-    wheel = mesh.sector is not None and mesh.sector.count > 0
-    sides = [mesh.faces[name] for name in ("pressure_side", "suction_side") if name in mesh.faces]
-    if sides and (wheel or "clamp" not in mesh.faces):
-        return float(min(mesh.points[face.ravel(), 0].min() for face in sides))
+    sides = _heights(mesh, ("pressure_side", "suction_side"))
+    if sides.size and (_is_wheel(mesh) or "clamp" not in mesh.faces):
+        return float(sides.min())
     if "clamp" in mesh.faces:
         return float(mesh.points[mesh.faces["clamp"].ravel(), 0].max())
     return float(mesh.points[:, 0].min())
+
+
+def naming_root(mesh: Mesh) -> float:
+    """Height x [m] above which modes are named: that of ``blade_root``; of a wheel whose mesh names
+    no side of the aerofoil the outer end of the platform's seats, where it names these: down to
+    the bore the motion is no clamped beam's.
+    """
+    seats = _heights(mesh, ("seat_left", "seat_right"))
+    if (
+        _is_wheel(mesh)
+        and seats.size
+        and not _heights(mesh, ("pressure_side", "suction_side")).size
+    ):
+        return float(seats.max())
+    return blade_root(mesh)
+
+
+def _is_wheel(mesh: Mesh) -> bool:
+    return mesh.sector is not None and mesh.sector.count > 0
+
+
+def _heights(mesh: Mesh, names: Sequence[str]) -> np.ndarray:
+    """(n,) x [m] of the nodes of those of the faces that the mesh names."""
+    faces = [mesh.faces[name].ravel() for name in names if name in mesh.faces]
+    return np.concatenate([mesh.points[face, 0] for face in faces]) if faces else np.zeros(0)
 
 
 def beam_function(order: int, s: np.ndarray) -> np.ndarray:
@@ -171,7 +195,7 @@ def family_table(
         body: the aerofoil's body; the whole mesh when there is no such body.
         root: height x of the aerofoil's root [m]; found from the named faces when left out.
     """
-    root = blade_root(mesh) if root is None else root
+    root = naming_root(mesh) if root is None else root
     volumes = nodal_volumes(mesh)
     nodes = np.unique(mesh.bodies.get(body, np.concatenate(list(mesh.bodies.values()))))
     nodes = nodes[mesh.points[nodes, 0] >= root]
@@ -186,7 +210,7 @@ def family_table(
     match[:, [name == "mixed" for name in names]] = 0.0
     energy = np.einsum("mni,n->mn", np.abs(modes.shapes) ** 2, volumes)
     share = energy[:, nodes].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
-    below = "disc" if mesh.sector is not None and mesh.sector.count else "foot"
+    below = "disc" if _is_wheel(mesh) else "foot"
     return pd.DataFrame(
         {
             "mode": np.arange(1, len(match) + 1),
