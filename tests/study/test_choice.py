@@ -4,11 +4,14 @@ estimates.
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from bladefem.errors import NotSolvedError
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import size
@@ -29,7 +32,7 @@ from bladefem.study.adaptive.family import (
 )
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
 from bladefem.study.adaptive.settings import Settings, enriched_settings, first_for
-from bladefem.study.pipeline import loads
+from bladefem.study.pipeline import case_models, loads
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.response_remarks import beyond_tolerance
@@ -173,3 +176,34 @@ def test_exact_events_stay_exact_in_the_models_that_judge():
     point = solve(family_member(family, settings).model, 2 * np.pi * 1237.0, 3, 0)
     found = indicate_errors(family, settings, point)
     assert point.converged and found.errors["samples"] == 0 and 0 < found.errors["harmonics"] < 0.1
+
+
+def test_a_light_load_alone_is_no_end_where_richer_models_of_it_are_not_solved(monkeypatch):
+    """With `study.loads = 9` alone the shipped wedge ended with "not solved"."""
+    scene = load_scene("scenes/wedge.toml")
+    peak = SimpleNamespace(solution=None)
+    stand_ins = {
+        "affordable_harmonics": lambda case: 15,
+        "harmonic_diameters": lambda *args: (9,),
+        "is_wheel": lambda mesh: True,
+        "with_coriolis": lambda scene, reduced: reduced,
+        "family_of_case": lambda *args: None,
+        "family_member": lambda *args: SimpleNamespace(model=None),
+        "naming_the_load": lambda *args: nullcontext(),
+        "covered_band": lambda *args: [],
+        "peak_of": lambda points: None,
+        "softened_where_lifting": lambda family, settings, top: settings,
+        "peak_from": lambda *args: peak,
+    }
+    for name, stand_in in stand_ins.items():
+        monkeypatch.setattr(case_models, name, stand_in)
+
+    def refused(*args, **given):
+        raise NotSolvedError("no peak with three harmonics")
+
+    monkeypatch.setattr(case_models, "choose_at_peak", refused)
+    bodies = SimpleNamespace(mesh=None)
+    settings, reduced = case_models.reduced_sector(
+        scene, bodies, None, [], lambda name, key, make: "reduced"
+    )
+    assert reduced == "reduced" and settings.most == 15 and settings.error is None

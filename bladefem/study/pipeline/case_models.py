@@ -13,6 +13,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...data import Patch, PortModel
+from ...errors import NotSolvedError
 from ...hbm.model import ReducedModel, softened_layer
 from ...reduction.assemble import wheel_models
 from ...reduction.other_diameters import has_rigid_motion, spanned_models
@@ -180,7 +181,7 @@ def reduced_sector(
     keep: Callable[[str, str, Callable[[], Reduced]], Reduced],
 ) -> tuple[Settings, Reduced]:
     """The sector with as many modes as the resonance of one load needs, and settings to start the
-    others from.
+    others from; those there were where richer models of that resonance are not solved.
     """
     settings = replace(first_settings(scene), most=affordable_harmonics(case))
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
@@ -199,7 +200,11 @@ def reduced_sector(
             rough = covered_band(model, settings, scene.study.band, mode, 1.0)
             settings = softened_where_lifting(family, settings, peak_of(rough))
             peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)
-        enough = choose_at_peak(family, settings, peak, scene.accuracy, fixed=("modes",))
+        try:
+            enough = choose_at_peak(family, settings, peak, scene.accuracy, fixed=("modes",))
+        except NotSolvedError:
+            # where the damper comes off at this load; each curve judges the modes again
+            return settings, reduced
         settings, _, found = cheaper_settings(family, *enough, scene.accuracy)
         more = enriched_settings(settings, "modes")
         known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
