@@ -58,6 +58,7 @@ def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | Non
     if "alternating_stress" in near:
         per_metre = near["alternating_stress"] / near["peak_amplitude"]
         added["alternating_stress"] = per_metre * best["peak_amplitude"]
+        added["stress_error"] = near.get("stress_error", np.nan)
     return pd.concat([best, pd.Series(added, dtype=float)])
 
 
@@ -82,6 +83,20 @@ def error_words(row: pd.Series) -> str:
         return "error unknown: richer models were not solved"
     parts = "model and mesh" if np.isfinite(row.get("body_mesh", np.nan)) else "model; mesh apart"
     return f"± {max(100 * error, 0.01):.2g} % ({parts})"
+
+
+def stress_error_words(row: pd.Series) -> str:
+    """ "± 30 % (24 % by the mesh there)": that of the amplitude, and of the stress by the mesh at
+    its place.
+    """
+    mesh = row.get("stress_error", np.nan)
+    if not np.isfinite(mesh):
+        return f"{error_words(row)}, error by the mesh there apart"
+    by_mesh = f"{100 * mesh:.2g} % by the mesh there"
+    error = row.get("error", np.nan)
+    if not np.isfinite(error):
+        return f"{error_words(row)}; {by_mesh}"
+    return f"± {100 * (error + mesh):.2g} % ({by_mesh})"
 
 
 def flat_range(best: pd.Series) -> str:

@@ -124,7 +124,8 @@ CAPTIONS = {
     "response/flow_damping": "Damping of each wave by blade and flow, without dampers. Waves below "
     "zero flutter unless friction holds them.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "
-    "resonance amplitude: of the balance, of contact points, of the body's mesh and of the layer.",
+    "resonance amplitude: of the balance, of contact points, of the body's mesh and of the layer; "
+    "stresses have one of their own by the mesh, given where that of the whole motion was computed.",
     "accuracy/loads_with_doubtful_points": "Loads with points that did not converge or needed a "
     "fallback.",
 }

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from .best_load import error_words, found_best
+from .best_load import error_words, found_best, stress_error_words
 from .statements import ResponseAnswer
 
 # what an answer says in place of a number that the data cannot carry
@@ -65,7 +65,7 @@ def _quantity(what: str) -> str:
     """Which uncertainty belongs to a headline, by the words in its title."""
     words = {
         "amplitude": "amplitude",
-        "stress": "amplitude",
+        "stress": "stress",
         "frequency": "frequency",
         "work": "amplitude",
         "damping ratio": "amplitude",
@@ -85,6 +85,7 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
     low, high = _bracket(finite, best)
     return {
         "amplitude": error_words(best),
+        "stress": stress_error_words(best),
         "frequency": _frequency_text(best, points),
         "load": _between_text(low, high, "N"),
         "own load": "by equilibrium, no model error",
@@ -103,6 +104,7 @@ def _of_search(best: pd.Series) -> dict[str, str]:
     known = low is not None and high is not None
     return {
         "amplitude": error_words(total),
+        "stress": stress_error_words(total),
         "load": _flatness_text(low, high),
         "mass": _mass_text(low, high, best["load"]) if known else "as the optimum load",
     }

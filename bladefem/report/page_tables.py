@@ -58,6 +58,7 @@ PAGE_COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
             "interval",
             "reduction",
             "alternating_stress",
+            "stress_error",
             "dissipated",
             "error",
             "points",

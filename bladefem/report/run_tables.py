@@ -80,14 +80,24 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 
 def _summary(result: SolvedRun) -> pd.DataFrame:
-    """The design table, with the alternating stress at each resonance."""
+    """The design table, with the alternating stress at each resonance and its error by the mesh."""
     table = pd.DataFrame(design_table(result.response.curves, result.response.limits))
-    table.insert(
-        table.columns.get_loc("reduction") + 1,
-        "alternating_stress",
-        _alternating(result, table["peak_amplitude"].to_numpy()),
-    )
+    place = table.columns.get_loc("reduction") + 1
+    stress = _alternating(result, table["peak_amplitude"].to_numpy())
+    table.insert(place, "alternating_stress", stress)
+    if result.damped:
+        table.insert(place + 1, "stress_error", _stress_errors(result, len(table)))
     return table
+
+
+def _stress_errors(result: SolvedRun, rows: int) -> np.ndarray:
+    """(rows,) estimated relative error by the mesh of the stress in the design table; NaN where the
+    stress of the whole motion was not computed.
+    """
+    errors = np.full(rows, np.nan)
+    for number, found in (result.damped or {}).items():
+        errors[1 + number] = found.mesh_error
+    return errors
 
 
 def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:

@@ -178,6 +178,7 @@ def test_the_error_of_a_searched_optimum_has_that_of_the_mesh():
     rows |= {"halved": [0.0, np.nan, 0.2, 0.0], "body_mesh": [0.0, 0.08, 0.05, 0.0]}
     rows |= {"layer_law": [0.0, 0.01, np.nan, 0.0]}
     rows |= {"alternating_stress": [1e8, 2e7, 2e7, 1e8]}
+    rows |= {"stress_error": [np.nan, 0.2, np.nan, np.nan]}
     summary = pd.DataFrame(rows)
     row = {"load": 170.0, "amplitude": 9e-6, "frequency": 448.0, "error": 0.01, "tolerance": 1e-3}
     row |= {"tolerated_from": 150.0, "tolerated_to": 190.0, "reason": ""}
@@ -189,6 +190,13 @@ def test_the_error_of_a_searched_optimum_has_that_of_the_mesh():
     assert amplitude.uncertainty == "± 10 % (model and mesh)"
     (stress,) = [one for one in numbers if "stress" in one.what]
     assert stress.value == "18 MPa"
+    assert stress.uncertainty == "± 30 % (20 % by the mesh there)"
+    found = headlines(response_answer(summary, None), summary, None)
+    assert "± 30 % (20 % by the mesh there)" in [one.uncertainty for one in found]
+    unknown = summary.drop(columns="stress_error")
+    found = headlines(response_answer(unknown, None), unknown, None)
+    (stress,) = [one for one in found if "stress" in one.what]
+    assert stress.uncertainty == "± 10 % (model and mesh), error by the mesh there apart"
 
 
 def test_a_speed_that_does_not_drive_the_resonance_is_named():
