@@ -125,7 +125,7 @@ CAPTIONS = {
     "zero flutter unless friction holds them.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "
     "resonance amplitude: of the balance, of contact points, of the body's mesh and of the layer; "
-    "stresses have one of their own by the mesh, given where that of the whole motion was computed.",
+    "stresses have one of their own by the mesh, where that of the whole motion was computed.",
     "accuracy/loads_with_doubtful_points": "Loads with points that did not converge or needed a "
     "fallback.",
 }
