@@ -52,6 +52,7 @@ from .modes import (
     mode_set,
     pairs_together,
 )
+from .open_matrix import chosen_rows, entries_of_sum, times
 from .open_sector import columns_of_part
 from .subdomains import whole_part
 
@@ -421,18 +422,25 @@ def _project_columns(
     T1 = columns_of_part(t.opened, high_part(t)[t.opened.places])
     faces = np.flatnonzero(np.diff(T1.indptr))
     low = columns_of_part(t.opened, t.low[t.opened.places])
-    high = T1[faces] @ W
+    high = _few_rows_times(T1[faces], W)
     out = []
     both = t.opened.K, t.opened.M
     inner = _project_interior(both, (low, W), high, faces, new)
     for A, (LL, HL) in zip(both, inner, strict=True):
-        coupling = A[faces].T.tocsr()
+        beside = chosen_rows(A, faces)
+        coupling = beside.T.tocsr()
         near = np.flatnonzero(np.diff(coupling.indptr))
-        LH = (low[near] @ W).T @ (coupling[near] @ high[:, new])
-        own = [LL + high.T @ (A[faces][:, faces] @ high[:, new]), LH + HL, LH - HL]
+        LH = _few_rows_times(low[near], W).T @ (coupling[near] @ high[:, new])
+        own = [LL + high.T @ (beside[:, faces] @ high[:, new]), LH + HL, LH - HL]
         out.append([comm.allreduce(part) for part in own] if comm.size > 1 else own)
     K, M = out
     return K, M
+
+
+def _few_rows_times(A: sp.csr_matrix, W: np.ndarray) -> np.ndarray:
+    """A W with the rows of W alone that A needs: SciPy copies what it multiplies."""
+    needed = np.unique(A.indices)
+    return np.asarray(A[:, needed] @ W[needed])
 
 
 def _project_interior(
@@ -454,7 +462,7 @@ def _project_interior(
     for first in range(new.start, W.shape[1], COLUMNS_AT_A_TIME):
         moved = np.ascontiguousarray(T0 @ W[:, first : first + COLUMNS_AT_A_TIME])
         for piece, A in zip(pieces, both, strict=True):
-            image = A @ moved
+            image = times(A, moved)
             piece.append((W.T @ (turned @ image), high.T @ image[faces]))
     return [
         (
@@ -559,7 +567,7 @@ def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
     if t.opened is None:
         return None
     opened = t.opened
-    return opened.elimination.shifted((opened.K - shift * opened.M).tocsr())
+    return opened.elimination.shifted(entries_of_sum(opened.K, -shift, opened.M))
 
 
 def _counts_below(

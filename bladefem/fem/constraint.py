@@ -168,8 +168,8 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     if t.opened is not None:
         C, faces = maps_of_part(t.opened, T)
         shared = t.opened.shared
-        stiffness = Folded(t.opened.K, C, t.opened.elimination, None, shared, faces)
-        mass = Folded(t.opened.M, C, None, t.opened.nodal_mass, shared, faces)
+        stiffness = Folded(t.opened.K, C, t.opened.elimination, shared, faces)
+        mass = Folded(t.opened.M, C, None, shared, faces)
         return Constrained(t.body, T, own, stiffness, lambda: mass, n)
     if real:
         K, M = (combined(A[0], phase, A[1]) for A in (t.K, t.M))

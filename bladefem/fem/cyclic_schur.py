@@ -22,6 +22,7 @@ from ..errors import NotSolvedError
 from .compat import MPI, shared_matrix
 from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
+from .open_matrix import OpenMatrix, entries
 from .schur import Bridge, replace_dense_solve, schur_complement, solve_through_boundary
 from .separators import (
     Separators,
@@ -167,7 +168,7 @@ class Elimination:
     """The elimination of an open sector's interior, done when it is asked for first."""
 
     # (n_open, n_open) [N/m], see Core
-    A: sp.csr_matrix
+    A: OpenMatrix
     rim: np.ndarray
     order: np.ndarray | None
     shared: SharedBoundary | None
@@ -179,7 +180,7 @@ class Elimination:
         """The eliminated interior (collective where it is shared)."""
         if self.done is None:
             self.done = eliminate_interior(
-                self.A,
+                entries(self.A),
                 self.rim,
                 order=self.order,
                 shared=self.shared,
@@ -278,6 +279,8 @@ def _folded_complement(core: Core, faces: FaceMap) -> np.ndarray:
 
 def solve_diameter(rim: Rim, B: np.ndarray) -> np.ndarray:
     """Solve for a block of vectors (n_own, k)."""
+    if B.shape[1] <= COLUMNS_PER_SOLVE:
+        return _solve_batch([(rim, B)])[0]
     X = np.empty(B.shape, np.result_type(B, rim.faces.C.dtype), order="F")
     for first in range(0, B.shape[1], COLUMNS_PER_SOLVE):
         part = slice(first, first + COLUMNS_PER_SOLVE)
@@ -322,7 +325,7 @@ def _solve_batch(systems: list[tuple[Rim, np.ndarray]]) -> list[np.ndarray]:
 
     inside = _sweep(core, np.hstack(wide) if len(wide) > 1 else wide[0], answer)
     for (rim, _), part, X in zip(systems, columns, found, strict=True):
-        X[rim.faces.inner] = _join_parts(inside[:, part], X)
+        _put_parts(X, rim.faces.inner, inside[:, part])
     return found if shared is None else [back_to_ranks(shared, X) for X in found]
 
 
@@ -410,18 +413,19 @@ def _split_parts(X: np.ndarray, k: int) -> np.ndarray:
     return X.real if X.shape[1] == k else np.concatenate([X.real, X.imag], axis=1)
 
 
+def _put_parts(X: np.ndarray, places: np.ndarray, parts: np.ndarray) -> None:
+    """Real columns into rows of X (n_own, k), without a complex copy of them."""
+    k = X.shape[1]
+    if not np.iscomplexobj(X):
+        X[places] = parts
+        return
+    X.real[places], X.imag[places] = parts[:, :k], parts[:, k:]
+
+
 def _join_parts(X: np.ndarray, like: np.ndarray) -> np.ndarray:
     """The inverse of ``_split_parts``."""
     k = like.shape[1]
     return X if not np.iscomplexobj(like) else X[:, :k] + 1j * X[:, k:]
-
-
-def real_times_complex(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
-    """Real sparse matrix times a complex block, without a complex copy of the matrix."""
-    if not np.iscomplexobj(X):
-        return A @ X
-    X = np.ascontiguousarray(X)
-    return (A @ X.view(float)).view(complex)
 
 
 def _count_negative(S: np.ndarray) -> int:

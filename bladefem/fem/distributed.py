@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
+
 import numpy as np
 import scipy.sparse as sp
 
 from .body import Body
 from .compat import PETSc
+from .mumps import petsc_call
 
 
 def rows_of_rank(body: Body) -> np.ndarray:
@@ -46,3 +49,33 @@ def local_rows(A: PETSc.Mat) -> sp.csr_matrix:
     """This rank's rows."""
     indptr, indices, data = A.getValuesCSR()
     return sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, A.size[1]))
+
+
+def shared_rows(A: PETSc.Mat) -> sp.csr_matrix | None:
+    """The matrix of one rank on PETSc's own memory, not to be written to, valid as long as it is;
+    None where PETSc keeps it in another form.
+    """
+    if A.getType() != "seqaij":
+        return None
+    n, done = ctypes.c_int64(), ctypes.c_int()
+    number = ctypes.c_int64 if np.dtype(PETSc.IntType).itemsize == 8 else ctypes.c_int32
+    starts, columns = ctypes.POINTER(number)(), ctypes.POINTER(number)()
+    values = ctypes.POINTER(ctypes.c_double)()
+    by = ctypes.byref
+    petsc_call("MatGetRowIJ", A.handle, 0, 0, 0, by(n), by(starts), by(columns), by(done))
+    if not done.value:
+        return None
+    petsc_call("MatSeqAIJGetArrayRead", A.handle, by(values))
+    indptr = np.ctypeslib.as_array(starts, (A.size[0] + 1,))
+    count = int(indptr[-1])
+    parts = (
+        np.ctypeslib.as_array(values, (count,)),
+        np.ctypeslib.as_array(columns, (count,)),
+        indptr,
+    )
+    for part in parts:
+        part.flags.writeable = False
+    # forgets the pointers, not the memory
+    petsc_call("MatSeqAIJRestoreArrayRead", A.handle, by(values))
+    petsc_call("MatRestoreRowIJ", A.handle, 0, 0, 0, by(n), by(starts), by(columns), by(done))
+    return sp.csr_matrix(parts, shape=A.size)

@@ -17,7 +17,8 @@ from scipy.linalg import eigh
 from ..errors import NotSolvedError
 from .compat import MPI
 from .constraint import Constrained
-from .linalg import apply_block, inner_products, linear_combinations, subtract_product
+from .linalg import apply_block, inner_products, linear_combinations, recombine, subtract_product
+from .memory import give_back
 
 MAX_STEPS = 200
 # share of old directions in a new one below which its image under M is corrected, not computed
@@ -76,9 +77,14 @@ def lowest_eigenpairs(
         NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
     """
     space = _Space()
-    block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype, copy=False))
+    block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
     for _ in range(MAX_STEPS):
-        _extend_basis(con, space, block, Mblock, inverse(Mblock))
+        # pieces that are left behind, into which no block fits
+        give_back()
+        image = inverse(Mblock)
+        give_back()
+        _extend_basis(con, space, block, Mblock, image)
+        del image
         theta, S = eigh(space.H)
         theta = theta[::-1]
         S = S[:, ::-1]
@@ -88,6 +94,11 @@ def lowest_eigenpairs(
         if not len(rest) and k < count:
             raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
         if (k >= count and error < tolerance) or not len(rest):
+            # of no more use where memory is at its peak
+            del block, Mblock
+            space.MV.clear()
+            space.MP.clear()
+            give_back()
             return 1 / theta[:k], linear_combinations(
                 [*space.V, *space.P], np.concatenate([S[:, :k], rest])
             )
@@ -108,7 +119,7 @@ def orthonormal(
     size: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """W made M-orthonormal and, once more, M-orthogonal to V: basis Q, M Q, and R with W = V (...)
-    + Q R.
+    + Q R. Q takes the memory of W.
 
     Args:
         size: M-norm of what W was taken from. Directions that are rounding compared with it are
@@ -121,7 +132,12 @@ def orthonormal(
     left = inner_products(comm, MV, W)
     W = subtract_product(W, V, left)
     clean = abs(left).max(initial=0.0) < OLD_DIRECTION_SHARE
-    MW = subtract_product(MW, MV, left) if clean else apply_block(con.M, W)
+    if clean:
+        MW = subtract_product(MW, MV, left)
+    else:
+        # both products at once would be the peak of memory
+        del MW
+        MW = apply_block(con.M, W)
     if clean and spread > SINGLE_NORMALISATION_SHARE:
         return W, MW, R
     # what is much longer than 1 now came from a direction that was rounding in the first product:
@@ -199,5 +215,5 @@ def _orthogonal_factor(
     good = size > max(share * size[-1], least, tiny) if len(size) else size > 0
     root = np.sqrt(size[good])
     Z = Z[:, good]
-    W, MW = (linear_combinations(A, Z / root) for A in (W, MW))
+    W, MW = (recombine(A, Z / root) for A in (W, MW))
     return W, MW, (Z * root).conj().T, float((root[0] / root[-1]) ** 2) if len(root) else 1.0

@@ -23,6 +23,7 @@ from scipy.linalg import blas
 from . import cyclic_schur as interior
 from .compat import MPI, PETSc
 from .mumps import Factorised, dense_matrix, dense_values, factorise_matrix, solve_matrix
+from .open_matrix import OpenMatrix, diagonal, entries, entries_of_sum, times
 from .subdomains import SharedBoundary, sum_of_parts, whole_part
 
 
@@ -40,14 +41,11 @@ class Folded:
     """
 
     # (n_open, n_open) real, symmetric
-    A: sp.csr_matrix
+    A: OpenMatrix
     # (n_open, n_free) real or complex
     C: sp.csr_matrix
     # A with its interior eliminated, shared by all nodal diameters
     core: interior.Elimination | None
-    # (n_open/dim,)*2 the same for each direction: A is its Kronecker product with the identity,
-    # a third of the numbers to read; None where A couples directions
-    nodal: sp.csr_matrix | None = None
     # several ranks: A and C are those of this rank's part
     shared: SharedBoundary | None = None
     # where the boundary's unknowns are; worked out where the rank has all of them
@@ -68,7 +66,9 @@ class Folded:
 
 # of a product with a folded matrix at a time: whole, the blocks on its way would be the peak of
 # memory
-COLUMNS_AT_A_TIME = 8
+COLUMNS_AT_A_TIME = 4
+# of a block that is replaced in place: its products stay in the cache
+ROWS_AT_A_TIME = 4096
 
 Matrix: TypeAlias = PETSc.Mat | Doubled | Folded
 Block: TypeAlias = np.ndarray | list[np.ndarray]
@@ -115,7 +115,7 @@ def factorise(
         core = (
             A.core.core()
             if A.core is not None
-            else interior.eliminate_interior(A.A, A.rim, definite, shared=A.shared)
+            else interior.eliminate_interior(entries(A.A), A.rim, definite, shared=A.shared)
         )
         if springs is not None and A.shared is not None:
             springs = whole_part(A.shared, springs[:, None])[:, 0]
@@ -124,9 +124,9 @@ def factorise(
     matrix = A.matrix if isinstance(A, Doubled) else A
     if springs is not None:
         matrix = matrix.duplicate(copy=True)
-        diagonal = matrix.createVecRight()
-        diagonal.array = np.repeat(springs, 2) if doubled else springs
-        matrix.setDiagonal(diagonal, addv=PETSc.InsertMode.ADD_VALUES)
+        added = matrix.createVecRight()
+        added.array = np.repeat(springs, 2) if doubled else springs
+        matrix.setDiagonal(added, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
     return Factor(factorise_matrix(matrix, definite, on_disk=on_disk), doubled)
 
@@ -179,13 +179,7 @@ def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
 
 def _folded_product(A: Folded, X: np.ndarray) -> np.ndarray:
     """C^H A C X for unknowns (n_free, k) of one rank's part."""
-    open_values = A.C @ X
-    if A.nodal is None:
-        image = interior.real_times_complex(A.A, open_values)
-    else:
-        by_node = open_values.reshape(A.nodal.shape[0], -1)
-        image = interior.real_times_complex(A.nodal, by_node).reshape(open_values.shape)
-    return np.asfortranarray(A.C.conj().T @ image)
+    return np.asfortranarray(A.C.conj().T @ times(A.A, A.C @ X))
 
 
 def combined(
@@ -195,7 +189,7 @@ def combined(
 ) -> Matrix:
     """A + factor B."""
     if isinstance(A, Folded) and isinstance(B, Folded):
-        return replace(A, A=(A.A + factor * B.A).tocsr(), core=None, nodal=None)
+        return replace(A, A=entries_of_sum(A.A, factor, B.A), core=None)
     if isinstance(A, Doubled) and isinstance(B, Doubled):
         return Doubled(combined(A.matrix, factor, B.matrix))
     if isinstance(A, Folded | Doubled):
@@ -209,11 +203,11 @@ def mean_diagonal(A: Matrix) -> float:
     """Mean of the diagonal, a measure of size."""
     if isinstance(A, Folded):
         if A.shared is None:
-            return float(A.A.diagonal().mean())
-        total = A.shared.cut.comm.allreduce(float(A.A.diagonal().sum()))
+            return float(diagonal(A.A).mean())
+        total = A.shared.cut.comm.allreduce(float(diagonal(A.A).sum()))
         return total / A.shared.open_size
-    diagonal = (A.matrix if isinstance(A, Doubled) else A).getDiagonal()
-    return diagonal.sum() / diagonal.size
+    values = (A.matrix if isinstance(A, Doubled) else A).getDiagonal()
+    return values.sum() / values.size
 
 
 def dense_rows(A: Matrix, n: int) -> np.ndarray:
@@ -267,10 +261,21 @@ def linear_combinations(V: Block, C: np.ndarray) -> np.ndarray:
     )
 
 
+def recombine(W: np.ndarray, C: np.ndarray) -> np.ndarray:
+    """W C (n_own, l) for l <= k, in the memory of W (n_own, k)."""
+    few = W[:, : C.shape[1]]
+    for first in range(0, len(W), ROWS_AT_A_TIME):
+        rows = slice(first, first + ROWS_AT_A_TIME)
+        few[rows] = W[rows] @ C
+    return few
+
+
 def inertia(A: Matrix) -> int:
     """Number of negative eigenvalues, by Sylvester's law; the factors are not kept."""
     if isinstance(A, Folded):
-        core = interior.eliminate_interior(A.A, A.rim, definite=False, keep=False, shared=A.shared)
+        core = interior.eliminate_interior(
+            entries(A.A), A.rim, definite=False, keep=False, shared=A.shared
+        )
         return interior.count_negative(core, A.faces)
     doubled = isinstance(A, Doubled)
     parts = factorise_matrix(A.matrix if doubled else A, definite=False, keep=False)

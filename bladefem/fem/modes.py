@@ -32,6 +32,7 @@ from .linalg import (
     release,
 )
 from .memory import give_back
+from .open_matrix import entries_of_sum
 
 # error of a vector's direction; that of a frequency is its square
 DIRECTION_TOLERANCE = 1e-8
@@ -276,7 +277,7 @@ def count_below(con: Constrained, lam: float) -> int:
     """Number of eigenvalues below lam [rad^2/s^2], by Sylvester's law of inertia."""
     if isinstance(con.K, Folded) and isinstance(con.M, Folded) and con.K.core is not None:
         # the interior in the order that serves the stiffness too
-        shifted = (con.K.A - lam * con.M.A).tocsr()
+        shifted = entries_of_sum(con.K.A, -lam, con.M.A)
         return count_negative(con.K.core.shifted(shifted), con.K.faces)
     return inertia(combined(con.K, -lam, con.M))
 

@@ -21,6 +21,9 @@ from .compat import PETSc, no_error_messages
 COLUMNS_PER_SOLVE = 128
 # per cent of memory beyond MUMPS's own estimate
 EXTRA_MEMORY_PERCENT = 40
+# the same where nothing is pivoted and one rank does it all, as MUMPS itself sets it: the estimate
+# is nearly exact, and what is beyond is written to for a while
+EXACT_MEMORY_PERCENT = 5
 # MATOP_LUFACTOR_SYMBOLIC
 SYMBOLIC_FACTORISATION = 25
 # share of non-zero rows below which a right-hand side counts as sparse
@@ -71,7 +74,8 @@ def factorise_matrix(
     A.setOption(PETSc.Mat.Option.SPD, definite)
     pc = _prepare_solver(A, PETSc.PC.Type.CHOLESKY)
     F = pc.getFactorMatrix()
-    F.setMumpsIcntl(14, EXTRA_MEMORY_PERCENT)
+    exact = definite and A.comm.size == 1
+    F.setMumpsIcntl(14, EXACT_MEMORY_PERCENT if exact else EXTRA_MEMORY_PERCENT)
     if on_disk and keep:
         F.setMumpsIcntl(22, 1)
     if not definite:

@@ -13,8 +13,9 @@ import scipy.sparse as sp
 from . import cyclic_schur as core
 from .body import Body
 from .compat import PETSc
-from .distributed import local_rows, rows_of_rank, to_petsc
+from .distributed import local_rows, rows_of_rank, shared_rows, to_petsc
 from .memory import give_back
+from .open_matrix import OpenMatrix, Repeated, Selected
 from .ordering import interior_first
 from .subdomains import SharedBoundary, divide, matrix_share, share_boundary
 
@@ -34,11 +35,9 @@ class Opened:
     # (n_open,) the displacement in mesh numbering that each open unknown is
     places: np.ndarray
     # (n_open, n_open) [N/m]; the parts' add up
-    K: sp.csr_matrix
+    K: OpenMatrix
     # [kg]
-    M: sp.csr_matrix
-    # (n_open/dim,)*2 the mass of one direction; None where directions differ
-    nodal_mass: sp.csr_matrix | None
+    M: OpenMatrix
     elimination: core.Elimination
     # (nb,) places of the boundary of all parts; empty on one rank
     boundary: np.ndarray
@@ -80,8 +79,8 @@ def open_sector(
     if len(rim) == len(places):
         return None
     if body.comm.size == 1:
-        K, M = _open_matrices(body, T, start)
-        return _opened(body, T, places, (K, M), rim, None, np.empty(0, int))
+        both = _open_stiffness(body, T, start), _open_mass(body, T, start)
+        return _opened(body, T, places, both, rim, None, np.empty(0, int))
     part = shared = None
     shares = []
     for A in _open_matrices(body, T, start):
@@ -135,19 +134,19 @@ def _opened(
     body: Body,
     T: sp.csr_matrix,
     places: np.ndarray,
-    matrices: tuple[sp.csr_matrix, sp.csr_matrix],
+    matrices: tuple[OpenMatrix, sp.csr_matrix],
     rim: np.ndarray,
     shared: SharedBoundary | None,
     boundary: np.ndarray,
 ) -> Opened:
     """The record, with the order of the elimination."""
-    K, M = matrices
+    K, mass = matrices
     order = interior_first(K, rim, places // body.dim)
-    nodal = _of_one_direction(M, places, body.dim)
+    M = _of_one_direction(mass, places, body.dim)
     # what building the matrices took is of no more use
     give_back()
     elimination = core.Elimination(K, rim, order, shared, body.plan.on_disk)
-    return Opened(T, places, K, M, nodal, elimination, boundary)
+    return Opened(T, places, K, M, elimination, boundary)
 
 
 def _open_matrices(
@@ -155,22 +154,50 @@ def _open_matrices(
     T: sp.csr_matrix,
     start: np.ndarray,
 ) -> Iterator[sp.csr_matrix]:
-    """This rank's rows (n_own, n_open) of stiffness and mass, one after the other; zeros between
-    directions of the mass are dropped.
+    """This rank's rows (n_own, n_open) of stiffness and mass, one after the other."""
+    yield _open_matrix(body, body.K, T, start)
+    yield _open_mass(body, T, start)
+
+
+def _open_mass(body: Body, T: sp.csr_matrix, start: np.ndarray) -> sp.csr_matrix:
+    """This rank's rows of the mass, without the zeros between its directions."""
+    out = _open_matrix(body, body.M, T, start)
+    out.eliminate_zeros()
+    return out
+
+
+def _open_matrix(
+    body: Body,
+    A: PETSc.Mat,
+    T: sp.csr_matrix,
+    start: np.ndarray,
+) -> sp.csr_matrix:
+    """This rank's rows (n_own, n_open) of T^T A T."""
+    if _merely_selects(T):
+        out = _selected(body, A, T, start)
+    elif body.comm.size == 1:
+        local = T[rows_of_rank(body)]
+        out = (local.T @ local_rows(A) @ local).tocsr()
+    else:
+        out = local_rows(A.ptap(to_petsc(body, T, start)))
+    out.sum_duplicates()
+    return out
+
+
+def _merely_selects(T: sp.csr_matrix) -> bool:
+    """Each open unknown is a displacement, and none is two."""
+    return T.nnz == T.shape[1] and bool((T.data == 1).all())
+
+
+def _open_stiffness(body: Body, T: sp.csr_matrix, start: np.ndarray) -> OpenMatrix:
+    """The stiffness of an open sector that one rank holds, on the body's own memory if it can
+    be.
     """
-    chosen = T.nnz == T.shape[1] and bool((T.data == 1).all())
-    for A in (body.K, body.M):
-        if chosen:
-            out = _selected(body, A, T, start)
-        elif body.comm.size == 1:
-            local = T[rows_of_rank(body)]
-            out = (local.T @ local_rows(A) @ local).tocsr()
-        else:
-            out = local_rows(A.ptap(to_petsc(body, T, start)))
-        out.sum_duplicates()
-        if A is body.M:
-            out.eliminate_zeros()
-        yield out
+    whole = shared_rows(body.K) if _merely_selects(T) else None
+    if whole is None:
+        return _open_matrix(body, body.K, T, start)
+    # open unknowns are numbered as the rows are
+    return Selected(whole, body.scalar_rows[T.tocsc().indices], body.K)
 
 
 def _selected(
@@ -193,13 +220,13 @@ def _of_one_direction(
     M: sp.csr_matrix,
     places: np.ndarray,
     dim: int,
-) -> sp.csr_matrix | None:
-    """The nodes' part of a mass matrix that is the same in all directions; None for others."""
+) -> OpenMatrix:
+    """A mass matrix that is the same in all directions by its nodes' part; others as they are."""
     if len(places) % dim or M.nnz % dim:
-        return None
+        return M
     whole = places.reshape(-1, dim) - np.arange(dim)
     if (whole % dim).any() or (whole != whole[:, :1]).any():
-        return None
+        return M
     M.sort_indices()
     nodal = M[::dim, ::dim].tocsr()
     nodal.sort_indices()
@@ -207,5 +234,5 @@ def _of_one_direction(
     again.sort_indices()
     same = np.array_equal(again.indptr, M.indptr) and np.array_equal(again.indices, M.indices)
     if not same or abs(again.data - M.data).max(initial=0.0) > SAME_MASS * abs(M.data).max():
-        return None
-    return nodal
+        return M
+    return Repeated(nodal, dim)

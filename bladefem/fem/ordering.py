@@ -17,13 +17,15 @@ from ctypes.util import find_library
 import numpy as np
 import scipy.sparse as sp
 
+from .open_matrix import OpenMatrix, chosen_rows
+
 # unknowns from which METIS beats AMD
 MIN_METIS_UNKNOWNS = 60_000
 METIS_LIBRARIES = ("libmetis.so.5", "libmetis.so", "libmetis.dylib")
 
 
 def interior_first(
-    A: sp.csr_matrix,
+    A: OpenMatrix,
     last: np.ndarray,
     groups: np.ndarray,
 ) -> np.ndarray | None:
@@ -43,7 +45,7 @@ def interior_first(
     inner = np.setdiff1d(np.arange(A.shape[0]), last)
     node = np.unique(groups[inner], return_inverse=True)[1]
     join = sp.csr_matrix((np.ones(len(inner), np.int8), node, np.arange(len(inner) + 1)))
-    cut = A[inner][:, inner]
+    cut = chosen_rows(A, inner)[:, inner]
     pattern = sp.csr_matrix((np.ones(cut.nnz, np.int8), cut.indices, cut.indptr), cut.shape)
     graph = (join.T @ pattern @ join).tocsr()
     graph.setdiag(0)

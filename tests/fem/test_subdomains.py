@@ -18,6 +18,7 @@ from bladefem.fem.constraint import at_diameter, restrict_load, transformation, 
 from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.linalg import apply_block, mean_diagonal
 from bladefem.fem.modes import count_below
+from bladefem.fem.open_matrix import entries
 from bladefem.fem.ports import port_models
 from bladefem.scene.tables import Material
 
@@ -128,7 +129,7 @@ def test_a_failure_of_one_rank_ends_all(both, monkeypatch):
 
     monkeypatch.setattr(core, "factorise_matrix", fails)
     with pytest.raises(NotSolvedError, match="memory ran out"):
-        opened.elimination.shifted(opened.K)
+        opened.elimination.shifted(entries(opened.K))
 
 
 def test_a_count_that_fails_on_one_rank_ends_all(both, monkeypatch):

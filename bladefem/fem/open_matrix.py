@@ -1,0 +1,107 @@
+"""Matrices of open sectors, kept as what they are made of: another copy of the stiffness would take
+a tenth of the memory of a modal solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import scipy.sparse as sp
+
+
+@dataclass(frozen=True)
+class Selected:
+    """Rows and columns of a larger matrix, picked where they are used."""
+
+    # (n, n) real, symmetric
+    whole: sp.csr_matrix
+    # (n_open,) rows and columns
+    chosen: np.ndarray
+    # whose memory the numbers are in, which must not change
+    owner: object
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_open, n_open)"""
+        return len(self.chosen), len(self.chosen)
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """The Kronecker product with the identity: the same for each direction, a third of the numbers
+    to read.
+    """
+
+    # (n_open/dim,)*2
+    nodal: sp.csr_matrix
+    dim: int
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(n_open, n_open)"""
+        n = self.dim * self.nodal.shape[0]
+        return n, n
+
+
+OpenMatrix: TypeAlias = sp.csr_matrix | Selected | Repeated
+
+
+def entries(A: OpenMatrix) -> sp.csr_matrix:
+    """The matrix (n_open, n_open) with entries of its own, where it has none yet."""
+    if isinstance(A, Selected):
+        return A.whole[A.chosen][:, A.chosen].tocsr()
+    if isinstance(A, Repeated):
+        return chosen_rows(A, np.arange(A.shape[0]))
+    return A
+
+
+def entries_of_sum(
+    A: OpenMatrix,
+    factor: float,
+    B: OpenMatrix,
+) -> sp.csr_matrix:
+    """A + factor B."""
+    return (entries(A) + factor * entries(B)).tocsr()
+
+
+def chosen_rows(A: OpenMatrix, places: np.ndarray) -> sp.csr_matrix:
+    """(k, n_open) some rows."""
+    if isinstance(A, Selected):
+        return A.whole[A.chosen[places]][:, A.chosen].tocsr()
+    if isinstance(A, Repeated):
+        node, direction = np.divmod(places, A.dim)
+        rows = A.nodal[node]
+        columns = A.dim * rows.indices + np.repeat(direction, np.diff(rows.indptr))
+        return sp.csr_matrix((rows.data, columns, rows.indptr), (len(places), A.shape[1]))
+    return A[places].tocsr()
+
+
+def diagonal(A: OpenMatrix) -> np.ndarray:
+    """(n_open,)"""
+    if isinstance(A, Selected):
+        return np.asarray(A.whole.diagonal()[A.chosen])
+    if isinstance(A, Repeated):
+        return np.repeat(A.nodal.diagonal(), A.dim)
+    return np.asarray(A.diagonal())
+
+
+def times(A: OpenMatrix, X: np.ndarray) -> np.ndarray:
+    """A X for real or complex X (n_open, k)."""
+    if isinstance(A, Selected):
+        moved = np.zeros((A.whole.shape[0], X.shape[1]), X.dtype)
+        moved[A.chosen] = X
+        return _real_times_complex(A.whole, moved)[A.chosen]
+    if isinstance(A, Repeated):
+        by_node = X.reshape(A.nodal.shape[0], -1)
+        return _real_times_complex(A.nodal, by_node).reshape(X.shape)
+    return _real_times_complex(A, X)
+
+
+def _real_times_complex(A: sp.csr_matrix, X: np.ndarray) -> np.ndarray:
+    """Real sparse matrix times a complex block, without a complex copy of the matrix."""
+    if not np.iscomplexobj(X):
+        return np.asarray(A @ X)
+    X = np.ascontiguousarray(X)
+    return np.asarray((A @ X.view(float)).view(complex))

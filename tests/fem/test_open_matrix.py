@@ -1,0 +1,83 @@
+"""Matrices of open sectors that share memory are the matrices that they stand for."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from structured import sector
+
+from bladefem.fem.body import assemble
+from bladefem.fem.constraint import transformation
+from bladefem.fem.distributed import local_rows, shared_rows
+from bladefem.fem.linalg import recombine
+from bladefem.fem.open_matrix import (
+    Repeated,
+    Selected,
+    chosen_rows,
+    diagonal,
+    entries,
+    entries_of_sum,
+    times,
+)
+from bladefem.scene.tables import Material
+
+RNG = np.random.default_rng(3)
+WHOLE = sp.random(15, 15, 0.4, "csr", random_state=1)
+WHOLE = (WHOLE + WHOLE.T).tocsr()
+CHOSEN = np.array([0, 1, 2, 6, 7, 8, 9, 10, 11])
+NODAL = WHOLE[:3, :3]
+KINDS = {
+    "own": (WHOLE[CHOSEN][:, CHOSEN].tocsr(), WHOLE.toarray()[np.ix_(CHOSEN, CHOSEN)]),
+    "selected": (Selected(WHOLE, CHOSEN, None), WHOLE.toarray()[np.ix_(CHOSEN, CHOSEN)]),
+    "repeated": (Repeated(NODAL, 3), np.kron(NODAL.toarray(), np.eye(3))),
+}
+
+
+@pytest.fixture(scope="module")
+def body():
+    return assemble(sector(8, (4, 3, 2), "tetra10", bump=0.2), "blade", Material())
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("dtype", [float, complex])
+def test_every_kind_is_its_dense_matrix(kind, dtype):
+    A, dense = KINDS[kind]
+    X = RNG.standard_normal((9, 4)).astype(dtype)
+    if dtype is complex:
+        X = X + 1j * RNG.standard_normal((9, 4))
+    places = np.array([1, 5, 6])
+    assert A.shape == dense.shape
+    np.testing.assert_allclose(times(A, X), dense @ X, atol=1e-13)
+    np.testing.assert_array_equal(entries(A).toarray(), dense)
+    np.testing.assert_array_equal(chosen_rows(A, places).toarray(), dense[places])
+    np.testing.assert_array_equal(diagonal(A), dense.diagonal())
+    other, dense_other = KINDS["own"]
+    np.testing.assert_allclose(entries_of_sum(A, -2.0, other).toarray(), dense - 2 * dense_other)
+
+
+def test_the_stiffness_of_an_open_sector_is_the_body_s_own_memory(body):
+    opened = transformation(body, cyclic=True).opened
+    assert isinstance(opened.K, Selected)
+    assert isinstance(opened.M, Repeated)
+    assert np.shares_memory(opened.K.whole.data, shared_rows(body.K).data)
+    own = body.scalar_rows[opened.places]
+    for A, whole in ((opened.K, body.K), (opened.M, body.M)):
+        expected = local_rows(whole)[own][:, own]
+        assert abs(entries(A) - expected).max() <= 1e-14 * abs(expected).max()
+
+
+def test_shared_rows_are_the_matrix_and_cannot_be_written_to(body):
+    A = shared_rows(body.K)
+    assert abs(A - local_rows(body.K)).max() == 0
+    with pytest.raises(ValueError, match="read-only"):
+        A.data[0] = 1.0
+
+
+@pytest.mark.parametrize("dtype", [float, complex])
+def test_a_block_is_recombined_in_its_own_memory(dtype):
+    W = np.asfortranarray(RNG.standard_normal((9001, 5)).astype(dtype))
+    C = RNG.standard_normal((5, 3)).astype(dtype)
+    expected = W @ C
+    out = recombine(W, C)
+    np.testing.assert_allclose(out, expected, atol=1e-13)
+    assert np.shares_memory(out, W)
+    assert out.flags.f_contiguous
