@@ -196,15 +196,14 @@ def sweep(
     followed = yield from _close_in_maxima(
         model, solved, H, samples, (peak, curve), options, paths, notes
     )
-    if not followed:
-        return
-    points = list(solved.values())
-    found = find_branches(
-        model, band, points, H, samples, peak=peak, options=options, most_folds=most_folds
-    )
-    notes.extend(found.notes)
-    yield from found.points
-    yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)
+    if followed:
+        points = list(solved.values())
+        found = find_branches(
+            model, band, points, H, samples, peak=peak, options=options, most_folds=most_folds
+        )
+        notes.extend(found.notes)
+        yield from found.points
+        yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)
 
 
 def _crossed(branches: Branches, omega: float) -> bool:

@@ -79,11 +79,7 @@ def resonance_curve(
         NotSolvedError: no point converged.
     """
     settings = with_excited_harmonics(family, replace(settings, error=None))
-    points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
-    suited = _suited_to_lift_off(family, settings, peak_of(points))
-    if suited != settings:
-        settings = suited
-        points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
+    settings, points = _rough_curve(family, settings, band, mode)
     used, top = with_harmonics_of_stiff_layer(family, settings, peak_of(points), accuracy)
     swept = settings, 1.0
     notes: list[str] = []
@@ -117,6 +113,22 @@ def resonance_curve(
             break
         used = missed or used
     return Checked(used, points, found, tuple(notes), _parts(errors))
+
+
+def _rough_curve(
+    family: Family,
+    settings: Settings,
+    band: tuple[float, float] | None,
+    mode: int,
+) -> tuple[Settings, list[Solution]]:
+    """A rough sweep, and the settings that it was made with: others than those given where contacts
+    lift off at its peak and ask for them.
+    """
+    points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
+    suited = _suited_to_lift_off(family, settings, peak_of(points))
+    if suited == settings:
+        return settings, points
+    return suited, covered_band(family_member(family, suited).model, suited, band, mode, 1.0)
 
 
 def _parts(errors: PeakErrors | None) -> Mapping[str, float]:
