@@ -151,7 +151,7 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
     if curve.marched_instead:
-        lost += f"; the amplitude given, {1e6 * curve.peak_amplitude:.4g} um, is of a march"
+        lost += "; the amplitude given is that of a march from there"
     elif curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
         lost += "; it is given as the resonance"
     elif curve.keeps_unstable:
