@@ -129,7 +129,9 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     marched = SimpleNamespace(
         **vars(rippling(far)) | {"marched_instead": True, "peak_amplitude": 1.2e-3}
     )
-    assert "; the amplitude given is that of a march from there; " in unstable_sentence(marched, 0.05)
+    assert "; the amplitude given is that of a march from there; " in unstable_sentence(
+        marched, 0.05
+    )
 
 
 def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
