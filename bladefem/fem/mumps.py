@@ -19,11 +19,13 @@ from .compat import PETSc, no_error_messages
 
 # columns a solve: MUMPS works on them by matrix products, 256 are no faster
 COLUMNS_PER_SOLVE = 128
-# per cent of memory beyond MUMPS's own estimate
-EXTRA_MEMORY_PERCENT = 40
+# per cent of memory beyond MUMPS's own estimate, tried one after the other
+EXTRA_MEMORY_PERCENTS = (40, 200)
 # the same where nothing is pivoted and one rank does it all, as MUMPS itself sets it: the estimate
-# is nearly exact, and what is beyond is written to for a while
-EXACT_MEMORY_PERCENT = 5
+# is nearly exact, and what is beyond is written to for a while; too little for some small matrices
+EXACT_MEMORY_PERCENTS = (5, *EXTRA_MEMORY_PERCENTS)
+# INFOG(1) where the room that MUMPS took by its own estimate ended, of integers or of numbers
+ESTIMATE_EXCEEDED = (-8, -9)
 # MATOP_LUFACTOR_SYMBOLIC
 SYMBOLIC_FACTORISATION = 25
 # share of non-zero rows below which a right-hand side counts as sparse
@@ -72,24 +74,20 @@ def factorise_matrix(
     """
     A.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     A.setOption(PETSc.Mat.Option.SPD, definite)
-    pc = _prepare_solver(A, PETSc.PC.Type.CHOLESKY)
-    F = pc.getFactorMatrix()
     exact = definite and A.comm.size == 1
-    F.setMumpsIcntl(14, EXACT_MEMORY_PERCENT if exact else EXTRA_MEMORY_PERCENT)
-    if on_disk and keep:
-        F.setMumpsIcntl(22, 1)
-    if not definite:
-        # the last block is counted too
-        F.setMumpsIcntl(13, 1)
-        F.setMumpsIcntl(24, 1)
-    if not keep:
-        F.setMumpsIcntl(31, 1)
-        # scaling costs as much as a fifth of the elimination, and changes no sign
-        F.setMumpsIcntl(8, 0)
-    if schur is not None:
-        index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
-        petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
-    _factorise_numeric(F, A.size[0], pc.setUp if order is None else lambda: _in_order(F, A, order))
+    for percent in EXACT_MEMORY_PERCENTS if exact else EXTRA_MEMORY_PERCENTS:
+        pc = _prepare_solver(A, PETSc.PC.Type.CHOLESKY)
+        F = pc.getFactorMatrix()
+        _set_controls(F, percent, definite, keep, on_disk)
+        if schur is not None:
+            index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
+            petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
+        failed = _factorise_numeric(pc.setUp if order is None else lambda: _in_order(F, A, order))
+        if F.getMumpsInfog(1) not in ESTIMATE_EXCEEDED:
+            break
+    code = F.getMumpsInfog(1)
+    if failed or code < 0:
+        raise NotSolvedError(_failure_reason(code, F.getMumpsInfog(2), A.size[0]))
     # and with it PETSc's hold on A
     pc.destroy()
     negative = F.getMumpsInfog(12)
@@ -250,21 +248,37 @@ def _in_order(
         made.destroy()
 
 
-def _factorise_numeric(
+def _set_controls(
     F: PETSc.Mat,
-    size: int,
-    factorise: Callable[[], None],
+    percent: int,
+    definite: bool,
+    keep: bool,
+    on_disk: bool,
 ) -> None:
-    """Factorise; failures become one sentence."""
-    failed = False
+    """MUMPS's settings for one factorisation, see ``factorise_matrix`` (users' guide 5.5, section
+    6).
+    """
+    F.setMumpsIcntl(14, percent)
+    if on_disk and keep:
+        F.setMumpsIcntl(22, 1)
+    if not definite:
+        # the last block is counted too
+        F.setMumpsIcntl(13, 1)
+        F.setMumpsIcntl(24, 1)
+    if not keep:
+        F.setMumpsIcntl(31, 1)
+        # scaling costs as much as a fifth of the elimination, and changes no sign
+        F.setMumpsIcntl(8, 0)
+
+
+def _factorise_numeric(factorise: Callable[[], None]) -> bool:
+    """Factorise; whether PETSc complained."""
     try:
         with no_error_messages():
             factorise()
     except (PETSc.Error, NotSolvedError):
-        failed = True
-    code = F.getMumpsInfog(1)
-    if failed or code < 0:
-        raise NotSolvedError(_failure_reason(code, F.getMumpsInfog(2), size))
+        return True
+    return False
 
 
 def _failure_reason(

@@ -1,5 +1,6 @@
 """What MUMPS cannot do becomes one sentence, with its own code in it."""
 
+import numpy as np
 import pytest
 from structured import box
 
@@ -23,11 +24,29 @@ def test_out_of_memory(bar, monkeypatch):
     """A workspace below MUMPS's own estimate: the code of a real machine without memory is among
     the same.
     """
-    monkeypatch.setattr(mumps, "EXTRA_MEMORY_PERCENT", -95)
+    monkeypatch.setattr(mumps, "EXTRA_MEMORY_PERCENTS", (-95,))
+    monkeypatch.setattr(mumps, "EXACT_MEMORY_PERCENTS", (-97, -95))
     with pytest.raises(
         NotSolvedError, match=r"memory ran out.* fewer unknowns \(INFOG\(1\) = -\d+"
     ):
         flexible(bar)
+
+
+def test_estimate_exceeded(bar, monkeypatch):
+    """Where the room by MUMPS's estimate is too little, as on some small matrices, it gets more."""
+    load = np.ones(bar.K.size[0])[:, None]
+    usual = mumps.solve_matrix(mumps.factorise_matrix(bar.K, True), load)
+    given = []
+    real = mumps._set_controls
+    monkeypatch.setattr(
+        mumps,
+        "_set_controls",
+        lambda F, percent, *rest: given.append(percent) or real(F, percent, *rest),
+    )
+    monkeypatch.setattr(mumps, "EXACT_MEMORY_PERCENTS", (-95, 40))
+    again = mumps.solve_matrix(mumps.factorise_matrix(bar.K, True), load)
+    assert given == [-95, 40]
+    np.testing.assert_array_equal(again, usual)
 
 
 @pytest.mark.parametrize(
