@@ -8,6 +8,10 @@ from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .peak import Peak
 from .peak_levels import PeakSearch
 
+# ratio of the heights at the ends of a bracket beyond which it is halved: a cubic between 1649 um
+# and 171 um, from one branch of a design chart to the other, hides a minimum or makes one up
+MAX_HEIGHT_RATIO = 3.0
+
 
 def bracket_minimum(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:
     """The lowest height tried and its neighbour downhill, which is no lower: a minimum lies
@@ -33,13 +37,15 @@ def next_value(
     lower end.
 
     The cubic sees smooth minima, the tangents corners, where two peaks exchange their order; of two
-    minima in a bracket neither can be trusted, and it is halved.
+    minima in a bracket neither can be trusted, nor either curve between very different heights:
+    the bracket is halved then.
     """
     width = search.width(low.value, high.value)
     down = low.slope * width
     up = high.slope * width
     rise = high.height - low.height
-    if not down < 0 <= up:
+    unlike = max(low.height, high.height) > MAX_HEIGHT_RATIO * min(low.height, high.height)
+    if unlike or not down < 0 <= up:
         return search.moved(low.value, width / 2), np.inf
     meet, corner = tangents_meet(down, up, rise)
     smooth, bottom = cubic_minimum(down, up, rise)

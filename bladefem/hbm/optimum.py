@@ -34,7 +34,8 @@ from .solver.newton import DEFAULT_OPTIONS, Options
 
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
-# factor by which a step is shortened where no peak was solved at its end, and how often at most
+# factor by which a step is shortened where no peak was solved at its end, also inside a bracket, and
+# how often at most
 SHORTENING_FACTOR = 3.0
 MOST_SHORTENED = 3
 # first step, as a share of the range (of a factor: of its logarithm)
@@ -205,12 +206,15 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
     shortened = 0
     for _ in range(MOST_LEVELS):
         low, high = bracket_minimum(highest_peaks(levels))
-        enclosed = low is not None and high is not None
         if low is not None and high is not None:
             value, gain = next_value(search, low, high, narrow)
             if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
                 return points
             narrow = not narrow
+            # nearer to the lower end where a load inside was not solved
+            best = min((low, high), key=lambda peak: peak.height)
+            share = SHORTENING_FACTOR**-shortened
+            value = search.moved(best.value, share * search.width(best.value, value))
         else:
             end, sign = (low, 1.0) if high is None else (high, -1.0)
             # the lowest peak itself is one of the two
@@ -222,7 +226,7 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
             levels[value], count = solve_level(search, value, nearby_peaks(levels, value))
         except NotSolvedError:
             shortened += 1
-            if enclosed or shortened > MOST_SHORTENED:
+            if shortened > MOST_SHORTENED:
                 raise
             step /= SHORTENING_FACTOR
             continue

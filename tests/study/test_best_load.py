@@ -9,9 +9,12 @@ import pytest
 
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import optimum as optimum_module
+from bladefem.hbm.next_parameter import next_value
 from bladefem.hbm.optimum import lowest_peak, optimum
 from bladefem.hbm.peak import find_peak
+from bladefem.hbm.peak_levels import PeakSearch
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.report.best_load import best_load_table, reasons_against
 from bladefem.report.statements import response_answer
 from bladefem.scene.toml import load_scene
@@ -77,21 +80,46 @@ def test_a_search_near_a_known_load_looks_farther_where_that_was_wrong(best):
         assert again.amplitude == pytest.approx(best.amplitude, rel=3 * best.tolerance)
 
 
-@pytest.mark.parametrize("failures", [1, 2])
+@pytest.mark.parametrize("failures", [{1}, {1, 2}, {2}, {3}])
 def test_a_step_to_a_load_without_a_solved_peak_is_shortened(best, monkeypatch, failures):
+    """Also where the first one, or another, already lies between loads that enclose the best one."""
     solve_level = optimum_module.solve_level
     tried = []
 
     def sometimes(search, value, near):
         tried.append(value)
-        if len(tried) <= failures:
+        if len(tried) in failures:
             raise NotSolvedError("no peak")
         return solve_level(search, value, near)
 
     monkeypatch.setattr(optimum_module, "solve_level", sometimes)
     found = find_best_load(scene(), case_at, family, SETTINGS, None)
-    assert found.reason == "" and len(tried) > failures
+    assert found.reason == "" and len(tried) > max(failures)
     assert found.amplitude == pytest.approx(best.amplitude, rel=3 * best.tolerance)
+
+
+def test_a_bracket_between_very_different_heights_is_halved(best):
+    """No cubic is laid from one branch of a design chart to the other: it makes up a minimum next
+    to the lower end, or hides one.
+    """
+    along = load_variation(case_at, family, SETTINGS)
+    search = PeakSearch(along, (HZ * 1150, HZ * 1450), 3, 0, (0.5, 5.0), 1e-3, DEFAULT_OPTIONS)
+    peak = find_peak(along.model_at(best.load), HZ * best.frequency, 3, 0)
+    low = replace(peak, value=1.0, height=10.0, slope=-6.5)
+    high = replace(peak, value=4.0, height=1.0, slope=0.2)
+    value, gain = next_value(search, low, high, tangents=False)
+    assert value == pytest.approx(2.0) and gain == np.inf
+    value, gain = next_value(search, replace(low, height=2.0, slope=-1.0), high, tangents=False)
+    assert 2.0 < value < 4.0 and np.isfinite(gain)
+
+
+def test_a_search_that_is_too_large_is_not_made(best, monkeypatch):
+    """It ends where the last one did, with the error that the richer settings show."""
+    monkeypatch.setattr(best_load_module, "_too_large_to_search", lambda *richer: True)
+    poor = replace(SETTINGS, harmonics=1, samples=64, chosen=("harmonics", "samples"))
+    found = find_best_load(scene(), case_at, family, poor, None)
+    assert found.reason == "" and found.settings.harmonics == 1
+    assert abs(found.amplitude / best.amplitude - 1) < 2 * found.settings.error
 
 
 def test_a_search_without_any_solved_neighbour_says_so(monkeypatch):
