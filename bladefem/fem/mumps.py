@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -82,7 +83,8 @@ def factorise_matrix(
         if schur is not None:
             index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
             petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
-        failed = _factorise_numeric(pc.setUp if order is None else lambda: _in_order(F, A, order))
+        in_order = None if order is None else partial(_in_order, F, A, order)
+        failed = _factorise_numeric(in_order or pc.setUp)
         if F.getMumpsInfog(1) not in ESTIMATE_EXCEEDED:
             break
     code = F.getMumpsInfog(1)

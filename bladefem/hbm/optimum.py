@@ -34,8 +34,8 @@ from .solver.newton import DEFAULT_OPTIONS, Options
 
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
-# factor by which a step is shortened where no peak was solved at its end, also inside a bracket, and
-# how often at most
+# factor by which a step is shortened where no peak was solved at its end, also inside a bracket,
+# and how often at most
 SHORTENING_FACTOR = 3.0
 MOST_SHORTENED = 3
 # first step, as a share of the range (of a factor: of its logarithm)

@@ -2,6 +2,10 @@
 
 The pinned numbers stand on gmsh 4.15.2; another mesher may move them a little, hence 0.5 % against
 the pin and 1e-8 between rank counts. Remake them with: BLADEFEM_COARSE=1 ./run demos/NAME.py
+
+The same mesher moves them from one processor to another, by the last digits of its mathematics
+(6805 points and 6811 for one scene with and without fused multiplication). What hangs on a coarse
+mesh is therefore held to what meshes of this size leave open, BETWEEN_MESHES.
 """
 
 from __future__ import annotations
@@ -25,6 +29,11 @@ PINNED = {
     "own_blade": 12.99114303,
 }
 
+# relative; measured with element sizes of 10, 9, ... 4 mm: 1.2719, 1.2731, 1.2620, 1.2545, 1.2618,
+# 1.2664 and 1.2691 (1.2726, 1.2641, 1.2607 without fused multiplication); 178.57 and 178.60 um,
+# with an estimated error of 12 %
+BETWEEN_MESHES = {"change_geometry": 1.5e-2, "forced_response": 1.5e-2}
+
 
 def final_number(name: str, ranks: int) -> float:
     """The last number that a demo prints."""
@@ -43,6 +52,6 @@ def final_number(name: str, ranks: int) -> float:
 @pytest.mark.parametrize("name", PINNED)
 def test_demo_ends_in_its_number_on_any_number_of_ranks(name: str) -> None:
     alone = final_number(name, 1)
-    assert alone == pytest.approx(PINNED[name], rel=5e-3)
+    assert alone == pytest.approx(PINNED[name], rel=BETWEEN_MESHES.get(name, 5e-3))
     for ranks in (2, 4):
         assert final_number(name, ranks) == pytest.approx(alone, rel=1e-8)

@@ -86,7 +86,7 @@ def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(mo
     judged = alone.verdict != UNKNOWN
     assert judged.sum() == 1
     said = stability_sentence([(alone.verdict, alone.multiplier)])
-    assert f"{(~judged).sum()} not judged (of curves whose verdicts" in said
+    assert f"{(~judged).sum()} not judged (where the verdicts on a curve" in said
 
 
 def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
