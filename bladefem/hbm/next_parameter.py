@@ -10,7 +10,7 @@ from .peak_levels import PeakSearch
 
 # ratio of the heights at the ends of a bracket beyond which it is halved: a cubic between 1649 um
 # and 171 um, from one branch of a design chart to the other, hides a minimum or makes one up
-MAX_HEIGHT_RATIO = 3.0
+MAX_HEIGHT_RATIO = 6.0
 
 
 def bracket_minimum(tried: list[Peak]) -> tuple[Peak | None, Peak | None]:

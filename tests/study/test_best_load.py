@@ -113,13 +113,33 @@ def test_a_bracket_between_very_different_heights_is_halved(best):
     assert 2.0 < value < 4.0 and np.isfinite(gain)
 
 
-def test_a_search_that_is_too_large_is_not_made(best, monkeypatch):
-    """It ends where the last one did, with the error that the richer settings show."""
-    monkeypatch.setattr(best_load_module, "_too_large_to_search", lambda *richer: True)
+def test_a_search_that_is_too_large_is_made_with_less(best, monkeypatch):
+    """It ends where that does, with the error that the richer settings show."""
+
+    def too_large(family, settings):
+        return settings.harmonics > 3
+
+    monkeypatch.setattr(best_load_module, "_too_large_to_search", too_large)
+    monkeypatch.setattr(best_load_module, "_lifts", lambda peak: True)
     poor = replace(SETTINGS, harmonics=1, samples=64, chosen=("harmonics", "samples"))
-    found = find_best_load(scene(), case_at, family, poor, None)
-    assert found.reason == "" and found.settings.harmonics == 1
-    assert abs(found.amplitude / best.amplitude - 1) < 2 * found.settings.error
+    found = find_best_load(replace(scene(), accuracy=1e-4), case_at, family, poor, None)
+    assert found.reason == "" and found.settings.harmonics == 3
+    assert abs(found.amplitude / best.amplitude - 1) < 2 * found.settings.error + best.tolerance
+
+
+def test_less_means_fewer_contact_points_first(best, monkeypatch):
+    """And what the scene gives stays."""
+
+    def too_large(family, settings):
+        return settings.points * (2 * settings.harmonics + 1) > 40
+
+    monkeypatch.setattr(best_load_module, "_too_large_to_search", too_large)
+    rich = replace(SETTINGS, harmonics=15, points=16, chosen=("harmonics", "points"))
+    less = best_load_module._smaller_settings
+    assert less(family, rich, lifts=True) == replace(rich, harmonics=3, points=4)
+    assert less(family, rich, lifts=False) == rich
+    given = replace(rich, chosen=("harmonics",))
+    assert less(family, given, lifts=True) == replace(given, harmonics=3)
 
 
 def test_a_search_without_any_solved_neighbour_says_so(monkeypatch):

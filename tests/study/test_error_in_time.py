@@ -28,13 +28,14 @@ def hopping():
     return replace(model, excitation={1: STRONGER * model.excitation[1]})
 
 
-def in_halves():
-    """`hopping` with its contact in two halves at one place."""
+def in_parts(count):
+    """`hopping` with its contact in so many equal parts at one place."""
     K = np.array([[2.0, -0.3, 0.1], [-0.3, 1.5, 0.2], [0.1, 0.2, 1.2]])
-    ports = {"contact": [0, 1, 2, 0, 1, 2], "load": [0, 1], "probe": [0]}
+    ports = {"contact": [0, 1, 2] * count, "load": [0, 1], "probe": [0]}
     body = port_model_from_matrices(np.eye(3), K, ports, C=0.02 * K)
-    halves = Elements(*(np.full(2, x) for x in (0.5, 1.0, 0.4, 0.075)), tangents=2)
-    return ReducedModel((body,), halves, {1: STRONGER * np.array([0.1, 0.08j])})
+    kt, kn, mu, n0 = 1.0 / count, 2.0 / count, 0.4, 0.15 / count
+    parts = Elements(*(np.full(count, x) for x in (kt, kn, mu, n0)), tangents=2)
+    return ReducedModel((body,), parts, {1: STRONGER * np.array([0.1, 0.08j])})
 
 
 def settings_of(error, **given):
@@ -69,8 +70,10 @@ def test_an_error_that_balances_tell_as_well_is_left(error):
     assert error_in_time(Marches(family), curve, top, 0.012) is None
 
 
-def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points():
-    family = family_of(in_halves(), [2])
+@pytest.mark.parametrize(("nodes", "counted"), [(2, 1.0), (4, 2.0)])
+def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points(nodes, counted):
+    """Which counts twice where there are more of them still."""
+    family = family_of(in_parts(nodes), [nodes])
     coarse = settings_of(np.inf, points=1)
     top = solve(family_member(family, coarse).model, OMEGA, 3, 64)
     truth = abs(size(top) / size(solve(hopping(), OMEGA, 31, 512)) - 1)
@@ -79,6 +82,6 @@ def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points():
     assert moved.f.shape[0] == 2 and not moved.converged
     found = error_in_time(Marches(family), Checked(coarse, [], {}), top, 0.05)
     assert found.band.points == 2
-    assert found.error == pytest.approx(truth, abs=2e-3)
-    every = replace(coarse, points=2)
+    assert found.error == pytest.approx(counted * truth, abs=counted * 2e-3)
+    every = replace(coarse, points=nodes)
     assert error_in_time(Marches(family), Checked(every, [], {}), moved, 0.05) is None

@@ -52,6 +52,8 @@ FIRST_SEARCH = {"harmonics": 3, "points": 8}
 # minutes and end without a solution; 7 harmonics on 4 points (360) take 12 s, and end 5 % above a
 # march in time
 MAX_SEARCH_UNKNOWNS = 1400
+# the fewest that such a search is left with
+FEWEST_SEARCHED = {"points": 4, "harmonics": 3}
 # range of a search on each side of a load that is known to be near the best, as a factor
 REPEATED_RANGE = 4.0
 
@@ -153,7 +155,7 @@ def _repeated_search(
     bounds = searched if start is None else _near(start, searched)
     known = None
     points = 0
-    for _ in range(MAX_SEARCHES):
+    for left in reversed(range(MAX_SEARCHES)):
         found = _search(scene, case_at, family_of, settings, bounds, start, known)
         points += found.points
         if found.value in bounds and bounds != searched:
@@ -167,26 +169,51 @@ def _repeated_search(
         richer, peak, _ = choose_at_peak(
             family, settings, found.peak, scene.accuracy, fixed=("modes",), sufficient=1.0
         )
-        if _too_large_to_search(family, richer, peak):
+        next_one = _smaller_settings(family, richer, _lifts(peak))
+        smaller = next_one != richer
+        if smaller and (not left or _same(next_one, settings)):
             settings = _with_change_between(settings, found.peak, richer, peak)
             break
-        enough = replace(richer, error=settings.error) == settings
-        settings = richer
+        enough = _same(richer, settings)
+        settings = next_one
         found = replace(found, peak=peak)
         if enough:
             break
         start = found.value
-        known = peak
+        known = None if smaller else peak
         bounds = _near(start, searched)
     return replace(found, points=points), settings
 
 
-def _too_large_to_search(family: Family, settings: Settings, peak: Peak) -> bool:
-    """A search with these settings is not worth its time."""
-    if not peak.solution.states["lift"]:
-        return False
+def _same(one: Settings, other: Settings) -> bool:
+    """But for their errors."""
+    return replace(one, error=None) == replace(other, error=None)
+
+
+def _lifts(peak: Peak) -> bool:
+    """Contacts lift off at a resonance."""
+    return bool(peak.solution.states["lift"])
+
+
+def _smaller_settings(family: Family, settings: Settings, lifts: bool) -> Settings:
+    """The settings with fewer contact points, then fewer harmonics, until a search with them is
+    worth its time where contacts lift off; of what the scene leaves open.
+    """
+    for name, fewest in FEWEST_SEARCHED.items():
+        # 15 harmonics become 7, 16 points 8
+        while lifts and name in settings.chosen and _too_large_to_search(family, settings):
+            now = getattr(settings, name) or fewest
+            fewer: dict[str, Any] = {name: max(fewest, now // 2)}
+            if fewer[name] >= now:
+                break
+            settings = replace(settings, error=None, **fewer)
+    return settings
+
+
+def _too_large_to_search(family: Family, settings: Settings) -> bool:
+    """A search with these settings is not worth its time where contacts lift off."""
     springs = family_member(family, settings).model.springs.size
-    return springs * (2 * settings.harmonics + 1) > MAX_SEARCH_UNKNOWNS
+    return bool(springs * (2 * settings.harmonics + 1) > MAX_SEARCH_UNKNOWNS)
 
 
 def _with_change_between(

@@ -29,6 +29,9 @@ from .stability import in_one_body, model_in_time
 
 # relative, of an error that was summed twice
 ROUNDING = 1e-9
+# error over the change by twice the contact points, where there are more of them still: on the
+# shipped wedge under 18 N 8 points change the 1251 um with 4 by 8.7 %, all of them by 17 %
+ERROR_OVER_CHANGE = 2.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +100,10 @@ def error_in_time(
     if band is None or band.reason:
         return None
     error = MarchedBand(band.lowest, band.highest).farthest(size(top))
-    error += left if known else 0.0
+    if known:
+        error += left
+    elif _finer_settings(models, settings) is not None:
+        error *= ERROR_OVER_CHANGE
     # a march that the harmonics were chosen by tells the same
     if error > told * (1 + ROUNDING):
         return None

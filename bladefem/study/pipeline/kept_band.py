@@ -38,8 +38,11 @@ MAX_STEPS = 4e6
 # the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
 # 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N
 MAX_MARCH = 1e11
-# and of those that its first periods show to be needed, some 10 s
+# and of those that its first periods show to be needed, some 10 s; twice of it where no fewer
+# contact points are left to march with: the shipped wedge with ground faces needs 7e10 under
+# 1100 N
 MAX_COUNTED = 6e10
+MAX_COUNTED_LAST = 1.2e11
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
@@ -132,12 +135,14 @@ def _kept_with(
 ) -> KeptBand:
     """What the blade keeps to after an unstable motion, marched with other contact points."""
     model = model_in_time(models, fewer)
+    last = fewer.points is None or fewer.points <= FEWEST_POINTS
+    counted = MAX_COUNTED_LAST if last else MAX_COUNTED
     if fewer == settings:
-        return kept_band(model, point)
+        return kept_band(model, point, counted)
     moved = moved_solution(models, settings, point, fewer)
     if not moved.converged:
         return _unknown_band(point, "its motion with fewer contact points was not solved")
-    band = kept_band(model, moved)
+    band = kept_band(model, moved, counted)
     ratio = size(point) / size(moved)
     return replace(
         band, lowest=ratio * band.lowest, highest=ratio * band.highest, points=fewer.points
@@ -152,12 +157,16 @@ def affordable_march(model: ReducedModel) -> bool:
         return True
 
 
-def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
-    """The band of amplitudes that the model keeps to after an unstable motion."""
+def kept_band(model: ReducedModel, point: Solution, counted: float = MAX_COUNTED) -> KeptBand:
+    """The band of amplitudes that the model keeps to after an unstable motion.
+
+    Args:
+        counted: operations that a march by steps may need, as its first periods show.
+    """
     try:
         system = time_system(in_one_body(model), point.harmonics)
     except InputError:
-        return band_by_steps(model, point)
+        return band_by_steps(model, point, counted)
     periods = LEFT_PERIODS + KEPT_PERIODS
     steps = periods * max(SAMPLES_PER_PERIOD, 2 * np.pi * system.fastest / point.omega)
     if steps > MAX_STEPS:
@@ -172,7 +181,11 @@ def kept_band(model: ReducedModel, point: Solution) -> KeptBand:
     return _band_of(point, motion, periods)
 
 
-def band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
+def band_by_steps(
+    model: ReducedModel,
+    point: Solution,
+    counted: float = MAX_COUNTED,
+) -> KeptBand:
     """The same with two tangents, and for travelling waves.
 
     Marched again with more instants where the blade seems to leave the motion at the start, and
@@ -182,7 +195,7 @@ def band_by_steps(model: ReducedModel, point: Solution) -> KeptBand:
     band = _unknown_band(point, "nothing was marched")
     for instants in INSTANTS_BY_STEPS:
         try:
-            found, resolved = _band_with(model, point, instants, *periods)
+            found, resolved = _band_with(model, point, instants, *periods, counted)
         except (InputError, NotSolvedError) as error:
             return _unknown_band(point, str(error))
         if found.reason:
@@ -218,14 +231,15 @@ def _band_with(
     instants: int,
     left: int,
     kept: int,
+    counted: float,
 ) -> tuple[KeptBand, bool]:
     """The band by so many instants a period, and whether steps were short enough for forces that
     are linear in them.
     """
     enough = partial(_known_enough, point, instants)
-    march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants, enough, MAX_COUNTED)
-    if march.operations > MAX_COUNTED:
-        reason = f"a march takes {march.operations:.1g} operations, at most {MAX_COUNTED:.0e}"
+    march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants, enough, counted)
+    if march.operations > counted:
+        reason = f"a march takes {march.operations:.1g} operations, at most {counted:.2g}"
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
     if not (march.settled and np.isfinite(march.motion).all()):
         reason = "the contact forces of a step of the march were not found"
