@@ -21,9 +21,11 @@ from .next_parameter import bracket_minimum, next_value
 from .parameters import check_parameter, parameter_value, path_coordinate, vary
 from .peak import Peak, with_slope
 from .peak_levels import (
+    SAME_PEAK_LOSS,
     PeakSearch,
     Variation,
     add_peak,
+    estimated_height,
     highest_peaks,
     look_over_band,
     nearby_peaks,
@@ -209,7 +211,11 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
         if low is not None and high is not None:
             value, gain = next_value(search, low, high, narrow)
             if gain < search.tolerance or search.width(low.value, high.value) < search.finest:
-                return points
+                higher, count = higher_from_neighbours(search, levels)
+                points += count
+                if not higher:
+                    return points
+                continue
             narrow = not narrow
             # nearer to the lower end where a load inside was not solved
             best = min((low, high), key=lambda peak: peak.height)
@@ -235,6 +241,35 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
     raise NotSolvedError(
         f"optimum of {search.name} not closed in with {MOST_LEVELS} values, last at {value:.4g}"
     )
+
+
+def higher_from_neighbours(
+    search: PeakSearch,
+    levels: dict[float, list[Peak]],
+) -> tuple[bool, int]:
+    """Whether the lowest level misses a peak that its neighbours have, which is added to it; and
+    the points spent.
+
+    Where peaks of a band are many, 78 um under 50 N and 129 um under 49.9 N are two of them. Where
+    the higher one ends between the two loads, at a fold, following it meets none.
+    """
+    best = min(highest_peaks(levels), key=lambda peak: peak.height)
+    spent = 0
+    for value in neighbour_values(levels, best.value):
+        if value is None:
+            continue
+        top = max((p for p in levels[value] if p.value == value), key=lambda peak: peak.height)
+        if estimated_height(search, top, best.value) < (1 + SAME_PEAK_LOSS) * best.height:
+            continue
+        model = search.along.model_at(best.value)
+        with suppress(NotSolvedError):
+            peak = search.peak(model, top.omega, top)
+            spent += peak.points
+            if search.inside(peak) and peak.height > (1 + SAME_PEAK_LOSS) * best.height:
+                found = search.along.with_slope(model, peak, best.value)
+                levels[best.value] = add_peak(found, levels[best.value])
+                return True, spent
+    return False, spent
 
 
 def _widen(search: PeakSearch, levels: dict[float, list[Peak]], height: float) -> int:

@@ -174,8 +174,8 @@ def solve_level(
     model = search.along.model_at(value)
     found: list[Peak] = []
     points = 0
-    for old in sorted(known, key=lambda peak: -_estimated_height(search, peak, value)):
-        if found and _estimated_height(search, old, value) < SOLVED_HEIGHT_SHARE * max(
+    for old in sorted(known, key=lambda peak: -estimated_height(search, peak, value)):
+        if found and estimated_height(search, old, value) < SOLVED_HEIGHT_SHARE * max(
             peak.height for peak in found if peak.value == value
         ):
             found.append(old)
@@ -197,7 +197,7 @@ def solve_level(
     return [met], points + count
 
 
-def _estimated_height(
+def estimated_height(
     search: PeakSearch,
     peak: Peak,
     value: float,

@@ -10,13 +10,14 @@ from bladefem.data import Elements
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import peak as peak_module
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.hbm.optimum import lowest_peak, optimum
+from bladefem.hbm.optimum import higher_from_neighbours, lowest_peak, optimum
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak, with_slope
-from bladefem.hbm.peak_levels import Variation
+from bladefem.hbm.peak_levels import PeakSearch, Variation
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.hbm.sweep import response
 from bladefem.reduction.matrices import port_model_from_matrices
 
@@ -122,6 +123,29 @@ def test_optima_of_light_and_heavy_dampers(kt, mass, band, height):
     assert best.peak.height == pytest.approx(
         height, rel=0.015
     )  # two peaks less than 2 % apart count as one
+
+
+def test_a_level_that_missed_a_peak_gets_it_from_its_neighbour():
+    """Two peaks: that of the blade that slips is 25 times as high as that of the stuck one."""
+    along = Variation(
+        lambda factor: vary(reference_model(2e7, 0.06, 1.0, harmonics=3), "load", factor),
+        lambda changed, peak, factor: with_slope(changed, peak, "load", factor),
+    )
+    search = PeakSearch(along, (HZ * 900, HZ * 1400), 3, 128, (0.1, 20.0), 1e-3, DEFAULT_OPTIONS)
+
+    def peak_at(value, frequency):
+        model = along.model_at(value)
+        return along.with_slope(model, search.peak(model, HZ * frequency), value)
+
+    low, high, known = peak_at(0.5, 1114), peak_at(0.499, 1236), peak_at(0.5, 1236)
+    assert known.height > 10 * low.height
+    levels = {0.5: [low], 0.499: [high]}
+    higher, points = higher_from_neighbours(search, levels)
+    assert higher and points > 0
+    top = max(levels[0.5], key=lambda peak: peak.height)
+    assert top.value == 0.5 and top.height == pytest.approx(known.height, rel=2e-3)
+    # neighbours that agree ask for nothing
+    assert higher_from_neighbours(search, levels) == (False, 0)
 
 
 def highest(model, band, count=101):
