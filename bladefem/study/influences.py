@@ -398,7 +398,9 @@ class _Study:
             self.best.mass,
             start=one.predicted[end, 0],
         )
-        reason = f"{name} times {factor:.3g}: {found.reason}" if found.reason else ""
+        # of a point that was not solved: one of several attempts tells enough here
+        first = found.reason.split("; ")[0]
+        reason = f"{name} times {factor:.3g}: {first}" if first else ""
         return np.array([found.load, found.amplitude, found.frequency]), reason
 
 

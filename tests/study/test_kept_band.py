@@ -264,6 +264,7 @@ def test_fewer_points_are_marched_where_all_take_too_long(monkeypatch):
 
     monkeypatch.setattr(module, "_kept_with", kept)
     monkeypatch.setattr(module, "model_in_time", lambda *_: None)
+    monkeypatch.setattr(module, "settings_in_time", lambda _, settings: settings)
     monkeypatch.setattr(module, "affordable_march", lambda _: True)
     settings = replace(first_for(3), points=32)
     assert module.kept_of_family(None, settings, None).points == 8

@@ -23,7 +23,12 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.loads import curve_of
-from bladefem.study.pipeline.stability import in_one_body, stability_of
+from bladefem.study.pipeline.stability import (
+    MODES_IN_TIME,
+    in_one_body,
+    settings_in_time,
+    stability_of,
+)
 from bladefem.study.pipeline.stability_remarks import (
     ripple_sentence,
     stability_sentence,
@@ -153,3 +158,18 @@ def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
     assert marched.error == pytest.approx(replace(again, kept=None).error + 0.2)
     assert not replace(again, unstable_peak=None).keeps_unstable
     assert not replace(again, unstable_peak=replace(again.peak, omega=1.0)).keeps_unstable
+
+
+@pytest.mark.parametrize(
+    ("chosen", "now", "known", "expected"),
+    [
+        (("modes",), 10, 60, MODES_IN_TIME),
+        (("modes",), 10, 12, 12),
+        (("modes",), 40, 60, 40),
+        ((), 3, 60, 3),
+    ],
+)
+def test_marches_have_modes_that_the_resonance_does_not_need(chosen, now, known, expected):
+    """As many as there are, and never other than a scene says."""
+    settings = replace(first_for(known), modes=now, chosen=chosen)
+    assert settings_in_time(SimpleNamespace(modes=known), settings).modes == expected

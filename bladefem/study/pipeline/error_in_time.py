@@ -25,7 +25,7 @@ from ..adaptive.choice_in_time import COVERED_IN_TIME, MarchedBand
 from ..adaptive.family import Family, Member, carried_displacements, family_member
 from ..adaptive.settings import Settings
 from .kept_band import KeptBand, affordable_march, band_by_steps
-from .stability import in_one_body, model_in_time
+from .stability import in_one_body, model_in_time, settings_in_time
 
 # relative, of an error that was summed twice
 ROUNDING = 1e-9
@@ -48,7 +48,7 @@ class Marches:
         """
         key = replace(settings, error=None), point.omega, size(point)
         if key not in self.done:
-            model = model_in_time(self.models, settings)
+            model = model_in_time(self.models, settings_in_time(self.models, settings))
             if not _marched_by_steps(model, point):
                 return None
             self.done[key] = band_by_steps(model, point)

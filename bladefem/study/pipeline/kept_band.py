@@ -24,7 +24,7 @@ from ...time.event_integrator import State, integrate_periods
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution
 from ..adaptive.settings import Settings
-from .stability import in_one_body, model_in_time
+from .stability import in_one_body, model_in_time, settings_in_time
 
 # disturbance of the unstable motion at the start, relative
 DISTURBANCE_SHARE = 1e-3
@@ -119,7 +119,7 @@ def kept_of_family(models: Family, settings: Settings, point: Solution) -> KeptB
     fewer = settings
     while True:
         most = fewer.points is None or fewer.points <= FEWEST_POINTS
-        model = model_in_time(models, fewer)
+        model = model_in_time(models, settings_in_time(models, fewer))
         if most or affordable_march(model):
             band = _kept_with(models, settings, point, fewer)
             if most or not band.too_long:
@@ -134,7 +134,7 @@ def _kept_with(
     fewer: Settings,
 ) -> KeptBand:
     """What the blade keeps to after an unstable motion, marched with other contact points."""
-    model = model_in_time(models, fewer)
+    model = model_in_time(models, settings_in_time(models, fewer))
     last = fewer.points is None or fewer.points <= FEWEST_POINTS
     counted = MAX_COUNTED_LAST if last else MAX_COUNTED
     if fewer == settings:

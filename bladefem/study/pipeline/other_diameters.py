@@ -27,7 +27,7 @@ from ...hbm.stability import (
 )
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
-from .stability import JUDGED_OPTIONS, judged_motion, model_in_time
+from .stability import JUDGED_OPTIONS, judged_motion, model_in_time, settings_in_time
 from .stability_remarks import Disturbances
 
 # growth from which on more instants are taken not to make a motion stable
@@ -72,6 +72,7 @@ def class_verdicts(
     classes = range(1, gcd(engine_order, sectors) // 2 + 1) if sectors else range(0)
     if models.disturbed is None or not classes or not motion.converged:
         return ()
+    settings = settings_in_time(models, settings)
     model = model_in_time(models, settings)
     if has_one_motion(model) or model.elements.law is not None:
         return ()
