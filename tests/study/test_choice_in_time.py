@@ -14,6 +14,7 @@ from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.study.adaptive import choice_in_time
+from bladefem.study.adaptive import resonance_curve as resonance_curve_module
 from bladefem.study.adaptive.choice_in_time import MarchedBand, choose_in_time, marched_widely
 from bladefem.study.adaptive.family import Family, Member, family_of
 from bladefem.study.adaptive.resonance_choice import PeakErrors
@@ -46,9 +47,11 @@ def chosen(monkeypatch):
     start = replace(first_for(family.modes), harmonics=3, points=8)
     asked = []
 
-    def choice(heights, band, points=0.0):
+    def choice(heights, band, points=0.0, other=None, with_points=None):
         def known(family, old, point, new, accuracy, fallbacks=True):
             asked.append(new)
+            if with_points is not None and new.points > old.points:
+                return KnownPeak(with_points)
             if new.harmonics not in heights:
                 raise NotSolvedError("too rich")
             return KnownPeak(heights[new.harmonics])
@@ -60,7 +63,7 @@ def chosen(monkeypatch):
 
         monkeypatch.setattr(choice_in_time, "peak_from", known)
         monkeypatch.setattr(choice_in_time, "peak_errors", errors)
-        march = lambda settings, point: band
+        march = lambda settings, point, on=None: band if on is None else other
         return choose_in_time(family, start, KnownPeak(heights[3]), ACCURACY, march), asked
 
     return choice
@@ -94,6 +97,26 @@ def test_contact_points_are_added_beyond_the_accuracy(change, points, chosen):
     assert settings.points == points and settings.harmonics == 3
 
 
+@pytest.mark.parametrize(
+    ("kept", "points", "error"),
+    [
+        ((1.85, 2.14), 8, 2.08 / 1.83 - 1 + 2.08 / 1.85 - 1),
+        ((0.58, 0.62), 16, None),
+        (None, 16, None),
+    ],
+)
+def test_another_motion_of_a_richer_model_is_asked_in_time(kept, points, error, chosen):
+    """9 N on ground faces: four contact points have 2082 um, eight 603 um; marched with eight, the
+    first stays.
+    """
+    other = None if kept is None else MarchedBand(*kept)
+    band = MarchedBand(1.83, 2.09)
+    (settings, peak, _), _ = chosen({3: 2.08}, band, 0.7, other, with_points=0.603)
+    assert settings.points == points
+    assert peak.height == (2.08 if points == 8 else 0.603)
+    assert error is None or settings.error == pytest.approx(error)
+
+
 def test_without_a_march_others_choose(chosen):
     assert chosen({3: 0.56}, None)[0] is None
 
@@ -107,6 +130,24 @@ def test_where_less_than_half_lifts_off_no_march_is_asked_for():
     assert not marched_widely(march, replace(settings, softened=True), top)
     top.states["lift"] = 7
     assert not marched_widely(march, settings, top)
+
+
+@pytest.mark.parametrize(
+    ("height", "converged", "lost"),
+    [(0.4, False, True), (0.4, True, False), (0.6, False, False)],
+)
+def test_a_resonance_is_lost_where_points_beside_it_are(height, converged, lost):
+    """And no other one is nearly as high."""
+
+    def point(omega, height, converged=True):
+        return SimpleNamespace(
+            omega=omega, probe=KnownPeak(height).solution.probe, converged=converged
+        )
+
+    points = [point(0.8, height), point(0.99, 0.9, converged), point(1.1, 0.1), point(1.3, 0.05)]
+    if converged:
+        points[1] = point(0.99, 0.1)
+    assert resonance_curve_module._is_lost(point(1.0, 1.0), points) is lost
 
 
 def test_a_curve_of_a_mass_that_hops_has_the_error_of_its_march():

@@ -44,6 +44,11 @@ from .stiff_layer import softened_where_lifting, with_harmonics_of_stiff_layer
 MAXIMUM_SHARE = 0.1
 # sweeps of one curve with ever richer settings
 MAX_SWEEPS = 3
+# share of a resonance with poor settings below which richer ones, whose points were not solved
+# there, have lost it: on the shipped wedge with ground faces under 9 N one harmonic has 2082 um at
+# 369.1 Hz, which a march confirms (1830 to 2170 um with four and eight points a seat); with three
+# no point between 367 and 371 Hz is solved, and the highest of the others has 416 um
+LOST_HEIGHT_SHARE = 0.5
 # folds of a curve from which they may be those of few samples and contact points, and how many of
 # these it is followed with then: under 580 N on the shipped wedge with ground faces four points a
 # seat and 64 samples have 20 pieces between folds, 549 points in 15 s; 256 samples have 7, and with
@@ -122,13 +127,24 @@ def _rough_curve(
     mode: int,
 ) -> tuple[Settings, list[Solution]]:
     """A rough sweep, and the settings that it was made with: others than those given where contacts
-    lift off at its peak and ask for them.
+    lift off at its peak and ask for them, unless that peak is lost with them.
     """
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
-    suited = _suited_to_lift_off(family, settings, peak_of(points))
+    top = peak_of(points)
+    suited = _suited_to_lift_off(family, settings, top)
     if suited == settings:
         return settings, points
-    return suited, covered_band(family_member(family, suited).model, suited, band, mode, 1.0)
+    richer = covered_band(family_member(family, suited).model, suited, band, mode, 1.0)
+    return (settings, points) if _is_lost(top, richer) else (suited, richer)
+
+
+def _is_lost(top: Solution, points: Sequence[Solution]) -> bool:
+    """No point is nearly as high as a resonance, and one next to its frequency was not solved."""
+    omegas = np.array([p.omega for p in points])
+    place = int(np.searchsorted(omegas, top.omega))
+    beside = points[max(0, place - 1) : place + 1]
+    low = size(peak_of(points)) < LOST_HEIGHT_SHARE * size(top)
+    return low and not all(p.converged for p in beside)
 
 
 def _parts(errors: PeakErrors | None) -> Mapping[str, float]:

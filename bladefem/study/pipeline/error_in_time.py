@@ -54,9 +54,18 @@ class Marches:
             self.done[key] = band_by_steps(model, point)
         return self.done[key]
 
-    def __call__(self, settings: Settings, point: Solution) -> MarchedBand | None:
-        """The same for the choice of harmonics; None as well where the march came to no end."""
-        band = self.band(settings, point)
+    def __call__(
+        self,
+        settings: Settings,
+        point: Solution,
+        on: Settings | None = None,
+    ) -> MarchedBand | None:
+        """The same for the choice of harmonics, also on the model of other settings; None as well
+        where the march came to no end.
+        """
+        if on is not None:
+            point = carried_motion(self.models, settings, point, on)
+        band = self.band(on or settings, point)
         return None if band is None or band.reason else MarchedBand(band.lowest, band.highest)
 
 
