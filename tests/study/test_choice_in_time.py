@@ -79,7 +79,7 @@ def test_harmonics_are_added_until_the_blade_keeps_the_amplitude(chosen):
 
 def test_no_balance_betters_an_amplitude_inside_the_band(chosen):
     (settings, _, errors), asked = chosen({3: 1.38, 7: 1.3}, MarchedBand(1.24, 1.43))
-    assert settings.harmonics == 3 and not asked
+    assert settings.harmonics == 3 and all(s.harmonics <= 3 for s in asked)
     assert errors.height["harmonics"] == pytest.approx(1.38 / 1.24 - 1)
 
 
@@ -115,6 +115,27 @@ def test_another_motion_of_a_richer_model_is_asked_in_time(kept, points, error, 
     assert settings.points == points
     assert peak.height == (2.08 if points == 8 else 0.603)
     assert error is None or settings.error == pytest.approx(error)
+
+
+@pytest.mark.parametrize(("change", "counted"), [(0.065, 0.065), (0.0, 0.04), (0.5, 0.04)])
+def test_all_points_with_few_harmonics_judge_the_points_too(change, counted, chosen, monkeypatch):
+    """Unless they meet another motion."""
+    monkeypatch.setattr(choice_in_time, "_change_with_all_points", lambda *_: change)
+    (_, _, errors), _ = chosen({3: 0.66}, MarchedBand(0.66, 0.67), 0.04)
+    assert errors.height["points"] == counted
+
+
+def test_all_points_change_a_peak_as_two_peaks_say():
+    family = family_of(reference_model(points=16, load=1.4, phase=0.7, modes=10, harmonics=7))
+    settings = replace(first_for(family.modes), harmonics=3, points=1)
+    few = find_peak(family.build(replace(settings, harmonics=1)).model, 2 * np.pi * 1320, 1, 64)
+    every = replace(settings, harmonics=1, points=4096)
+    rich = find_peak(family.build(every).model, few.omega, 1, 64)
+    told = choice_in_time._change_with_all_points(family, settings, few, 0.01)
+    assert told == pytest.approx(abs(few.height / rich.height - 1), abs=2e-3)
+    assert told > 0.02
+    given = replace(settings, chosen=("harmonics",))
+    assert choice_in_time._change_with_all_points(family, given, few, 0.01) == 0.0
 
 
 def test_without_a_march_others_choose(chosen):

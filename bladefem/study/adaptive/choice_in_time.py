@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution, size
-from .family import Family
+from .family import Family, lowest_harmonics
 from .resonance_choice import (
     LARGEST_BALANCE,
     MAX_ENRICHMENTS,
@@ -26,7 +26,7 @@ from .resonance_choice import (
     peak_from,
     too_large,
 )
-from .settings import DIRECTIONS, Settings, enriched_settings
+from .settings import DIRECTIONS, RICHEST_SETTINGS, Settings, enriched_settings
 
 # respects that a march leaves nothing of
 COVERED_IN_TIME = ("harmonics", "samples")
@@ -156,9 +156,40 @@ def _with_left_out(
     accuracy: float,
     left_out: float,
 ) -> PeakErrors:
-    """The errors of a peak by richer models, and what harmonics and samples leave out."""
+    """The errors of a peak by richer models, and what harmonics and samples leave out.
+
+    Richer models may end on other motions that are as high by chance: on the shipped wedge under 18
+    N 32 points a seat have what 8 have, with one harmonic all 63 have 6.5 % less, and marched in
+    time 13 %. So the larger of both changes is taken.
+    """
     known = {name: (0.0, 0.0) for name in COVERED_IN_TIME} | {"harmonics": (left_out, 0.0)}
-    return replace(peak_errors(family, settings, peak, accuracy, known), in_time=True)
+    errors = replace(peak_errors(family, settings, peak, accuracy, known), in_time=True)
+    told = _change_with_all_points(family, settings, peak, accuracy)
+    if not errors.height["points"] < told < OTHER_MOTION:
+        return errors
+    return replace(errors, height={**errors.height, "points": told})
+
+
+def _change_with_all_points(
+    family: Family,
+    settings: Settings,
+    peak: Peak,
+    accuracy: float,
+) -> float:
+    """Relative change of the height by all contact points with the fewest harmonics, with which
+    they cost little; 0 where it is not found, or there are no more.
+    """
+    if settings.points is None or "points" not in settings.chosen:
+        return 0.0
+    fewest = lowest_harmonics(family, settings)
+    own = replace(settings, harmonics=fewest)
+    every = replace(own, points=RICHEST_SETTINGS["points"])
+    try:
+        base = peak_from(family, settings, peak.solution, own, accuracy, fallbacks=False)
+        found = peak_from(family, own, base.solution, every, accuracy, fallbacks=False)
+    except NotSolvedError:
+        return 0.0
+    return abs(base.height / found.height - 1)
 
 
 def _with_enough_harmonics(
