@@ -41,9 +41,14 @@ Share of the count, bladefem alone on a busy machine:
      49 632  0 to 12             9.6         0.93  0.08
     148 482  5                  19.5         1.68  0.21
 
-With vectors given back before the last solves, no second copy of the space of guesses, and without
-the factors of cut faces that nobody needs again, these take 0.54 GB (nodal diameter 5) and 0.79 GB
-(0 to 12; 9.0 s on a busy machine), not yet compared with ccx in one run.
+With vectors given back before the last solves, no second copy of the space of guesses, without the
+factors of cut faces that nobody needs again, and with large blocks returned to the system, both
+sides in one run on another machine:
+
+     49 632  5          curved       20.8           4.4    4.7  0.46    1.10   3.4e-07      6.4e-05
+     49 632  0          curved       23.8           4.5    5.3  0.45    1.09   2.4e-07      6.3e-05
+     49 632  0 to 12    curved      285.7          11.9   24.0  0.56    1.20   3.4e-07      6.9e-05
+     49 632  5          straight     22.2           4.6    4.8  0.46    1.10   2.4e-07      9.3e-06
 
     python benchmarks/fem_ccx.py 45000 151000      both sides in one run, some 12 minutes
 """
