@@ -253,12 +253,13 @@ def higher_from_neighbours(
     Where peaks of a band are many, 78 um under 50 N and 129 um under 49.9 N are two of them. Where
     the higher one ends between the two loads, at a fold, following it meets none.
     """
-    best = min(highest_peaks(levels), key=lambda peak: peak.height)
+    tops = {peak.value: peak for peak in highest_peaks(levels)}
+    best = min(tops.values(), key=lambda peak: peak.height)
     spent = 0
     for value in neighbour_values(levels, best.value):
         if value is None:
             continue
-        top = max((p for p in levels[value] if p.value == value), key=lambda peak: peak.height)
+        top = tops[value]
         if estimated_height(search, top, best.value) < (1 + SAME_PEAK_LOSS) * best.height:
             continue
         model = search.along.model_at(best.value)

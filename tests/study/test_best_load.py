@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -116,11 +117,10 @@ def test_a_bracket_between_very_different_heights_is_halved(best):
 def test_a_search_that_is_too_large_is_made_with_less(best, monkeypatch):
     """It ends where that does, with the error that the richer settings show."""
 
-    def too_large(family, settings):
+    def too_large(family, settings, point, limit):
         return settings.harmonics > 3
 
-    monkeypatch.setattr(best_load_module, "_too_large_to_search", too_large)
-    monkeypatch.setattr(best_load_module, "_lifts", lambda peak: True)
+    monkeypatch.setattr(best_load_module, "too_large", too_large)
     poor = replace(SETTINGS, harmonics=1, samples=64, chosen=("harmonics", "samples"))
     found = find_best_load(replace(scene(), accuracy=1e-4), case_at, family, poor, None)
     assert found.reason == "" and found.settings.harmonics == 3
@@ -130,16 +130,17 @@ def test_a_search_that_is_too_large_is_made_with_less(best, monkeypatch):
 def test_less_means_fewer_contact_points_first(best, monkeypatch):
     """And what the scene gives stays."""
 
-    def too_large(family, settings):
-        return settings.points * (2 * settings.harmonics + 1) > 40
+    def too_large(family, settings, point, limit):
+        return point.states["lift"] > 0 and settings.points * (2 * settings.harmonics + 1) > 40
 
-    monkeypatch.setattr(best_load_module, "_too_large_to_search", too_large)
+    monkeypatch.setattr(best_load_module, "too_large", too_large)
+    lifting, closed = (SimpleNamespace(states={"lift": lift}) for lift in (3, 0))
     rich = replace(SETTINGS, harmonics=15, points=16, chosen=("harmonics", "points"))
     less = best_load_module._smaller_settings
-    assert less(family, rich, lifts=True) == replace(rich, harmonics=3, points=4)
-    assert less(family, rich, lifts=False) == rich
+    assert less(family, rich, lifting) == replace(rich, harmonics=3, points=4)
+    assert less(family, rich, closed) == rich
     given = replace(rich, chosen=("harmonics",))
-    assert less(family, given, lifts=True) == replace(given, harmonics=3)
+    assert less(family, given, lifting) == replace(given, harmonics=3)
 
 
 def test_a_search_without_any_solved_neighbour_says_so(monkeypatch):

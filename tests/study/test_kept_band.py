@@ -255,6 +255,19 @@ def test_steps_too_long_for_the_bodies_are_halved(monkeypatch, ends, lowest, hig
     assert found.highest == pytest.approx(highest * size(point), rel=1e-6)
 
 
+@pytest.mark.parametrize(("points", "share"), [(8, 1.0), (4, 2.0), (None, 2.0)])
+def test_a_march_without_fewer_points_to_try_may_take_twice_the_operations(
+    points, share, monkeypatch
+):
+    asked = []
+    monkeypatch.setattr(module, "model_in_time", lambda *_: None)
+    monkeypatch.setattr(module, "settings_in_time", lambda _, settings: settings)
+    monkeypatch.setattr(module, "kept_band", lambda model, point, most: asked.append(most))
+    settings = replace(first_for(3), points=points)
+    module._kept_with(None, settings, None, settings)
+    assert asked == [share * module.MAX_COUNTED]
+
+
 def test_fewer_points_are_marched_where_all_take_too_long(monkeypatch):
     tried = []
 

@@ -37,7 +37,7 @@ from .resonance_choice import (
     peak_from,
     settings_of_lift_off,
 )
-from .settings import Settings, enriched_settings
+from .settings import Settings, enriched_settings, same_settings
 from .stiff_layer import softened_where_lifting, with_harmonics_of_stiff_layer
 
 # of the accuracy: to which a sweep closes in its maxima
@@ -91,9 +91,9 @@ def resonance_curve(
     for number in range(MAX_SWEEPS):
         used, peak, errors = _chosen(family, used, top, accuracy, number == 0, march)
         in_time = marched_widely(march, used, top) if errors is None else errors.in_time
-        if number == 0 and not in_time and _same_settings(used, settings):
+        if number == 0 and not in_time and same_settings(used, settings):
             used, peak, errors = _with_missed(family, used, points, top, accuracy, peak, errors)
-        if swept[1] != accuracy or not _same_settings(swept[0], used):
+        if swept[1] != accuracy or not same_settings(swept[0], used):
             finer = _with_fewer_folds(used, peak) if number == 0 else None
             most = None if finer is None else MANY_FOLDS
             points = _swept(family, used, points, swept, band, mode, accuracy, notes, most)
@@ -216,11 +216,6 @@ def _refined_top(
     return finer, peak.solution
 
 
-def _same_settings(one: Settings, other: Settings) -> bool:
-    """They solve the same equations."""
-    return replace(one, error=None) == replace(other, error=None)
-
-
 def _with_missed(
     family: Family,
     settings: Settings,
@@ -283,7 +278,7 @@ def _judged_top(
 
 def _same_points(one: tuple[Settings, float], other: tuple[Settings, float]) -> bool:
     """Sweeps with two settings and accuracies solve the same points, and equally well."""
-    return _same_settings(one[0], other[0]) and solver_options(one[1]) == solver_options(other[1])
+    return same_settings(one[0], other[0]) and solver_options(one[1]) == solver_options(other[1])
 
 
 def too_large_to_follow(family: Family, settings: Settings) -> bool:

@@ -93,6 +93,11 @@ class Settings:
         )
 
 
+def same_settings(one: Settings, other: Settings) -> bool:
+    """They solve the same equations: equal but for their errors."""
+    return replace(one, error=None) == replace(other, error=None)
+
+
 def scene_line(settings: Settings) -> str:
     """What makes a scene run with these settings: a line of TOML for its beginning.
 

@@ -22,11 +22,12 @@ from ...hbm.node_gradients import node_gradients
 from ...hbm.optimum import Optimum, lowest_peak
 from ...hbm.peak import Peak, with_slope
 from ...hbm.peak_levels import Variation
+from ...hbm.solution import Solution
 from ...scene.tables import Scene
 from ..adaptive.choice import default_band, solver_options
 from ..adaptive.family import Family, family_member, joined_elements, with_excited_harmonics
-from ..adaptive.resonance_choice import choose_at_peak
-from ..adaptive.settings import FIRST_SETTINGS, Settings
+from ..adaptive.resonance_choice import choose_at_peak, too_large
+from ..adaptive.settings import FIRST_SETTINGS, Settings, same_settings
 from .assemble_model import LoadCase
 
 CaseAt = Callable[[float], LoadCase]
@@ -169,12 +170,12 @@ def _repeated_search(
         richer, peak, _ = choose_at_peak(
             family, settings, found.peak, scene.accuracy, fixed=("modes",), sufficient=1.0
         )
-        next_one = _smaller_settings(family, richer, _lifts(peak))
+        next_one = _smaller_settings(family, richer, peak.solution)
         smaller = next_one != richer
-        if smaller and (not left or _same(next_one, settings)):
+        if smaller and (not left or same_settings(next_one, settings)):
             settings = _with_change_between(settings, found.peak, richer, peak)
             break
-        enough = _same(richer, settings)
+        enough = same_settings(richer, settings)
         settings = next_one
         found = replace(found, peak=peak)
         if enough:
@@ -185,35 +186,19 @@ def _repeated_search(
     return replace(found, points=points), settings
 
 
-def _same(one: Settings, other: Settings) -> bool:
-    """But for their errors."""
-    return replace(one, error=None) == replace(other, error=None)
-
-
-def _lifts(peak: Peak) -> bool:
-    """Contacts lift off at a resonance."""
-    return bool(peak.solution.states["lift"])
-
-
-def _smaller_settings(family: Family, settings: Settings, lifts: bool) -> Settings:
+def _smaller_settings(family: Family, settings: Settings, point: Solution) -> Settings:
     """The settings with fewer contact points, then fewer harmonics, until a search with them is
     worth its time where contacts lift off; of what the scene leaves open.
     """
     for name, fewest in FEWEST_SEARCHED.items():
         # 15 harmonics become 7, 16 points 8
-        while lifts and name in settings.chosen and _too_large_to_search(family, settings):
+        while name in settings.chosen and too_large(family, settings, point, MAX_SEARCH_UNKNOWNS):
             now = getattr(settings, name) or fewest
             fewer: dict[str, Any] = {name: max(fewest, now // 2)}
             if fewer[name] >= now:
                 break
             settings = replace(settings, error=None, **fewer)
     return settings
-
-
-def _too_large_to_search(family: Family, settings: Settings) -> bool:
-    """A search with these settings is not worth its time where contacts lift off."""
-    springs = family_member(family, settings).model.springs.size
-    return bool(springs * (2 * settings.harmonics + 1) > MAX_SEARCH_UNKNOWNS)
 
 
 def _with_change_between(

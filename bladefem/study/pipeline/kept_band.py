@@ -118,13 +118,18 @@ def kept_of_family(models: Family, settings: Settings, point: Solution) -> KeptB
     """
     fewer = settings
     while True:
-        most = fewer.points is None or fewer.points <= FEWEST_POINTS
+        most = _has_fewest_points(fewer)
         model = model_in_time(models, settings_in_time(models, fewer))
         if most or affordable_march(model):
             band = _kept_with(models, settings, point, fewer)
             if most or not band.too_long:
                 return band
         fewer = replace(fewer, points=max(FEWEST_POINTS, (fewer.points or 0) // 2))
+
+
+def _has_fewest_points(settings: Settings) -> bool:
+    """A march with fewer contact points is not tried."""
+    return settings.points is None or settings.points <= FEWEST_POINTS
 
 
 def _kept_with(
@@ -135,8 +140,7 @@ def _kept_with(
 ) -> KeptBand:
     """What the blade keeps to after an unstable motion, marched with other contact points."""
     model = model_in_time(models, settings_in_time(models, fewer))
-    last = fewer.points is None or fewer.points <= FEWEST_POINTS
-    counted = MAX_COUNTED_LAST if last else MAX_COUNTED
+    counted = MAX_COUNTED_LAST if _has_fewest_points(fewer) else MAX_COUNTED
     if fewer == settings:
         return kept_band(model, point, counted)
     moved = moved_solution(models, settings, point, fewer)
