@@ -20,8 +20,9 @@ import numpy as np
 
 from ..data import Elements, PressureMap
 from ..scene.tables import Contact
-from .interface_elements import aggregation_matrix, doubling_force, seat_contact
+from .interface_elements import doubling_force, seat_contact
 from .interface_law import InterfaceLaw, force_of, stiffness_at
+from .joined_points import aggregation_matrix
 
 # halvings of an interval in which a root lies: down to rounding
 HALVINGS = 60

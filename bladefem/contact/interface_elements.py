@@ -15,6 +15,7 @@ from ..data import Elements, Patch, PressureMap
 from ..errors import InputError
 from ..scene.tables import Contact, Material, Seat
 from .interface_law import InterfaceLaw, rigid_faces
+from .joined_points import aggregation_matrix, joined_motion
 from .rough_layer import GROUND_FINISH, TOUCHING_PRESSURE, decay_length
 from .seating import ContactProblem
 
@@ -24,8 +25,6 @@ Layer = TypeVar("Layer", Contact, Seat)
 # stiffness per unit area that represents rigid faces in the elements [N/m^3]: a layer of
 # 1e-8 of the compliance of steel over a millimetre
 RIGID_STIFFNESS = 1e22
-# of the width of a group of nodes: below it they have one place along a side
-SAME_PLACE = 1e-6
 
 
 def mindlin_ratio(nu: float) -> float:
@@ -295,7 +294,8 @@ def friction_elements(
     t0 = None
     if maps[0].traction is not None:
         t0 = np.vstack([a.T @ m.traction for a, m in zip(members, maps, strict=True)])
-    S = sp.kron(sp.block_diag(G), sp.identity(1 + tangents), format="csr")
+    moved = [_moved_shares(m.patch, g) for m, g in zip(maps, G, strict=True)]
+    S = sp.kron(sp.block_diag(moved), sp.identity(1 + tangents), format="csr")
     mu = np.repeat([c.mu for c in seats], [len(a) for a in area])
     return Elements(kt, kn, mu, n0, tangents, t0=t0), S
 
@@ -351,64 +351,15 @@ def mapped_stiffness(problem: ContactProblem, maps: Sequence[PressureMap]) -> li
     return found
 
 
-def aggregation_matrix(patch: Patch, points: int | None) -> sp.csr_matrix:
-    """G (n, m): share of each node in its element by area; the columns sum to 1. The identity when
-    points is None.
-
-    Nodes are grouped by halving the patch again and again into parts of equal area: its shorter
-    side first, then in turns, so that the parts have the proportions of the patch. A force leaves
-    the middle sixth of the shorter side first: a damper that rolls lifts off there, and with one
-    point across it would roll freely (4000 N/mm^3 and 80 N on the shipped wedge: 40 um with 8
-    points along a seat, 56.1 um with 2 by 4 and 56.0 um with all 63).
+def _moved_shares(patch: Patch, G: sp.csr_matrix) -> sp.csr_matrix:
+    """(n, m) share of each node in the motion of its element, which keeps the seat's stiffness
+    against rotation.
     """
-    n = len(patch.area)
-    if points is None or points >= n:
-        return sp.identity(n, format="csr")
-    frame = patch.frame.mean(axis=0)
-    label = np.zeros(n, dtype=int)
-    x = (patch.points - patch.points.mean(axis=0)) @ frame[1:].T
-    # a little more for the shorter side, which is split first
-    sides = np.where(np.ptp(x, axis=0) < np.ptp(x, axis=0).max(), 1.01, 1.0)
-    _halve(x, sides, patch.area, np.arange(n), points, 0, label)
-    share = patch.area / np.bincount(label, patch.area)[label]
-    return sp.csr_matrix((share, (np.arange(n), label)), shape=(n, points))
+    if G.shape[0] == G.shape[1]:
+        return G
+    return sp.csr_matrix(joined_motion([patch], G.indices, patch.area).T)
 
 
 def _members(G: Sequence[sp.csr_matrix]) -> list[sp.csr_matrix]:
     """The same groups with ones instead of shares: sums instead of means."""
     return [sp.csr_matrix((np.ones_like(g.data), g.indices, g.indptr), shape=g.shape) for g in G]
-
-
-def _halve(
-    x: np.ndarray,
-    sides: np.ndarray,
-    area: np.ndarray,
-    nodes: np.ndarray,
-    parts: int,
-    first: int,
-    label: np.ndarray,
-) -> None:
-    """Label some nodes first .. first + parts - 1.
-
-    Args:
-        x: (n, sides) places in the patch [m].
-        sides: of these nodes, over those of the patch.
-    """
-    if parts == 1:
-        label[nodes] = first
-        return
-    widths = np.ptp(x[nodes], axis=0)
-    axis = int(np.argmax(np.where(widths > SAME_PLACE * widths.max(), sides, 0.0)))
-    nodes = nodes[np.lexsort((x[nodes, 1 - axis], x[nodes, axis].round(9)))]
-    low = parts // 2
-    below = np.cumsum(area[nodes]) - area[nodes] / 2
-    cut = int(np.searchsorted(below, area[nodes].sum() * low / parts))
-    cut = min(max(cut, low), len(nodes) - (parts - low))
-    shares = np.array([low / parts, 1 - low / parts])
-    for share, chosen, count, start in (
-        (shares[0], nodes[:cut], low, first),
-        (shares[1], nodes[cut:], parts - low, first + low),
-    ):
-        own = sides.copy()
-        own[axis] *= share
-        _halve(x, own, area, chosen, count, start, label)

@@ -23,7 +23,7 @@ import numpy as np
 
 from ..data import Elements, PressureMap
 from ..scene.tables import Contact
-from .interface_elements import aggregation_matrix
+from .joined_points import aggregation_matrix
 from .seating import ContactProblem
 
 # Numerical stiffness over that of the bodies under a medium wave of pressure. The part of the

@@ -9,12 +9,12 @@ from wedge import wedge_mesh
 
 import bladefem
 from bladefem.contact.interface_elements import (
-    aggregation_matrix,
     friction_elements,
     mindlin_ratio,
     normal_stiffness,
     pair_ratio,
 )
+from bladefem.contact.joined_points import aggregation_matrix
 from bladefem.contact.patch import patch_means
 from bladefem.contact.resultants import resultant
 from bladefem.contact.seating import solve_seating

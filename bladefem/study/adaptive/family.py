@@ -16,7 +16,7 @@ import numpy as np
 
 from ...data import Elements, PortModel, RigidBody
 from ...friction.law_table import merged_laws
-from ...hbm.model import ReducedModel, softened_layer
+from ...hbm.model import ReducedModel, in_series, softened_layer
 from ...reduction.assemble import recombine_contact
 from ...reduction.truncate import truncate_modes
 from .settings import Settings
@@ -103,21 +103,27 @@ def carried_displacements(
     return result
 
 
-def coarsened_elements(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
-    """The model with contact nodes joined into elements that see the mean motion, weighted by
-    stiffness.
+def coarsened_elements(
+    model: ReducedModel,
+    groups: np.ndarray,
+    pick: np.ndarray | None = None,
+) -> ReducedModel:
+    """The model with contact nodes joined into elements.
 
     Stiffnesses add up; the normal force is the sum over the pressed nodes, or the gap that the mean
     must close.
 
     Args:
         groups: (n,) number of the element of each node, 0 .. m-1.
+        pick: (m, n) from the nodes' motion to the elements' (``contact.joined_points``); the mean,
+            weighted by stiffness, when left out.
     """
     m = int(groups.max()) + 1
     if m == len(groups):
         return model
     elements = joined_elements(model.elements, groups)
-    pick = _means(model.elements, groups)
+    means = _means(model.elements, groups)
+    pick = means if pick is None else pick
     dofs = np.kron(pick, np.eye(elements.tangents + (not model.tangential)))
     damper: RigidBody | tuple[PortModel, ...] | None = model.damper
     if isinstance(damper, RigidBody):
@@ -128,13 +134,18 @@ def coarsened_elements(model: ReducedModel, groups: np.ndarray) -> ReducedModel:
         h: np.bincount(groups, f.real, m) + 1j * np.bincount(groups, f.imag, m)
         for h, f in model.normal.items()
     }
+    # what elements leave of their layer to the bodies stays with each of them
+    sides = tuple(recombine_contact(body, dofs) for body in softened_layer(model).sides)
+    series = None if model.series is None else means**2 @ model.series
+    if series is not None:
+        sides = tuple(in_series(side, series) for side in sides)
     return replace(
         model,
-        sides=tuple(recombine_contact(body, dofs) for body in model.sides),
+        sides=sides,
         elements=elements,
         damper=damper,
         normal=normal,
-        series=None if model.series is None else pick**2 @ model.series,
+        series=series,
         start=None if model.start is None else _totals(model.start, groups),
         closing=None if model.closing is None else pick @ model.closing,
     )

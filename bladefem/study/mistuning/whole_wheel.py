@@ -18,13 +18,12 @@ from ...reduction.assemble import pair_model
 from ...reduction.truncate import truncate_modes
 from ...scene.tables import Scene
 from ...wheel.model import Wheel, engine_order
-from ..adaptive.family import coarsened_elements
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.bodies import Bodies
-from ..pipeline.contact_cycle import element_labels
 from ..pipeline.coriolis import with_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
+from ..pipeline.joined_contacts import joined_member
 from ..pipeline.reduced_sector import Reduced, reduce_sector, with_damper_mass
 from .other_blades import foot_of
 from .validate import read_orders
@@ -119,11 +118,7 @@ def whole_wheel(
     model = joint_model(
         scene, mesh, reduced, patches, case, settings.harmonics, settings.damper, sides
     )
-    nodes = len(case.elements.kt)
-    groups = (
-        np.arange(nodes) if settings.points is None else element_labels(patches, settings.points)
-    )
-    model = coarsened_elements(model, groups)
+    model = joined_member(model, patches, settings.points, scene.contact.points).model
     damper = model.damper[0] if isinstance(model.damper, tuple) else model.damper
     return Wheel(
         count,

@@ -23,7 +23,7 @@ from ...scene.tables import Scene
 from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
-from ..adaptive.family import Family, Member, coarsened_elements, family_member, shared_harmonics
+from ..adaptive.family import Family, Member, family_member, shared_harmonics
 from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak, peak_from
 from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
 from ..adaptive.stiff_layer import softened_where_lifting
@@ -31,8 +31,8 @@ from .assemble_model import LoadCase, joint_model
 from .bodies import Bodies, is_wheel
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
 from .changed_cases import seated_case
-from .contact_cycle import element_labels
 from .coriolis import with_coriolis
+from .joined_contacts import joined_member
 from .liftoff import naming_the_load
 from .normal_modes import harmonic_diameters
 from .reduced_sector import Reduced, reduce_sector, with_damper_mass
@@ -88,12 +88,7 @@ def family_of_case(
             settings.harmonics,
             settings.damper,
         )
-        groups = (
-            np.arange(len(case.elements.kt))
-            if settings.points is None
-            else element_labels(patches, settings.points, scene.contact.points)
-        )
-        return Member(coarsened_elements(model, groups), groups)
+        return joined_member(model, patches, settings.points, scene.contact.points)
 
     others = other_diameters(scene, reduced)
 
@@ -109,7 +104,7 @@ def family_of_case(
         )
         H, damper = settings.harmonics, settings.damper
         model = joint_model(scene, mesh, reduced, patches, case, H, damper, sides)
-        joined = coarsened_elements(model, family_member(family, settings).groups)
+        joined = joined_member(model, patches, settings.points, scene.contact.points).model
         return softened_layer(joined) if settings.softened else joined
 
     family = Family(

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...contact.interface_elements import aggregation_matrix
+from ...contact.joined_points import element_labels
 from ...contact.numerical_stiffness import physical_stiffness
 from ...data import Elements, Patch
 from ...friction.aft import Forces, evaluate
@@ -218,37 +218,6 @@ def _loop(
     direction = np.linalg.svd(mean)[0][:, 0]
     T = synthesis(DRAWN_HARMONICS, 8 * DRAWN_HARMONICS + 8)
     return Loop(T @ (direction @ mean), T @ (direction @ force))
-
-
-def element_labels(
-    patches: Sequence[Patch],
-    points: int | None,
-    finest: int | None = None,
-) -> np.ndarray:
-    """(finest elements of all patches,) number of the element that each belongs to, ``points``
-    elements on each patch.
-
-    Args:
-        finest: elements on each patch that are joined, those of the scene (``contact.points``);
-            None for the nodes.
-    """
-    joined = [_element_patch(patch, finest) for patch in patches]
-    parts = [aggregation_matrix(patch, points) for patch in joined]
-    starts = np.cumsum([0] + [part.shape[1] for part in parts])
-    return np.concatenate(
-        [start + part.indices for start, part in zip(starts, parts, strict=False)]
-    )
-
-
-def _element_patch(patch: Patch, points: int | None) -> Patch:
-    """The patch with its elements in place of its nodes, as far as ``aggregation_matrix`` looks at
-    it: mean places and areas.
-    """
-    if points is None or points >= len(patch.area):
-        return patch
-    shares = aggregation_matrix(patch, points)
-    area = np.bincount(shares.indices, patch.area).astype(float)
-    return replace(patch, points=shares.T @ patch.points, area=area)
 
 
 def _in_all_directions(elements: Elements, w: np.ndarray) -> tuple[Elements, np.ndarray]:

@@ -15,17 +15,16 @@ import numpy as np
 
 from geometry.mesh import Mesh, sector_of
 
+from ...contact.joined_points import element_labels, joined_motion
 from ...contact.patch import rigid_motions, rigid_ports
-from ...data import Elements, ModeSet, Patch, RigidBody
+from ...data import ModeSet, Patch, RigidBody
 from ...friction.fourier import to_complex
 from ...hbm.solution import Solution
 from ...reduction.assemble import folded_diameter
 from ...scene.support import area_springs, held_letters
 from ...util.arrays import ComplexArray, RealArray
-from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
 from .bodies import Bodies, is_wheel
-from .contact_cycle import element_labels
 from .coriolis import response_damping
 from .flow import family_modes, flowing_modes, scene_flow
 from .ports import blade_ports
@@ -275,22 +274,13 @@ def node_forces(
     """
     elements = case.elements
     if len(f) != len(elements.kt):
-        f = _shared_forces(elements, f, element_labels(list(patches), points))
+        groups = element_labels(patches, points)
+        pick = joined_motion(patches, groups, elements.kt)
+        f = np.einsum("mn,mdk->ndk", pick, f)
     missing = 1 + elements.tangents - f.shape[1]
     f = np.concatenate([np.zeros((len(f), missing, f.shape[2])), f], axis=1)
     n, d, K = f.shape
     return to_complex(f.reshape(n * d, K)).T.reshape(-1, n, d)
-
-
-def _shared_forces(
-    elements: Elements,
-    f: np.ndarray,
-    groups: np.ndarray,
-) -> np.ndarray:
-    """Forces of joined elements, shared by their nodes as the joined motion weighs them."""
-    whole = joined_elements(elements, groups).kt[groups]
-    share = np.divide(elements.kt, whole, out=np.ones_like(whole), where=whole > 0)
-    return share[:, None, None] * f[groups]
 
 
 def _diameter(bodies: Bodies, harmonic: int) -> tuple[int, bool]:

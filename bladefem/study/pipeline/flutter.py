@@ -22,13 +22,12 @@ from ...reduction.assemble import folded_diameter, pair_model
 from ...reduction.truncate import truncate_modes
 from ...util.arrays import IntegerArray, RealArray
 from ...wheel.aerodynamics import limit_cycles, with_flow
-from ..adaptive.family import coarsened_elements
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase, joint_model
 from .bodies import Bodies
 from .case_models import load_cases
-from .contact_cycle import element_labels
 from .flow import Flow, family_numbers, port_shapes, scene_flow
+from .joined_contacts import joined_member
 from .reduced_sector import Reduced, reduce_sector, with_damper_mass
 from .run_records import ReducedRun
 from .stage_inputs import stage_key
@@ -248,10 +247,7 @@ def _wave_model(
     model = joint_model(
         run.scene, run.mesh, reduced, patches, case, 1, settings.damper, tuple(sides)
     )
-    nodes = len(case.elements.kt)
-    points = settings.points
-    groups = np.arange(nodes) if points is None else element_labels(patches, points)
-    return coarsened_elements(model, groups)
+    return joined_member(model, patches, settings.points, run.scene.contact.points).model
 
 
 def flutter_sentences(found: FlutterResult) -> list[str]:
