@@ -2,7 +2,8 @@
 
 The slope with the frequency is exact (`bladefem.hbm.sensitivity`). For one mode 1/size^2 is a
 parabola in omega, so its derivative is a straight line, and the secant finds its zero in a few
-points.
+points. Friction sampled in time makes a flat peak ripple, and slopes lead to the nearest ripple: a
+maximum that is sharper than one mode's is compared with its surroundings (`hbm.peak_ripples`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from ..util.curve_extremum import cubic_minimum, tangents_meet
 from .frequency_walk import walk_in_frequency
 from .model import ReducedModel
 from .parameters import vary
+from .peak_ripples import above_ripples, may_be_ripple
 from .sensitivity import sensitivities
 from .solution import Solution, size
 from .solve import solve
@@ -72,6 +74,7 @@ def find_peak(
     """The local maximum uphill of omega [rad/s].
 
     Args:
+        samples: time samples a period; their ripples are no maxima.
         near: a peak of a similar model, which spares the first steps, or a solution to start from.
         tolerance: relative accuracy of the height; the frequency follows with its square root.
         enough: relative gain that is given up where the point that promises it is not solved at
@@ -82,6 +85,38 @@ def find_peak(
         NotSolvedError: a point was not solved, or no maximum was closed in.
     """
     check_probe(model, options.probe)
+    found, sharpness = _closed_in(
+        model, omega, H, samples, near=near, tolerance=tolerance, enough=enough, options=options
+    )
+    # what only judges another peak (without fallbacks) is not worth more where its slope is zero
+    if np.isinf(sharpness) and not options.fallbacks:
+        return found
+    if not may_be_ripple(model, found.solution, sharpness, options.probe):
+        return found
+    top = above_ripples(model, found.solution, tolerance, options)
+    return replace(
+        found,
+        solution=top.solution,
+        height=size(top.solution, options.probe),
+        points=found.points + top.points,
+        bend=top.bend or found.bend,
+    )
+
+
+def _closed_in(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    *,
+    near: Peak | Solution | None,
+    tolerance: float,
+    enough: float,
+    options: Options,
+) -> tuple[Peak, float]:
+    """The maximum that slopes lead to, and the largest second derivative of 1/height^2 by which
+    it was closed in; infinite where it was from one side only.
+    """
     low = high = last = best = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
@@ -92,7 +127,7 @@ def find_peak(
         near_enough = best is not None and gain <= enough
         start = _solved_near(model, omega, H, samples, start, last is None, options, near_enough)
         if near_enough and not start.converged and best is not None:
-            return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
+            return _as_peak(best, count, bend, low, high)
         frequency = start.frequency
         _require_motion(start, options.probe)
         omega = start.omega
@@ -112,12 +147,29 @@ def find_peak(
             )
             reach = 2 * reach
         if gain < tolerance / 4:
-            return Peak(best.solution, best.height, count, bend=float(max(bend, 0.0)))
+            return _as_peak(best, count, bend, low, high)
         last = now
         omega = target
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _as_peak(
+    best: _Look,
+    points: int,
+    bend: float,
+    low: _Look | None,
+    high: _Look | None,
+) -> tuple[Peak, float]:
+    """The peak, and how sharp it is between the points that enclose it."""
+    peak = Peak(best.solution, best.height, points, bend=float(max(bend, 0.0)))
+    if low is None or high is None:
+        return peak, np.inf
+    if low.solution.omega == high.solution.omega:
+        return peak, peak.bend
+    enclosed = (high.line - low.line) / (high.solution.omega - low.solution.omega)
+    return peak, max(peak.bend, float(enclosed))
 
 
 def _require_motion(point: Solution, probe: int) -> None:

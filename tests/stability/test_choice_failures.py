@@ -285,12 +285,13 @@ def bends(step: float, samples: int) -> np.ndarray:
 
 def test_F37_differences_of_derivatives_over_small_steps():
     """Each derivative is exact, of a response that ripples with the instants of sampled friction:
-    the lowest height of a design chart looks like a highest one.
+    the lowest height of a design chart looks like a highest one, even where the peak itself is
+    told from its ripples.
     """
     exact = bends(2e-2, 0)
     assert (exact > 1.5).all()
     ripple = np.concatenate(
         [bends(step, samples) for step in (2e-3, 2e-2) for samples in (64, 128)]
     )
-    assert (ripple < 0).sum() >= 2 and ripple.max() > 10 * exact.max()
+    assert (ripple < 0).sum() >= 2 and ripple.min() < -exact.min()
     np.testing.assert_allclose(bends(WIDE_STEP, 128), exact, rtol=0.15)
