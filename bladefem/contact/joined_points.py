@@ -79,7 +79,7 @@ def element_patch(patch: Patch, points: int | None) -> Patch:
         patch,
         points=pick @ patch.points,
         places=pick @ _places(patch),
-        area=np.bincount(groups, patch.area),
+        area=np.bincount(groups, patch.area).astype(float),
     )
 
 
