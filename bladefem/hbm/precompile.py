@@ -25,6 +25,7 @@ from ..reduction.matrices import port_model_from_matrices
 from .linear.condensation import condense
 from .linear.contact_flexibility import by_harmonic
 from .model import Damping, ReducedModel
+from .ring_march import march_ring
 from .solve import solve
 from .solver.newton import newton
 from .solver.newton_krylov import iterative_inverse
@@ -81,7 +82,7 @@ def compile_2d() -> None:
 def compile_linear() -> None:
     """The linear part and iterations for many unknowns; then the kernels of 2-D elements with the
     derivative in double precision, as sensitivities take it: by then `compile_2d` has left what
-    both share on disk.
+    both share on disk; last the march in time that judges resonances.
     """
     plane = _plane_model()
     # its flexibility without springs is a kernel of its own
@@ -92,6 +93,7 @@ def compile_linear() -> None:
     )
     inverse(np.ones((3, 5)), 1e-6)
     evaluate(plane.elements, np.full((1, 3, 5), 0.1), 64)
+    march_ring(plane, solve(plane, 1.0, 2, 64), 0.0, 1)
 
 
 def _line_model() -> ReducedModel:
