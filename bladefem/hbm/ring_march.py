@@ -261,7 +261,7 @@ def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motio
             extra[i * d + a] = f[i, a] - preload[i * d + a]
     modal = np.dot(by_mode, extra)
     moved = np.empty(2 * M)
-    change = np.zeros((n, 3))
+    change = np.zeros((2, n, 3))
     for k in range(periods * S):
         motion[k // S, k % S] = steady[k % S] + np.dot(reading, y[:M]) - np.dot(flexible, extra)
         j = (k + 1) % S

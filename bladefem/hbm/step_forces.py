@@ -36,13 +36,14 @@ def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, pre
     """Forces at the end of a step, of w = c - F extra: f, extra and w are those before, and then
     those after. False where they were not found.
 
-    The sweeps start from the forces before and their change (n, 3) in the last step, which becomes
-    that of this one.
+    The sweeps start from a parabola through the last forces.
 
     Args:
         c: (m,) displacements without extra forces.
         flexibility: F (m, m), its transpose, and F preload (m,).
         w: (m,) relative displacements; f: (n, 3) contact forces; extra: (m,) those less preload.
+        change: (2, n, 3) of the forces in the last step and the one before; those of this step and
+            the last afterwards.
         table: (n, 3) kt, kn, mu; load0, load1: (n,) normal loads at zero displacement before and
             after the step.
         work: (1,) takes the operations.
@@ -55,8 +56,9 @@ def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, pre
         largest = max(largest, abs(extra[row] + preload[row]), abs(preload[row]))
     for i in range(len(f)):
         for a in range(d):
-            f[i, a] += change[i, a]
-            extra[i * d + a] += change[i, a]
+            ahead = 2.0 * change[0, i, a] - change[1, i, a]
+            f[i, a] += ahead
+            extra[i * d + a] += ahead
     found = _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, largest, work)
     if not found:
         # from the forces before the step: sweeps that do not settle lead away
@@ -68,7 +70,8 @@ def contact_forces(c, flexibility, w, f, change, extra, table, load0, load1, pre
         )
     for i in range(len(f)):
         for a in range(d):
-            change[i, a] = f[i, a] - old[0][i, a]
+            change[1, i, a] = change[0, i, a]
+            change[0, i, a] = f[i, a] - old[0][i, a]
     return found
 
 
@@ -91,6 +94,8 @@ def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, lar
         for a in range(d):
             if f[i, a] != 0.0:
                 _subtract(columns[i * d + a], f[i, a], w)
+    # a first sweep says nothing of how fast they settle
+    before = 0.0
     for _ in range(SWEEPS):
         change = 0.0
         for i in range(n):
@@ -106,8 +111,11 @@ def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, lar
                 extra[first + a] = f[i, a] - preload[first + a]
                 change = max(change, abs(gap[a]))
                 _subtract(columns[first + a], gap[a], w)
-        if change <= SETTLED * largest:
+        # by how much the next one would change a force, if it falls again as it did
+        ahead = change * min(change / before, 1.0) if before > 0.0 else change
+        if ahead <= SETTLED * largest:
             return True
+        before = change
     return False
 
 
