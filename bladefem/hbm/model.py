@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, TypeVar
 
 import numpy as np
@@ -14,6 +14,7 @@ import numpy as np
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_real
+from ..reduction.assemble import change_each
 from .linear.bodies import Damping, Stack, stack_bodies
 from .validate_model import check_model, port_size
 
@@ -285,9 +286,8 @@ def softened_layer(model: ReducedModel) -> ReducedModel:
         return model
 
     def make() -> ReducedModel:
-        return replace(
-            model, sides=tuple(in_series(side, -series) for side in model.sides), series=None
-        )
+        sides = change_each(partial(in_series, compliance=-series), model.sides)
+        return replace(model, sides=sides, series=None)
 
     return model.once("softened layer", make)
 

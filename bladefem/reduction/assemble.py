@@ -4,7 +4,7 @@ diameter h EO mod N.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import pi
 
@@ -75,7 +75,8 @@ def wheel_models(
     harmonics: int,
     shift: int = 0,
 ) -> tuple[PortModel, ...]:
-    """One model a harmonic 0..`harmonics` for a tuned wheel.
+    """One model a harmonic 0..`harmonics` for a tuned wheel; harmonics that move in the same
+    diameter share one.
 
     Args:
         sector: nodal diameter 0..N/2 to the sector's model in it.
@@ -85,16 +86,26 @@ def wheel_models(
     Raises:
         InputError: a harmonic falls into a nodal diameter that is not given.
     """
-    models = []
-    for h in range(harmonics + 1):
-        n, mirrored = folded_diameter(1, h * engine_order + shift, sectors)
+    diameters = [(h * engine_order + shift) % sectors for h in range(harmonics + 1)]
+    models = {}
+    for h, diameter in enumerate(diameters):
+        n, mirrored = folded_diameter(1, diameter, sectors)
         if n not in sector:
             raise InputError(
                 f"harmonic {h} of engine order {engine_order} needs the modes of nodal diameter {n}"
             )
-        body = _mirror(sector[n]) if mirrored else sector[n]
-        models.append(pair_model(body, following, 2 * pi * (h * engine_order + shift) / sectors))
-    return tuple(models)
+        if diameter not in models:
+            body = _mirror(sector[n]) if mirrored else sector[n]
+            models[diameter] = pair_model(body, following, 2 * pi * diameter / sectors)
+    return tuple(models[diameter] for diameter in diameters)
+
+
+def change_each(
+    change: Callable[[PortModel], PortModel], bodies: Sequence[PortModel]
+) -> tuple[PortModel, ...]:
+    """Changed bodies; one that stands for several harmonics is changed once and stays one."""
+    changed = {id(body): change(body) for body in {id(body): body for body in bodies}.values()}
+    return tuple(changed[id(body)] for body in bodies)
 
 
 def join_bodies(bodies: tuple[PortModel, ...]) -> PortModel:

@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 
 import numpy as np
 
 from ...data import Elements, PortModel, RigidBody
 from ...friction.law_table import merged_laws
 from ...hbm.model import ReducedModel, in_series, softened_layer
-from ...reduction.assemble import recombine_contact
+from ...reduction.assemble import change_each, recombine_contact
 from ...reduction.truncate import truncate_modes
 from .settings import Settings
 
@@ -135,10 +135,10 @@ def coarsened_elements(
         for h, f in model.normal.items()
     }
     # what elements leave of their layer to the bodies stays with each of them
-    sides = tuple(recombine_contact(body, dofs) for body in softened_layer(model).sides)
+    sides = change_each(partial(recombine_contact, selection=dofs), softened_layer(model).sides)
     series = None if model.series is None else means**2 @ model.series
     if series is not None:
-        sides = tuple(in_series(side, series) for side in sides)
+        sides = change_each(partial(in_series, compliance=series), sides)
     return replace(
         model,
         sides=sides,

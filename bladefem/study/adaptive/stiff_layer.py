@@ -9,6 +9,7 @@ wedge with 1e5 N/mm^3 under 80 and 320 N it took 67 and 261 s, without that comp
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ...errors import NotSolvedError
 from ...hbm.model import ReducedModel, in_series
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution
+from ...reduction.assemble import change_each
 from .choice import solver_options
 from .family import Family, family_member
 from .resonance_choice import LIFTING_POINTS, peak_from
@@ -109,7 +111,8 @@ def softer_model(model: ReducedModel, softening: float) -> ReducedModel:
     e = model.elements
     own = np.column_stack([e.kn, *[e.kt] * e.tangents])
     more = softening * np.divide(1.0, own, out=np.zeros_like(own), where=own > 0)
-    return replace(model, sides=tuple(in_series(side, more) for side in model.sides), series=more)
+    sides = change_each(partial(in_series, compliance=more), model.sides)
+    return replace(model, sides=sides, series=more)
 
 
 def stiff_layer_change(
@@ -205,6 +208,6 @@ def stiffened_model(split: ReducedModel, share: float) -> ReducedModel:
             kt=stiffness[:, 1],
             n0=np.where(e.n0 > 0, e.n0, ratio * e.n0),
         ),
-        sides=tuple(in_series(side, left - split.series) for side in split.sides),
+        sides=change_each(partial(in_series, compliance=left - split.series), split.sides),
         series=left,
     )

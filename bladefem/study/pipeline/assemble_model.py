@@ -5,6 +5,7 @@ solves.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from math import pi
 
 import numpy as np
@@ -16,7 +17,7 @@ from geometry.mesh import Mesh, sector_of
 from ...data import Elements, Patch, PortModel, RigidBody
 from ...errors import InputError
 from ...hbm.model import Damping, ReducedModel, in_series
-from ...reduction.assemble import pair_models, recombine_contact, wheel_models
+from ...reduction.assemble import change_each, pair_models, recombine_contact, wheel_models
 from ...scene.tables import Scene
 from .flow import flowing_sides, scene_flow
 from .reduced_sector import Reduced
@@ -75,13 +76,13 @@ def joint_model(
         sides = _sides(scene, reduced, harmonics)
     elements = case.elements
     if not whole:
-        sides = tuple(recombine_contact(side, pick) for side in sides)
+        sides = change_each(partial(recombine_contact, selection=pick), sides)
     if damper == "mass" or scene.contact.normal == "prescribed":
         elements = replace(elements, kn=np.zeros_like(elements.kn))
     series = case.series
     if series is not None:
         series = series * np.r_[float(elements.kn.any()), np.ones(elements.tangents)]
-        sides = tuple(in_series(side, series) for side in sides)
+        sides = change_each(partial(in_series, compliance=series), sides)
     other: RigidBody | tuple[PortModel, ...]
     if damper == "elastic":
         free = _with_stop(scene, mesh, reduced, patches).damper

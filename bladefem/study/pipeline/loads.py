@@ -28,6 +28,7 @@ from ..adaptive.resonance_curve import resonance_curve, too_large_to_follow
 from ..adaptive.settings import Settings, restarted_settings
 from ..adaptive.stiff_layer import stiff_layer_change
 from .assemble_model import LoadCase
+from .best_load import BestLoad
 from .body_mesh import SofterBody, softened_change
 from .error_in_time import Marches
 from .judged_resonance import judged_in_time, judged_resonance
@@ -213,10 +214,12 @@ def study_loads(
     keep: Keep = compute_without_keeping,
     softer: SofterBody | None = None,
     best: float = 0.0,
-) -> list[Curve]:
-    """One response curve a load case, shared over the ranks; every rank returns all of them.
+    searches: Sequence[Callable[[], BestLoad]] = (),
+) -> tuple[list[Curve], list[BestLoad]]:
+    """One response curve a load case, and the results of searches for the best load, shared over
+    the ranks; every rank returns all of them.
 
-    Loads that take longest come first, and the next one goes to the rank that is free.
+    What takes longest comes first, and the next one goes to the rank that is free.
 
     Args:
         family: of a load case, its models.
@@ -228,6 +231,7 @@ def study_loads(
             and kept.
         softer: the body less the error of its stiffness, for the error by its mesh.
         best: load with the smallest resonance [N]; 0 where it is not known.
+        searches: take as long as the response of a load below the best one.
     """
     order = longest_first([case.load for case in cases], best)
 
@@ -235,10 +239,12 @@ def study_loads(
         return keep(case, partial(curve_of, scene, case, family, settings, softer))
 
     def shown(numbers: Iterable[int]) -> Iterable[int]:
-        return progress(numbers, "forced responses", total=len(cases), delay=0.0)
+        return progress(numbers, "forced responses", total=len(tasks), delay=0.0)
 
-    curves = share_work(curve_at, [cases[i] for i in order], comm, shown, on_demand=True)
-    return [curves[order.index(i)] for i in range(len(cases))]
+    tasks: list[Callable[[], Any]] = [*searches, *(partial(curve_at, cases[i]) for i in order)]
+    done: list[Any] = share_work(lambda task: task(), tasks, comm, shown, on_demand=True)
+    found, curves = done[: len(searches)], done[len(searches) :]
+    return [curves[order.index(i)] for i in range(len(cases))], found
 
 
 def longest_first(loads: Sequence[float], best: float = 0.0) -> list[int]:

@@ -10,6 +10,7 @@ from geometry.mesh import Mesh, sector_of
 
 from ...data import Patch
 from ...errors import NotSolvedError
+from ...hbm.parallel import share_work
 from ...io.stage_cache import on_root
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
@@ -59,11 +60,13 @@ def run_response(
     settings = before.settings
     clock = keep.clock
     family = partial(family_of_case, scene, mesh, before.reduced, patches)
-    with clock("best load"):
-        best = _best_loads(scene, mesh, before.contact, family, settings, keep)
-        clock.messages.extend(best_load_remarks(scene, best))
-    charted = scene.study.loads is None and best and not any(b.reason for b in best)
-    if charted:
+    searches = _best_load_searches(scene, mesh, before.contact, family, settings, keep)
+    best: list[BestLoad] = []
+    if scene.study.loads is None:
+        with clock("best load"):
+            best = share_work(_done, searches, keep.comm, on_demand=True)
+        searches = []
+    if best and not any(b.reason for b in best):
         loads = studied_loads(scene, before.contact.own, chart_loads(best))
         before = replace(before, contact=seat_at_loads(scene, before.contact, loads, clock))
     cases = load_cases(scene, mesh, before.contact)
@@ -74,9 +77,11 @@ def run_response(
             "those of the stage, or its elements are far too large"
         )
     sectors = sector_of(mesh).count if is_wheel(mesh) else 0
-    response = _load_responses(scene, cases, family, settings, keep, softer, sectors, best)
+    response = _load_responses(
+        scene, cases, family, settings, keep, softer, sectors, best, searches
+    )
     with clock("influences"):
-        found = _influences(scene, mesh, before.contact, family, best, keep)
+        found = _influences(scene, mesh, before.contact, family, response.best, keep)
     curves = response.curves
     with clock("stresses"):
         damped = keep(
@@ -85,7 +90,7 @@ def run_response(
             lambda: _stresses(before, bodies, patches, curves, cases),
         )
         clock.messages.append(stress_message(curves, damped))
-    response = replace(response, best=best, influences=found)
+    response = replace(response, influences=found)
     result = SolvedRun(**vars(before), response=response, damped=damped)
     clock.messages.extend(filter(None, [utilisation_message(result)]))
     return result
@@ -138,15 +143,18 @@ def _load_responses(
     softer: SofterBody | None,
     sectors: int,
     best: Sequence[BestLoad],
+    searches: Sequence[Callable[[], BestLoad]],
 ) -> Response:
-    """Curves of all loads, and what is left without friction.
+    """Curves of all loads, the best loads, and what is left without friction.
 
     Args:
         sectors: of the wheel; 0 without one.
+        best: loads that were searched before.
+        searches: for those that were not.
     """
     clock = keep.clock
     with clock("response"):
-        curves = study_loads(
+        curves, found = study_loads(
             scene,
             cases,
             family,
@@ -160,11 +168,14 @@ def _load_responses(
             ),
             softer,
             min((b.load for b in best if not b.reason), default=0.0),
+            searches,
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         models = family(cases[-1])
         rich = family_member(models, settings).model
         limits = linear_limits(rich, scene.excitation.mode, band)
+    best = (*best, *found)
+    clock.messages.extend(best_load_remarks(scene, best))
     nodes = -(-len(cases[0].elements.kt) // 2)
     judged = Disturbances()
     others: dict[int, tuple[ClassVerdict, ...]] = {}
@@ -177,7 +188,7 @@ def _load_responses(
             others[k] = _class_verdicts(scene, family(cases[k]), curves[k], sectors, keep)
     clock.messages.extend(response_remarks(scene, settings, curves, nodes, judged))
     clock.messages.extend(_class_remarks(curves, others, judged))
-    return Response(settings, curves, limits, others=others)
+    return Response(settings, curves, limits, best, others=others)
 
 
 def _class_verdicts(
@@ -212,32 +223,40 @@ def _class_remarks(
 
 def _case_label(case: LoadCase) -> str:
     """ "90N" or "90N_30g"."""
-    return f"{case.load:g}N" + ("" if case.mass is None else f"_{1e3 * case.mass:g}g")
+    return f"{case.load:g}N{_mass_label(case.mass)}"
 
 
-def _best_loads(
+def _mass_label(mass: float | None) -> str:
+    return "" if mass is None else f"_{1e3 * mass:g}g"
+
+
+def _best_load_searches(
     scene: Scene,
     mesh: Mesh,
     contact: Seating,
     family: Callable[[LoadCase], Family],
     settings: Settings,
     keep: StageRunner,
-) -> tuple[BestLoad, ...]:
-    """The best load of each mass of the damper; none where a single load was asked for."""
+) -> list[Callable[[], BestLoad]]:
+    """The search for the best load of each mass of the damper, on one rank; none where a single
+    load was asked for.
+    """
     if scene.study.loads is not None and len(scene.study.loads) == 1:
-        return ()
+        return []
 
     def search(mass: float | None) -> BestLoad:
         case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass, contact.rough)
         return find_best_load(scene, case_at, family, settings, mass)
 
-    def compute() -> list[BestLoad]:
-        return on_root(keep.comm, lambda: [search(mass) for mass in scene.study.masses or (None,)])
+    def kept(mass: float | None) -> BestLoad:
+        key = stage_key("response", scene, "best load", mass, replace(settings, error=None))
+        return keep.alone(f"best_load{_mass_label(mass)}", key, partial(search, mass))
 
-    key = stage_key(
-        "response", scene, "best load", scene.study.masses, replace(settings, error=None)
-    )
-    return tuple(keep("best_load", key, compute))
+    return [partial(kept, mass) for mass in scene.study.masses or (None,)]
+
+
+def _done(search: Callable[[], BestLoad]) -> BestLoad:
+    return search()
 
 
 def _influences(
@@ -245,7 +264,7 @@ def _influences(
     mesh: Mesh,
     contact: Seating,
     family: Callable[[LoadCase], Family],
-    best: tuple[BestLoad, ...],
+    best: Sequence[BestLoad],
     keep: StageRunner,
 ) -> tuple[Influence, ...]:
     """What the lowest of the best loads depends on; none where it was not found or not wanted."""
