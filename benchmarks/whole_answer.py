@@ -52,7 +52,7 @@ from whole_answer_picture import draw_answer, write_advice, write_section
 
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.ring_march import march_ring
+from bladefem.hbm.ring_march import march_ring, state_of_solution
 from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
@@ -346,7 +346,7 @@ def judged(known: Prepared, k: int, answer: Answer) -> float:
         top = solve(model, moved.omega, 7, 512, start=moved)
         if not top.converged:
             return np.nan
-        march = march_ring(model, top, 1e-3, JUDGED_PERIODS)
+        march = march_ring(model, state_of_solution(model, top, 1e-3), JUDGED_PERIODS)
     except (InputError, NotSolvedError):
         return np.nan
     lines = 2 / march.motion.shape[-1] * np.fft.rfft(march.motion[-1], axis=-1)

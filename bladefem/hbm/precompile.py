@@ -25,7 +25,7 @@ from ..reduction.matrices import port_model_from_matrices
 from .linear.condensation import condense
 from .linear.contact_flexibility import by_harmonic
 from .model import Damping, ReducedModel
-from .ring_march import march_ring
+from .ring_march import march_ring, state_of_solution
 from .solve import solve
 from .solver.newton import newton
 from .solver.newton_krylov import iterative_inverse
@@ -93,7 +93,7 @@ def compile_linear() -> None:
     )
     inverse(np.ones((3, 5)), 1e-6)
     evaluate(plane.elements, np.full((1, 3, 5), 0.1), 64)
-    march_ring(plane, solve(plane, 1.0, 2, 64), 0.0, 1)
+    march_ring(plane, state_of_solution(plane, solve(plane, 1.0, 2, 64)), 1)
 
 
 def _line_model() -> ReducedModel:

@@ -35,6 +35,28 @@ PERIODS_AT_ONCE = 25
 
 
 @dataclass(frozen=True)
+class Drive:
+    """What excites the blades while they are marched."""
+
+    # [rad/s]
+    omega: float
+    # excitation over that of the model
+    size: float = 1.0
+
+
+@dataclass(frozen=True)
+class RingState:
+    """Blades and dampers at the beginning of a period of a drive."""
+
+    drive: Drive
+    # (2M,) modal displacements and velocities that contact forces add to the steady motion
+    # without them
+    modal: np.ndarray
+    # (r n, 3) contact forces, normal and two tangential ones [N]
+    forces: np.ndarray
+
+
+@dataclass(frozen=True)
 class RingMarch:
     """Motion of the first probe of each blade."""
 
@@ -46,6 +68,8 @@ class RingMarch:
     resolved: bool
     # operations that all periods would have taken, roughly
     operations: float
+    # after the last period
+    end: RingState
 
 
 def march_operations(
@@ -56,8 +80,7 @@ def march_operations(
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
     """
-    system = model.once("ring", lambda: sector_modes(model))
-    m, M = system.contact.shape
+    m, M = _system(model).contact.shape
     return 2.0 * periods * instants * (4 * M**2 + 4 * M * m + 5 * m**2)
 
 
@@ -68,17 +91,16 @@ def _never(motion: np.ndarray) -> bool:
 
 def march_ring(
     model: ReducedModel,
-    point: Solution,
-    disturbance: float,
+    start: RingState,
     periods: int,
     instants: int = INSTANTS_PER_PERIOD,
     enough: Callable[[np.ndarray], bool] = _never,
     most: float = np.inf,
 ) -> RingMarch:
-    """March from a solution whose modal amplitudes are disturbed.
+    """March under the drive of a state.
 
     Args:
-        disturbance: relative, of another size and sign for each mode.
+        start: of ``state_of_solution``, or of an earlier march, perhaps ``driven_anew``.
         periods: of the excitation, at most.
         enough: whether the motion (periods, r, instants) so far will do; asked every
             PERIODS_AT_ONCE.
@@ -93,20 +115,21 @@ def march_ring(
         raise InputError("normal loads are prescribed, expected ones that follow the motion")
     if model.elements.law is not None:
         raise InputError("a friction law of its own, expected Coulomb's")
-    r = model.once("ring", lambda: sector_modes(model)).blades
+    r = _system(model).blades
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
-    resolved, start = _start(model, point, disturbance, S)
+    y, forces = start.modal.copy(), start.forces.copy()
+    resolved, prepared = _prepared(model, start, S)
     motion = np.empty((periods, S, r))
     work = np.zeros(1)
-    m, M = model.once("ring", lambda: sector_modes(model)).contact.shape
+    m, M = _system(model).contact.shape
     of_bodies = 8.0 * periods * S * M * (M + m)
     operations = of_bodies
     settled, done = True, 0
     while settled and done < periods:
         # the first period tells what the others take
         following = min(done - done % PERIODS_AT_ONCE + PERIODS_AT_ONCE, periods) if done else 1
-        settled = bool(_march(*start, motion[done:following], work))
+        settled = bool(_march(y, forces, *prepared, motion[done:following], work))
         done = following
         operations = of_bodies + work[0] * periods / done
         if operations > most:
@@ -114,41 +137,71 @@ def march_ring(
         whole = done % PERIODS_AT_ONCE == 0 or done == periods
         if whole and enough(motion[:done].transpose(0, 2, 1)):
             break
-    return RingMarch(motion[:done].transpose(0, 2, 1), settled, resolved, operations)
+    end = RingState(start.drive, y, forces)
+    return RingMarch(motion[:done].transpose(0, 2, 1), settled, resolved, operations, end)
 
 
-def _start(
+def state_of_solution(
     model: ReducedModel,
     point: Solution,
-    disturbance: float,
-    S: int,
-) -> tuple[bool, tuple[Any, ...]]:
-    """Whether steps at S instants a period are short enough for forces that are linear in them, and
-    what `_march` takes before the motion: state and forces of a solution whose modal amplitudes are
-    disturbed, which it changes, and the steps of the bodies.
+    disturbance: float = 0.0,
+) -> RingState:
+    """The state of a solution whose modal amplitudes are disturbed.
+
+    Args:
+        disturbance: relative, of another size and sign for each mode.
+
+    Raises:
+        InputError: the wave does not repeat within the harmonics that the model has bodies for.
     """
-    system = model.once("ring", lambda: sector_modes(model))
-    r, M = system.blades, len(system.stiffness)
-    H = point.harmonics
-    free = _of_blades(condense(model, point.omega, H).free, r, S)
-    free_probe = _of_blades(free_response(model, point.omega, H)[:, :1], r, S)
-    preload = np.tile(model.preload, r)
-    forces = _of_blades(to_complex(point.f).reshape(-1, H + 1).T, r, S)[0]
-    q = _modal_start(model, system, point)
+    system = _system(model)
+    M = len(system.stiffness)
+    forces = _blades_at_start(to_complex(point.f).reshape(-1, point.harmonics + 1).T, system.blades)
+    q, velocity = _modal_start(model, system, point)
     noise = np.random.default_rng(0).standard_normal(M)
-    y = np.concatenate([q[0] * (1 + disturbance * noise), q[1]])
-    dt = 2 * np.pi / point.omega / S
+    y = np.concatenate([q * (1 + disturbance * noise), velocity])
+    return RingState(Drive(point.omega), y, _three(forces, model.elements.tangents))
+
+
+def driven_anew(model: ReducedModel, state: RingState, drive: Drive) -> RingState:
+    """The same motion of the modes under another drive from now on; on a model of other contact
+    points with forces that are found in its first steps.
+    """
+    before, after = (_free_modal_state(model, one) for one in (state.drive, drive))
+    nodes = _system(model).blades * len(model.elements.kt)
+    forces = state.forces if len(state.forces) == nodes else np.zeros((nodes, 3))
+    return RingState(drive, state.modal + before - after, forces)
+
+
+def _system(model: ReducedModel) -> SectorModes:
+    return model.once("ring", lambda: sector_modes(model))
+
+
+def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tuple[Any, ...]]:
+    """Whether steps at S instants a period are short enough for forces that are linear in them, and
+    what `_march` takes after state and forces: displacements, which it changes, and the steps of
+    the bodies.
+    """
+    system = _system(model)
+    r, M = system.blades, len(system.stiffness)
+    omega, size = start.drive.omega, start.drive.size
+    H = max((1, *model.excitation))
+    steady = condense(model, omega, H).free.copy(), free_response(model, omega, H)[:, :1].copy()
+    for amplitudes in steady:
+        amplitudes[1:] *= size
+    free, free_probe = (_of_blades(amplitudes, r, S) for amplitudes in steady)
+    preload = np.tile(model.preload, r)
+    dt = 2 * np.pi / omega / S
     springs = np.tile(model.springs.ravel(), r)
     bodies = (system.stiffness_matrix, system.contact.T, system.residual)
     resolved = dt <= longest_linear_step(*bodies, springs)
     E, G0, G1 = linear_steps(system, dt, mean=not resolved)
     e = model.elements
-    w = free[0] + system.contact @ y[:M] - system.residual @ (forces - preload)
+    extra = start.forces[:, : 1 + e.tangents].ravel() - preload
+    w = free[0] + system.contact @ start.modal[:M] - system.residual @ extra
     F = system.residual + system.contact @ G1[:M] @ system.contact.T
     probes = len(system.probe) // r
     return resolved, (
-        y,
-        _three(forces, e.tangents),
         w,
         tuple(map(_sparse_rows, (E, -G0, -G1))),
         (np.ascontiguousarray(system.contact), np.ascontiguousarray(system.contact.T)),
@@ -208,15 +261,9 @@ def _modal_start(
     H, r = point.harmonics, system.blades
     f = to_complex(point.f).reshape(-1, H + 1).T.copy()
     f[0] -= model.preload
-    h = np.arange(H + 1)
-    turn = np.exp(2j * np.pi * h[:, None] * np.arange(r) / r)
-    force = (turn[:, :, None] * f[:, None, :]).reshape(H + 1, -1)
+    force = _of_wave(f, r)
     push = -force @ system.contact
-    q = np.zeros_like(push)
-    for n in range(1, H + 1):
-        w = n * point.omega
-        impedance = system.stiffness_matrix - w**2 * np.eye(len(system.stiffness))
-        q[n] = np.linalg.solve(impedance + 1j * w * system.damping, push[n])
+    q = _steady_modes(system, push, point.omega)
     still = system.stiffness <= 0
     held = system.stiffness_matrix[np.ix_(~still, ~still)]
     q[0, ~still] = np.linalg.solve(held, push[0, ~still])
@@ -229,8 +276,50 @@ def _modal_start(
         flexible = system.contact @ q[0].real - system.residual @ force[0].real
         missing = np.tile(mean - free, r) - flexible
         q[0, still] = np.linalg.lstsq(system.contact[:, still], missing, rcond=1e-9)[0]
-    velocity = (1j * point.omega * h[:, None] * q).sum(axis=0).real
-    return q.sum(axis=0).real, velocity
+    return _at_start(q, point.omega)
+
+
+def _free_modal_state(model: ReducedModel, drive: Drive) -> np.ndarray:
+    """(2M,) modal displacements and velocities of the steady motion without contact forces, less
+    the mean, at phase zero.
+    """
+    system = _system(model)
+    H = max((1, *model.excitation))
+    loads = len(system.load) // system.blades
+    force = np.zeros((H + 1, loads), dtype=complex)
+    for h, amplitude in model.excitation.items():
+        force[h] = drive.size * amplitude
+    push = _of_wave(force, system.blades) @ system.load
+    return np.concatenate(_at_start(_steady_modes(system, push, drive.omega), drive.omega))
+
+
+def _steady_modes(system: SectorModes, push: np.ndarray, omega: float) -> np.ndarray:
+    """(H+1, M) complex modal amplitudes under modal forces (H+1, M); those of the mean are zero."""
+    q = np.zeros_like(push)
+    identity = np.eye(len(system.stiffness))
+    for h in range(1, len(push)):
+        w = h * omega
+        impedance = system.stiffness_matrix - w**2 * identity + 1j * w * system.damping
+        q[h] = np.linalg.solve(impedance, push[h])
+    return q
+
+
+def _at_start(q: np.ndarray, omega: float) -> tuple[np.ndarray, np.ndarray]:
+    """(M,) displacements and velocities at phase zero from amplitudes (H+1, M)."""
+    h = np.arange(len(q))[:, None]
+    return q.sum(axis=0).real, (1j * omega * h * q).sum(axis=0).real
+
+
+def _of_wave(amplitudes: np.ndarray, r: int) -> np.ndarray:
+    """(H+1, r rows) of all blades from complex amplitudes (H+1, rows) of one."""
+    h = np.arange(len(amplitudes))[:, None]
+    turn = np.exp(2j * np.pi * h * np.arange(r) / r)
+    return (turn[:, :, None] * amplitudes[:, None, :]).reshape(len(amplitudes), -1)
+
+
+def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
+    """(r rows,) of all blades at phase zero from complex amplitudes (H+1, rows) of one."""
+    return np.asarray(_of_wave(amplitudes, r).sum(axis=0).real)
 
 
 @njit(**KERNEL)

@@ -10,7 +10,7 @@ are its modes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 
 import numpy as np
@@ -48,6 +48,8 @@ class SectorModes:
     probe_residual: np.ndarray
     # (M, M) forces of the displacements that have no energy [1/s^2]; None where there are none
     circulatory: np.ndarray | None = None
+    # (r l, M) the same as U for the l loads on each blade; empty where nothing is asked of them
+    load: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def stiffness_matrix(self) -> np.ndarray:
@@ -71,9 +73,10 @@ def sector_modes(model: ReducedModel) -> SectorModes:
         np.hstack([part.contact for part in parts]),
         reduce(np.add, [part.residual for part in parts]),
         linalg.block_diag(*[part.turn for part in parts]),
-        np.hstack([_probes(part, len(parts[0].probe)) for part in parts]),
+        np.hstack([_readings(part, part.probe, len(parts[0].probe)) for part in parts]),
         parts[0].probe_residual,
         _joined_circulation(parts) if model.circulatory else None,
+        np.hstack([_readings(part, part.load, len(parts[0].load)) for part in parts]),
     )
 
 
@@ -82,9 +85,9 @@ def _joined_circulation(parts: Sequence[SectorModes]) -> np.ndarray:
     return linalg.block_diag(*[part.stiffness_matrix - np.diag(part.stiffness) for part in parts])
 
 
-def _probes(part: SectorModes, count: int) -> np.ndarray:
-    """(count, M) readings at the probes, none of which is on a damper."""
-    return part.probe if len(part.probe) else np.zeros((count, len(part.stiffness)))
+def _readings(part: SectorModes, rows: np.ndarray, count: int) -> np.ndarray:
+    """(count, M) readings at probes or loads, none of which is on a damper."""
+    return rows if len(rows) else np.zeros((count, len(part.stiffness)))
 
 
 def blades_of_wave(model: ReducedModel) -> int:
@@ -160,6 +163,7 @@ def _ring(
     stiffness: list[np.ndarray] = []
     contact: list[np.ndarray] = []
     probe: list[np.ndarray] = []
+    load: list[np.ndarray] = []
     loss: list[np.ndarray] = []
     turning: list[np.ndarray] = []
     turned: list[np.ndarray] = []
@@ -174,7 +178,7 @@ def _ring(
         double = 0 < 2 * j < r
         size = sign * np.sqrt((2 if double else 1) / r)
         phase = np.exp(2j * np.pi * j * blade / r)[:, None, None]
-        for rows, found in ((stack.contact, contact), (stack.probe, probe)):
+        for rows, found in ((stack.contact, contact), (stack.probe, probe), (stack.load, load)):
             shapes = size * (phase * stack.shapes[row, rows]).reshape(-1, len(own))
             found.extend([shapes.real] + [shapes.imag] * double)
         stiffness.extend([own**2] * (1 + double))
@@ -192,6 +196,7 @@ def _ring(
         np.hstack(probe),
         _ring_residual(stack, r, stack.probe),
         None if stack.circulatory is None else linalg.block_diag(*turning),
+        np.hstack(load),
     )
 
 

@@ -9,9 +9,9 @@ from scipy import linalg
 from test_stability import marched
 
 from bladefem.hbm.flow_map import flow_map
-from bladefem.hbm.ring_march import march_ring
+from bladefem.hbm.ring_march import Drive, driven_anew, march_ring, state_of_solution
 from bladefem.hbm.sector_modes import sector_modes
-from bladefem.hbm.solve import solve
+from bladefem.hbm.solve import free_response, solve
 from bladefem.hbm.stability import _handed_on, linearised_contacts
 
 PERIODS = 30
@@ -28,7 +28,7 @@ def test_a_march_by_steps_is_the_plain_one(omega):
     model = bouncing()
     point = solve(model, omega, 15, 1024)
     plain = heights(marched(model, point, PERIODS))
-    found = march_ring(model, point, 0.0, PERIODS, 512)
+    found = march_ring(model, state_of_solution(model, point), PERIODS, 512)
     assert found.settled
     own = heights(found.motion[:, 0])
     # where it bounces irregularly, two marches part after some periods
@@ -41,8 +41,8 @@ def test_blades_without_coupling_march_as_one_alone():
     body = alone.sides[0]
     sides = tuple(replace(body, shapes=body.shapes * np.exp(0.5j * np.pi * h)) for h in range(9))
     wave = replace(alone, sides=sides)
-    one = march_ring(alone, solve(alone, 1.3, 7, 256), 0.0, 10)
-    four = march_ring(wave, solve(wave, 1.3, 7, 256), 0.0, 10)
+    one = march_ring(alone, state_of_solution(alone, solve(alone, 1.3, 7, 256)), 10)
+    four = march_ring(wave, state_of_solution(wave, solve(wave, 1.3, 7, 256)), 10)
     assert four.motion.shape[1] == 4
     for blade in range(4):
         found = heights(four.motion[2:, blade])
@@ -66,7 +66,32 @@ def test_a_march_that_its_first_period_shows_to_be_too_long_is_left():
     """Contact forces of stiff layers take many sweeps, which no size tells."""
     model = bouncing()
     point = solve(model, 1.3, 7, 256)
-    whole = march_ring(model, point, 0.0, 50)
-    left = march_ring(model, point, 0.0, 50, most=whole.operations / 2)
+    start = state_of_solution(model, point)
+    whole = march_ring(model, start, 50)
+    left = march_ring(model, start, 50, most=whole.operations / 2)
     assert len(left.motion) == 1 and left.operations == pytest.approx(whole.operations, rel=0.3)
-    assert len(march_ring(model, point, 0.0, 50, most=2 * whole.operations).motion) == 50
+    assert len(march_ring(model, start, 50, most=2 * whole.operations).motion) == 50
+
+
+def test_a_march_that_goes_on_from_its_end_is_one_march():
+    model = bouncing()
+    start = state_of_solution(model, solve(model, 1.3, 7, 256), 1e-3)
+    whole = march_ring(model, start, 6)
+    half = march_ring(model, start, 3)
+    rest = march_ring(model, driven_anew(model, half.end, start.drive), 3)
+    parts = np.concatenate([half.motion, rest.motion])
+    np.testing.assert_allclose(parts, whole.motion, atol=1e-5 * abs(whole.motion).max())
+
+
+def test_another_drive_takes_the_motion_over_and_leads_to_its_own():
+    """Without contact the new steady motion is known, and so is what the old one leaves in it."""
+    model = bouncing()
+    elements = replace(model.elements, n0=np.full(len(model.elements.kt), -1e3))
+    model = replace(model, elements=elements)
+    point = solve(model, 1.3, 3, 64)
+    drive = Drive(1.5, 0.7)
+    start = driven_anew(model, state_of_solution(model, point), drive)
+    found = march_ring(model, start, 400).motion[:, 0]
+    line = 2 / found.shape[-1] * np.fft.rfft(found)[:, 1]
+    assert found[0, 0] == pytest.approx(point.probe[:, 0].sum().real, rel=1e-6)
+    assert line[-1] == pytest.approx(0.7 * free_response(model, 1.5)[1, 0], rel=1e-6)

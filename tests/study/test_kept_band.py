@@ -162,7 +162,7 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
 def marches_that_grow(point, instants_that_hold):
     """A march whose motion grows fivefold unless it has so many instants."""
 
-    def march(model, point, disturbance, periods, instants, enough, most):
+    def march(model, start, periods, instants, enough, most):
         growth = 1.0 if instants >= instants_that_hold else 5.0
         return marched(np.full(periods, growth * size(point)), instants, enough)
 
@@ -199,7 +199,7 @@ def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, periods):
     monkeypatch.setattr(
         module,
         "march_ring",
-        lambda model, point, disturbance, periods, instants, enough, most: marched(
+        lambda model, start, periods, instants, enough, most: marched(
             size(point) * heights[:periods], instants, enough
         ),
     )
@@ -242,7 +242,7 @@ def test_steps_too_long_for_the_bodies_are_halved(monkeypatch, ends, lowest, hig
     point = solve(model, 3.0, 15, 1024)
     seen = []
 
-    def march(model, point, disturbance, periods, instants, enough, most):
+    def march(model, start, periods, instants, enough, most):
         heights = np.full(periods, ends[len(seen)] * size(point))
         seen.append(instants)
         found = marched(heights, instants, enough)

@@ -17,7 +17,12 @@ import numpy as np
 from ...damper.branch import state_of
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
-from ...hbm.ring_march import PERIODS_AT_ONCE, march_operations, march_ring
+from ...hbm.ring_march import (
+    PERIODS_AT_ONCE,
+    march_operations,
+    march_ring,
+    state_of_solution,
+)
 from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
 from ...time.event_integrator import State, integrate_periods
@@ -241,7 +246,8 @@ def _band_with(
     are linear in them.
     """
     enough = partial(_known_enough, point, instants)
-    march = march_ring(model, point, DISTURBANCE_SHARE, left + kept, instants, enough, counted)
+    start = state_of_solution(model, point, DISTURBANCE_SHARE)
+    march = march_ring(model, start, left + kept, instants, enough, counted)
     if march.operations > counted:
         reason = f"a march takes {march.operations:.1g} operations, at most {counted:.2g}"
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
