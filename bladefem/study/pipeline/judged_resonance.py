@@ -34,11 +34,16 @@ class JudgedResonance:
     contradicted: bool = False
 
 
-def judged_resonance(marches: Marches, curve: Checked, scene: Scene) -> JudgedResonance:
+def judged_resonance(
+    marches: Marches, curve: Checked, scene: Scene, sought: bool = False
+) -> JudgedResonance:
     """Judge a curve, and march from its highest point where that is unstable.
 
     That one gives way to the highest that was judged and is not, where the blade is known to keep
     to less than that: else the blade moves most next to the unstable one.
+
+    Args:
+        sought: marches have found the resonance; from the highest point none is made.
     """
     heights = heights_of(curve.points)
     place = int(heights.argmax())
@@ -51,7 +56,7 @@ def judged_resonance(marches: Marches, curve: Checked, scene: Scene) -> JudgedRe
     model = model_in_time(models, settings)
     richer = richer_models(models, settings)
     marks = stability_of(model, curve.points, richer)
-    if marks.verdict[place] != UNSTABLE:
+    if marks.verdict[place] != UNSTABLE or sought:
         return JudgedResonance(highest, marks)
     kept = marches.band(settings, highest)
     if kept is None or kept.too_long:

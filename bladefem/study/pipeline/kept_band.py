@@ -263,7 +263,7 @@ def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
     """A march by steps may end: its last parts keep to one band that they drift to no faster than
     before, or it has grown so far that it is repeated with more instants.
     """
-    amplitudes = _amplitudes(point, motion)
+    amplitudes = amplitudes_of_periods(motion, point.harmonics)
     again = instants < INSTANTS_BY_STEPS[-1] and bool(point.states["lift"])
     if again and amplitudes.max() > GROWN_RATIO * size(point):
         return True
@@ -275,15 +275,15 @@ def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
     return bool(now <= min(before, SETTLED_BAND * ends.max()))
 
 
-def _amplitudes(point: Solution, motion: np.ndarray) -> np.ndarray:
-    """Of the harmonics of a point, from motion (..., samples of a period) at the probe [m]."""
-    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1 : point.harmonics + 1]
+def amplitudes_of_periods(motion: np.ndarray, harmonics: int) -> np.ndarray:
+    """Root of the sum of squares of harmonics 1..H, from motion (..., samples of a period) [m]."""
+    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1 : harmonics + 1]
     return np.asarray(np.linalg.norm(lines, axis=-1))
 
 
 def _band_of(point: Solution, motion: np.ndarray, periods: int) -> KeptBand:
     """From motion (..., samples of a period) at the probe."""
-    amplitudes = _amplitudes(point, motion)
+    amplitudes = amplitudes_of_periods(motion, point.harmonics)
     return KeptBand(point.frequency, float(amplitudes.min()), float(amplitudes.max()), periods)
 
 

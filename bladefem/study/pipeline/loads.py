@@ -20,7 +20,7 @@ from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import checked_points, estimated_errors
+from ..adaptive.choice import Checked, checked_points, estimated_errors
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
 from ..adaptive.layer_change import layer_change
@@ -36,6 +36,7 @@ from .kept_band import KeptBand
 from .liftoff import naming_the_load
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
+from .resonance_in_time import ResonanceInTime, resonance_in_time
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 
@@ -108,6 +109,9 @@ class Curve:
     # a march from the resonance that its estimated error was taken from; None where richer balances
     # tell it
     in_time: KeptBand | None = None
+    # the resonance that marches from frequency to frequency found where balances do not tell it:
+    # its highest amplitude is given
+    sought: ResonanceInTime | None = None
     # range of the resonance over loading histories; None where it was not asked for
     interval: LoadInterval | None = None
     # contacts lift off and the balance is too large for following its motions round folds: a
@@ -133,6 +137,7 @@ class Curve:
 
         A march from an unstable resonance tells the error of its balance as well; one that ends
         above a resonance elsewhere adds to it, and so does the width of one that is given itself.
+        A resonance sought in time has an error of its own in place of the balance's.
         """
         if self.settings.error is None:
             return None
@@ -140,6 +145,8 @@ class Curve:
         same = self.keeps_unstable and not self.marched_instead
         balance = max(balance, self.marched) if same else balance + self.marched
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
+        if self.sought is not None:
+            balance, contact_mesh = self.sought.error, 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
         layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
         return balance + contact_mesh + body_mesh + layer_law
@@ -173,11 +180,13 @@ class Curve:
     @property
     def peak_frequency(self) -> float:
         """[Hz]"""
-        return self.peak.frequency
+        return self.peak.frequency if self.sought is None else self.sought.frequency
 
     @property
     def peak_amplitude(self) -> float:
         """That of the balance, or the highest that a march keeps to where it contradicts it [m]."""
+        if self.sought is not None:
+            return self.sought.highest
         if self.marched_instead and self.kept is not None:
             return self.kept.highest
         return self.balance_amplitude
@@ -281,10 +290,11 @@ def curve_of(
         curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy, march)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
-    judged = judged_resonance(marches, curve, scene)
+    sought = _sought_in_time(scene, models, curve)
+    judged = judged_resonance(marches, curve, scene, sought is not None)
     marks, top = judged.marks, judged.point
     estimated, in_time = estimated_errors(curve), None
-    if not judged.contradicted:
+    if not judged.contradicted and sought is None:
         curve, estimated, in_time = judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
@@ -309,6 +319,7 @@ def curve_of(
         kept=judged.kept,
         marched_instead=judged.contradicted,
         in_time=in_time,
+        sought=sought,
         interval=interval,
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,
@@ -317,6 +328,19 @@ def curve_of(
         layer_law=unseen.layer_law,
         layer_shift=unseen.layer_shift,
     )
+
+
+def _sought_in_time(scene: Scene, models: Family, curve: Checked) -> ResonanceInTime | None:
+    """The resonance by marches, where most contacts lift off and balances do not tell it to the
+    accuracy.
+    """
+    top = peak_of(curve.points)
+    error = curve.settings.error
+    if not scene.study.stability or error is None or error <= scene.accuracy:
+        return None
+    if curve.settings.softened or 2 * top.states["lift"] < len(top.w):
+        return None
+    return resonance_in_time(models, curve.settings, top)
 
 
 def _unseen_errors(

@@ -83,7 +83,11 @@ def local_resonances(curve: Curve) -> list[LocalResonance]:
 
 
 def reach_sentence(curve: Curve) -> str:
-    """How the resonance that is given is reached, where not every slow sweep comes to it."""
+    """How the resonance that is given is reached, where not every slow sweep comes to it; "" for
+    one that marches have found.
+    """
+    if curve.sought is not None:
+        return ""
     listed = local_resonances(curve)
     given = [r for r in listed if abs(r.amplitude / curve.balance_amplitude - 1) < SAME_HEIGHT]
     if not given or given[0].reached == f"{UP} and {DOWN}":

@@ -72,6 +72,9 @@ def response_remarks(
     remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
     unstable = (unstable_sentence(c, scene.accuracy) for c in curves)
     remarks.extend(warning(text) for text in unstable if text)
+    remarks.extend(
+        warning(f"load {load_of(c)}: {c.sought.sentence}") for c in curves if c.sought is not None
+    )
     remarks.extend(map(warning, filter(None, [unjudged_sentence(curves)])))
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
@@ -138,7 +141,7 @@ def beyond_tolerance(curves: list[Curve]) -> str:
     """
     missed = {}
     for c in curves:
-        beyond = c.converged & (c.estimated > c.tolerated) & (c.frequency != c.peak_frequency)
+        beyond = c.converged & (c.estimated > c.tolerated) & (c.frequency != c.peak.frequency)
         if beyond.any():
             missed[load_of(c)] = f"{beyond.sum()} of {len(beyond)} points"
     if not missed:
@@ -153,7 +156,7 @@ def beyond_tolerance(curves: list[Curve]) -> str:
 
 def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
     """Why the highest points of curves may be wrong: one sentence a reason, with all its loads."""
-    next_to_unsolved = [load_of(c) for c in curves if _beside_unsolved(c)]
+    next_to_unsolved = [load_of(c) for c in curves if c.sought is None and _beside_unsolved(c)]
     if next_to_unsolved:
         yield (
             f"under {', '.join(next_to_unsolved)} the highest point that was solved lies next to "
@@ -208,7 +211,7 @@ def _largest_parts(curves: list[Curve]) -> str:
 
 def _beside_unsolved(c: Curve) -> bool:
     """Whether a point next to the highest one did not converge."""
-    near = np.flatnonzero(c.frequency == c.peak_frequency)[0] + np.array([-1, 1])
+    near = np.flatnonzero(c.frequency == c.peak.frequency)[0] + np.array([-1, 1])
     return not c.converged[near[(near >= 0) & (near < len(c.frequency))]].all()
 
 

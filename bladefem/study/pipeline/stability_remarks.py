@@ -166,7 +166,7 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
 
 def unjudged_sentence(curves: Sequence[Curve]) -> str:
     """The resonances whose motion could not be judged, among others that were, or ""."""
-    asked = [c for c in curves if (c.stability != UNKNOWN).any()]
+    asked = [c for c in curves if c.sought is None and (c.stability != UNKNOWN).any()]
     unknown = [c for c in asked if c.stability[_place(c, c.peak)] == UNKNOWN]
     if not unknown:
         return ""

@@ -1,0 +1,342 @@
+"""The resonance of a damper that bounces, sought by marching in time.
+
+Where most contacts lift off several motions exist at one frequency, few of them are periodic, and
+balances of the harmonics that are solved at all end on different ones. A march needs neither: the
+blade is driven harder than it is for a while and then left to come down, which leads it to the
+highest motion that it keeps there. From that the frequency is moved uphill step by step, the motion
+taken along, until the amplitude falls on both sides or the blade jumps to a lower motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...errors import InputError
+from ...hbm.model import ReducedModel
+from ...hbm.peak_ripples import bend_of_mode
+from ...hbm.ring_march import (
+    INSTANTS_PER_PERIOD,
+    PERIODS_AT_ONCE,
+    Drive,
+    RingState,
+    driven_anew,
+    march_ring,
+    state_of_solution,
+)
+from ...hbm.solution import Solution
+from ...util.arrays import RealArray
+from ...util.curve_extremum import parabola_at_middle
+from ..adaptive.family import Family, family_member
+from ..adaptive.resonance_choice import LIFTING_POINTS
+from ..adaptive.settings import Settings
+from .error_in_time import carried_motion
+from .kept_band import amplitudes_of_periods
+from .stability import model_in_time, settings_in_time
+
+# excitation over its own for these periods, before the blade comes down to what it keeps: 18 N on
+# the shipped wedge end on 1.13 mm from there and on 1.08 mm from the balance below, which creeps up
+OVERDRIVE = 2.0
+OVERDRIVEN_PERIODS = 50
+# the same from below
+UNDERDRIVE = 0.8
+UNDERDRIVEN_PERIODS = 25
+# after which a motion is taken as it is
+MOST_PERIODS = 400
+# relative change of the ends of the band of amplitudes, from one PERIODS_AT_ONCE to the next, that
+# is none
+SETTLED_CHANGE = 5e-3
+# periods whose amplitudes count
+COUNTED_PERIODS = 50
+# harmonics of which the amplitude of a period is made
+HARMONICS = 7
+# step of the frequency, over the half width of the resonance
+STEP_SHARE = 0.5
+MOST_STEPS = 10
+# share of the amplitude before, below which a step has led to another motion: along one it falls by
+# some 11 %
+JUMP_SHARE = 0.7
+# parts of a step that led to another motion: in smaller ones the blade follows further
+JUMP_PARTS = 4
+# relative gain of height by the vertex of a parabola that is marched as well
+WORTH_A_MARCH = 0.01
+# error over the change by twice the contact points, where there are more of them still
+ERROR_OVER_CHANGE = 2.0
+# operations of a search, some 40 s: 36 N on the shipped wedge take 1.5e11
+MOST_OPERATIONS = 4e11
+# of one march, some 15 s
+MOST_OF_ONE_MARCH = 1.5e11
+
+
+@dataclass(frozen=True)
+class ResonanceInTime:
+    """The highest motion that marches from frequency to frequency ended on."""
+
+    # [Hz]
+    frequency: float
+    # amplitudes of single periods, as those of ``KeptBand`` [m]
+    lowest: float
+    highest: float
+    # of the highest, estimated and relative: by the contact points, by where marches start, by
+    # their steps in time, by the width of the band; inf where not even that is known
+    error: float
+    # on each seat
+    points: int
+    # frequencies that were marched at, and periods at all of them
+    frequencies: int
+    periods: int
+
+    @property
+    def sentence(self) -> str:
+        """What was done and found."""
+        return (
+            f"most contacts lift off, and balances do not tell the resonance; it was sought by "
+            f"marching in time, with {self.points} contact points a seat, at {self.frequencies} "
+            f"frequencies for {self.periods} periods: at {self.frequency:.5g} Hz the blade keeps "
+            f"between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um"
+        )
+
+
+@dataclass(frozen=True)
+class _Settled:
+    """What the blade keeps to under a drive."""
+
+    omega: float
+    # amplitudes of single periods [m]; bouncing ones scatter, motions are compared by their mean
+    lowest: float
+    mean: float
+    highest: float
+    state: RingState
+    # steps were short enough for forces that are linear in them
+    resolved: bool
+
+
+@dataclass(frozen=True)
+class _Top:
+    """Where a climb ended."""
+
+    best: _Settled
+    # a lower motion of the same kind next to it
+    neighbour: _Settled
+    # step of the circular frequency beyond which the blade jumps to another motion; 0 where the
+    # amplitude falls smoothly on both sides
+    jump: float = 0.0
+
+
+@dataclass
+class _Work:
+    """What a search has taken so far."""
+
+    operations: float = 0.0
+    periods: int = 0
+    frequencies: set[float] = field(default_factory=set)
+
+    @property
+    def exhausted(self) -> bool:
+        """No more may be marched."""
+        return self.operations > MOST_OPERATIONS
+
+
+class _MarchFailedError(Exception):
+    """The forces of a step were not found, or the search was not closed in."""
+
+
+def resonance_in_time(
+    models: Family,
+    settings: Settings,
+    motion: Solution,
+) -> ResonanceInTime | None:
+    """The resonance next to a motion of the balance; None where marching is not possible, takes too
+    long, or leads nowhere.
+
+    Args:
+        motion: the highest one of the balance, of these settings.
+    """
+    points = LIFTING_POINTS if "points" in settings.chosen else settings.points
+    settings_here = settings_in_time(models, replace(settings, points=points))
+    try:
+        model = model_in_time(models, settings_here)
+        start = motion
+        if len(family_member(models, settings).model.springs) != len(model.springs):
+            start = carried_motion(models, settings, motion, settings_here)
+        work = _Work()
+        top = _climbed(model, start, work)
+        error = _error(models, settings_here, model, top, work)
+    except (InputError, _MarchFailedError):
+        return None
+    return ResonanceInTime(
+        top.best.omega / (2 * np.pi),
+        top.best.lowest,
+        top.best.highest,
+        error,
+        len(model.elements.kt) // 2,
+        len(work.frequencies),
+        work.periods,
+    )
+
+
+def _climbed(model: ReducedModel, start: Solution, work: _Work) -> _Top:
+    """The highest motion uphill of a start.
+
+    Raises:
+        _MarchFailedError: it was not closed in.
+    """
+    omega = start.omega
+    bend = bend_of_mode(model, omega)
+    if bend <= 0:
+        raise _MarchFailedError
+    state = driven_anew(model, state_of_solution(model, start), Drive(omega, OVERDRIVE))
+    state = _marched(model, state, OVERDRIVEN_PERIODS, work)
+    known = {0: _settled(model, driven_anew(model, state, Drive(omega)), work)}
+    step = STEP_SHARE * np.sqrt(2 / bend) / known[0].mean
+    for side in (1, -1):
+        place = side
+        while abs(place) <= MOST_STEPS and not work.exhausted:
+            known[place] = _moved(model, known[place - side], omega + place * step, work)
+            if known[place].mean < known[place - side].mean:
+                break
+            place += side
+        if abs(place) > 1:
+            # uphill on this side: the other one is known
+            break
+    place = max(known, key=lambda k: known[k].mean)
+    if place - 1 not in known or place + 1 not in known:
+        raise _MarchFailedError
+    best, beside = known[place], (known[place - 1], known[place + 1])
+    along = [one for one in beside if one.mean > JUMP_SHARE * best.mean]
+    neighbour = max(along, key=lambda one: one.mean, default=best)
+    if len(along) == 2:
+        return _Top(_at_vertex(model, best, *beside, work), neighbour)
+    jumped = min(beside, key=lambda one: one.mean)
+    part = (jumped.omega - best.omega) / JUMP_PARTS
+    return _up_to_jump(model, _Top(best, neighbour, part), work)
+
+
+def _at_vertex(
+    model: ReducedModel, best: _Settled, low: _Settled, high: _Settled, work: _Work
+) -> _Settled:
+    """The motion at the vertex of 1 / height^2 through three, where that is higher."""
+    left, right = best.omega - low.omega, high.omega - best.omega
+    level = best.mean**-2
+    slope, half = parabola_at_middle(left, right, low.mean**-2 - level, high.mean**-2 - level)
+    if half <= 0 or slope**2 / (4 * half) < 2 * WORTH_A_MARCH * level or work.exhausted:
+        return best
+    found = _moved(model, best, best.omega - slope / (2 * half), work)
+    return max(best, found, key=lambda one: one.mean)
+
+
+def _up_to_jump(model: ReducedModel, top: _Top, work: _Work) -> _Top:
+    """The highest motion before the blade jumps to a lower one, by small steps."""
+    for _ in range(JUMP_PARTS):
+        if work.exhausted:
+            break
+        found = _moved(model, top.best, top.best.omega + top.jump, work)
+        if found.mean <= top.best.mean:
+            break
+        top = _Top(found, top.best, top.jump)
+    return top
+
+
+def _error(
+    models: Family,
+    settings: Settings,
+    model: ReducedModel,
+    top: _Top,
+    work: _Work,
+) -> float:
+    """Estimated relative error of the highest amplitude."""
+    best = top.best
+    below = driven_anew(model, best.state, Drive(best.omega, UNDERDRIVE))
+    below = _marched(model, below, UNDERDRIVEN_PERIODS, work)
+    other = _settled(model, driven_anew(model, below, Drive(best.omega)), work)
+    # the blade may fall off to another motion, which says nothing of this one
+    same = other.mean > JUMP_SHARE * best.mean
+    error = abs(other.mean / best.mean - 1) if same else SETTLED_CHANGE
+    # single periods that are higher may come
+    error += (best.highest - best.lowest) / (2 * best.highest)
+    if not best.resolved:
+        finer = _settled(model, best.state, work, 2 * INSTANTS_PER_PERIOD)
+        error += abs(finer.mean / best.mean - 1)
+    return error + _change_by_points(models, settings, top, work)
+
+
+def _change_by_points(models: Family, settings: Settings, top: _Top, work: _Work) -> float:
+    """Relative error by the contact points: twice as many of them at the resonance, which where
+    the blade jumps is followed as far as they let it, or next to it where they jump there.
+    """
+    points, most = settings.points, _most_points(models, settings)
+    if points is None or points >= most:
+        return 0.0
+    factor = ERROR_OVER_CHANGE if 2 * points < most else 1.0
+    model = model_in_time(models, replace(settings, points=2 * points))
+    for own in (top.best, top.neighbour):
+        found = _settled(model, driven_anew(model, own.state, Drive(own.omega)), work)
+        if found.mean > JUMP_SHARE * own.mean:
+            break
+    else:
+        return float(np.inf)
+    if own is not top.best:
+        return factor * abs(found.mean / own.mean - 1) + 1 - own.mean / top.best.mean
+    if top.jump:
+        found = _up_to_jump(model, _Top(found, found, top.jump), work).best
+    return factor * abs(found.mean / own.mean - 1)
+
+
+def _most_points(models: Family, settings: Settings) -> int:
+    """Contact points of a seat of the richest model."""
+    return len(family_member(models, replace(settings, points=None)).groups) // 2
+
+
+def _moved(model: ReducedModel, before: _Settled, omega: float, work: _Work) -> _Settled:
+    """What the blade keeps to when the frequency is moved."""
+    return _settled(model, driven_anew(model, before.state, Drive(omega)), work)
+
+
+def _settled(
+    model: ReducedModel,
+    state: RingState,
+    work: _Work,
+    instants: int = INSTANTS_PER_PERIOD,
+) -> _Settled:
+    """What the blade keeps to from a state on.
+
+    Raises:
+        _MarchFailedError: the forces of a step were not found, or the march takes too long.
+    """
+    march = march_ring(model, state, MOST_PERIODS, instants, _has_settled, MOST_OF_ONE_MARCH)
+    periods = len(march.motion)
+    work.operations += march.operations * periods / MOST_PERIODS
+    work.periods += periods
+    work.frequencies.add(state.drive.omega)
+    heights = amplitudes_of_periods(march.motion, HARMONICS)
+    if not march.settled or march.operations > MOST_OF_ONE_MARCH or not np.isfinite(heights).all():
+        raise _MarchFailedError
+    last = heights[-min(COUNTED_PERIODS, periods // 2) :]
+    ends = float(last.min()), float(last.mean()), float(last.max())
+    return _Settled(state.drive.omega, *ends, march.end, march.resolved)
+
+
+def _marched(model: ReducedModel, state: RingState, periods: int, work: _Work) -> RingState:
+    """The state after some periods.
+
+    Raises:
+        _MarchFailedError: the forces of a step were not found, or the march takes too long.
+    """
+    march = march_ring(model, state, periods, most=MOST_OF_ONE_MARCH)
+    work.operations += march.operations
+    work.periods += periods
+    if not march.settled or march.operations > MOST_OF_ONE_MARCH:
+        raise _MarchFailedError
+    return march.end
+
+
+def _has_settled(motion: RealArray) -> bool:
+    """The last parts of a march keep to one band, to which they drift no faster than before."""
+    heights = amplitudes_of_periods(motion, HARMONICS)
+    parts = heights.reshape(-1, PERIODS_AT_ONCE * heights.shape[-1])
+    if len(parts) < 3 or not np.isfinite(heights).all():
+        return False
+    ends = np.column_stack([parts.min(axis=1), parts.max(axis=1)])[-3:]
+    before, now = abs(np.diff(ends, axis=0)).max(axis=1)
+    return bool(now <= min(before, SETTLED_CHANGE * ends.max()))
