@@ -108,13 +108,8 @@ def march_ring(
             marched.
 
     Raises:
-        InputError: normal loads are prescribed, a friction law is not Coulomb's, or the wave does
-            not repeat within the harmonics that the model has bodies for.
+        InputError: the wave does not repeat within the harmonics that the model has bodies for.
     """
-    if model.directions == model.elements.tangents:
-        raise InputError("normal loads are prescribed, expected ones that follow the motion")
-    if model.elements.law is not None:
-        raise InputError("a friction law of its own, expected Coulomb's")
     r = _system(model).blades
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
@@ -152,8 +147,13 @@ def state_of_solution(
         disturbance: relative, of another size and sign for each mode.
 
     Raises:
-        InputError: the wave does not repeat within the harmonics that the model has bodies for.
+        InputError: normal loads are prescribed, a friction law is not Coulomb's, or the wave does
+            not repeat within the harmonics that the model has bodies for.
     """
+    if model.directions == model.elements.tangents:
+        raise InputError("normal loads are prescribed, expected ones that follow the motion")
+    if model.elements.law is not None:
+        raise InputError("a friction law of its own, expected Coulomb's")
     system = _system(model)
     M = len(system.stiffness)
     forces = _blades_at_start(to_complex(point.f).reshape(-1, point.harmonics + 1).T, system.blades)

@@ -79,7 +79,7 @@ def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> x
     for curve in curves:
         probe = np.full(most + 1, np.nan + 0j)
         probe[: len(curve.peak.probe)] = curve.peak.probe[:, 0]
-        parts.append(_one_resonance(curve.load, curve.mass, curve.peak_frequency, probe))
+        parts.append(_one_resonance(curve.load, curve.mass, curve.peak.frequency, probe))
     masses = dict.fromkeys(curve.mass for curve in curves)
     for limit in limits:
         probe = np.full(most + 1, np.nan + 0j)

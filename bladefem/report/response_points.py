@@ -5,14 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from ..hbm.stability import STABLE
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
 
+# method of a point that no balance gives
+MARCHED = "march in time"
+
 
 def points_of(curve: Curve) -> pd.DataFrame:
-    """One row a response point."""
+    """One row a response point, and one of a resonance that a march in time gives in place of the
+    balance.
+    """
     mass = {} if curve.mass is None else {"mass": curve.mass}
-    return pd.DataFrame(
+    table = pd.DataFrame(
         {
             "load": curve.load,
             **mass,
@@ -43,6 +49,33 @@ def points_of(curve: Curve) -> pd.DataFrame:
             ),
         }
     )
+    return table if curve.peak_amplitude == curve.balance_amplitude else _with_marched(table, curve)
+
+
+def _with_marched(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:
+    """The table with the resonance that a march gives, as a motion next to those of the curve."""
+    branch = table["branch"] if "branch" in table else table["converged"].astype(int)
+    row = table.iloc[[0]].assign(
+        frequency=curve.peak_frequency,
+        amplitude=curve.peak_amplitude,
+        phase=np.nan,
+        converged=True,
+        method=MARCHED,
+        route=MARCHED,
+        residual=np.nan,
+        iterations=0,
+        slipping=curve.peak.states["slip"] + curve.peak.states["lift"],
+        drift=np.nan,
+        dissipated=np.nan,
+        imbalance=np.nan,
+        estimated_error=curve.error,
+        tolerated_error=np.nan,
+        error_checked=True,
+        branch=branch.max() + 1,
+    )
+    if "stability" in table:
+        row = row.assign(stability=STABLE, multiplier=np.nan, bifurcation="")
+    return pd.concat([table.assign(branch=branch), row], ignore_index=True)
 
 
 def linear_points(limit: Limit) -> pd.DataFrame:

@@ -82,7 +82,9 @@ def curves() -> list:
             mass=None,
             settings=SimpleNamespace(harmonics=H),
             peak_frequency=800.0 + load,
-            peak=SimpleNamespace(probe=(1 + 1j) * np.arange(H + 1)[:, None]),
+            peak=SimpleNamespace(
+                probe=(1 + 1j) * np.arange(H + 1)[:, None], frequency=800.0 + load
+            ),
         )
         for load, H in zip(LOADS, (1, 3), strict=True)
     ]

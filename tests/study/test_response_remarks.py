@@ -34,6 +34,8 @@ def curve(
         layer_law=layer_law,
         body_mesh=body_mesh,
         in_time=in_time,
+        sought=None,
+        peak=SimpleNamespace(frequency=100.0),
         peak_amplitude=656e-6,
         frequency=np.array([99.0, 100.0, 101.0]),
         peak_frequency=100.0,

@@ -57,8 +57,6 @@ MOST_STEPS = 10
 # share of the amplitude before, below which a step has led to another motion: along one it falls by
 # some 11 %
 JUMP_SHARE = 0.7
-# parts of a step that led to another motion: in smaller ones the blade follows further
-JUMP_PARTS = 4
 # relative gain of height by the vertex of a parabola that is marched as well
 WORTH_A_MARCH = 0.01
 # error over the change by twice the contact points, where there are more of them still
@@ -119,9 +117,16 @@ class _Top:
     best: _Settled
     # a lower motion of the same kind next to it
     neighbour: _Settled
-    # step of the circular frequency beyond which the blade jumps to another motion; 0 where the
-    # amplitude falls smoothly on both sides
+    # step of the circular frequency that led the blade to a lower motion; 0 where the amplitude
+    # falls smoothly on both sides
     jump: float = 0.0
+
+    @property
+    def rise_ahead(self) -> float:
+        """Relative rise that is possible before the jump, by the slope between the two motions."""
+        run = abs(self.best.omega - self.neighbour.omega)
+        rise = self.best.mean / self.neighbour.mean - 1
+        return rise * abs(self.jump) / run if run else abs(self.jump) / self.best.omega
 
 
 @dataclass
@@ -170,7 +175,7 @@ def resonance_in_time(
         top.best.lowest,
         top.best.highest,
         error,
-        len(model.elements.kt) // 2,
+        points or _most_points(models, settings_here),
         len(work.frequencies),
         work.periods,
     )
@@ -209,8 +214,8 @@ def _climbed(model: ReducedModel, start: Solution, work: _Work) -> _Top:
     if len(along) == 2:
         return _Top(_at_vertex(model, best, *beside, work), neighbour)
     jumped = min(beside, key=lambda one: one.mean)
-    part = (jumped.omega - best.omega) / JUMP_PARTS
-    return _up_to_jump(model, _Top(best, neighbour, part), work)
+    # in smaller steps the blade follows further
+    return _up_to_jump(model, _Top(best, neighbour, (jumped.omega - best.omega) / 2), work)
 
 
 def _at_vertex(
@@ -227,14 +232,17 @@ def _at_vertex(
 
 
 def _up_to_jump(model: ReducedModel, top: _Top, work: _Work) -> _Top:
-    """The highest motion before the blade jumps to a lower one, by small steps."""
-    for _ in range(JUMP_PARTS):
-        if work.exhausted:
+    """The highest motion before the blade jumps to a lower one, by steps that are halved where it
+    jumps, until another one promises little.
+    """
+    for _ in range(MOST_STEPS):
+        if work.exhausted or top.rise_ahead < WORTH_A_MARCH:
             break
         found = _moved(model, top.best, top.best.omega + top.jump, work)
-        if found.mean <= top.best.mean:
-            break
-        top = _Top(found, top.best, top.jump)
+        if found.mean > top.best.mean:
+            top = _Top(found, top.best, top.jump)
+        else:
+            top = replace(top, jump=top.jump / 2)
     return top
 
 
@@ -254,7 +262,7 @@ def _error(
     same = other.mean > JUMP_SHARE * best.mean
     error = abs(other.mean / best.mean - 1) if same else SETTLED_CHANGE
     # single periods that are higher may come
-    error += (best.highest - best.lowest) / (2 * best.highest)
+    error += (best.highest - best.lowest) / (2 * best.highest) + top.rise_ahead
     if not best.resolved:
         finer = _settled(model, best.state, work, 2 * INSTANTS_PER_PERIOD)
         error += abs(finer.mean / best.mean - 1)
@@ -279,13 +287,13 @@ def _change_by_points(models: Family, settings: Settings, top: _Top, work: _Work
     if own is not top.best:
         return factor * abs(found.mean / own.mean - 1) + 1 - own.mean / top.best.mean
     if top.jump:
-        found = _up_to_jump(model, _Top(found, found, top.jump), work).best
+        found = _up_to_jump(model, replace(top, best=found), work).best
     return factor * abs(found.mean / own.mean - 1)
 
 
 def _most_points(models: Family, settings: Settings) -> int:
-    """Contact points of a seat of the richest model."""
-    return len(family_member(models, replace(settings, points=None)).groups) // 2
+    """Contact points of a seat of the richest model; there are two seats."""
+    return -(-len(family_member(models, replace(settings, points=None)).groups) // 2)
 
 
 def _moved(model: ReducedModel, before: _Settled, omega: float, work: _Work) -> _Settled:

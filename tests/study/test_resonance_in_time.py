@@ -1,0 +1,83 @@
+"""Resonances sought by marching: against all motions of the balance, and against closed forms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from models import folding_pair, rebounding, single_mass
+
+from bladefem.hbm.branches import find_branches
+from bladefem.hbm.solution import size
+from bladefem.hbm.solve import solve
+from bladefem.hbm.sweep import response
+from bladefem.report.response_points import MARCHED, points_of
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline import loads as loads_module
+from bladefem.study.pipeline.resonance_in_time import ResonanceInTime, resonance_in_time
+
+
+BAND = (249.0, 431.0)
+SETTINGS = Settings(10, 15, 512, "rigid")
+
+
+@pytest.fixture(scope="module")
+def folding():
+    """The model whose resonance a sweep misses, and the highest of all its motions [m]."""
+    model = folding_pair()
+    sweep = [p for p in response(model, np.linspace(*BAND, 40), 7, 256) if p.converged]
+    found = find_branches(model, BAND, sweep, 7, 256, peak=1e-4)
+    return SimpleNamespace(model=model, truth=max(map(size, found.points)))
+
+
+@pytest.mark.parametrize("omega", [360.0, 330.0, 300.0])
+def test_the_peak_of_a_fold_is_found_from_a_motion_far_below(folding, omega):
+    """From the top of what a sweep sees, and from motions at which nothing points to it."""
+    start = solve(folding.model, omega, 15, 512)
+    assert start.converged and size(start) < folding.truth / 3
+    found = resonance_in_time(family_of(folding.model), SETTINGS, start)
+    off = abs(found.highest / folding.truth - 1)
+    assert off < 0.02
+    assert off / 2 < found.error < 0.05
+    assert found.lowest > 0.95 * found.highest
+    assert found.frequency == pytest.approx(52.6, rel=5e-3)
+
+
+def test_a_response_that_falls_smoothly_has_its_linear_peak():
+    """A contact so far open that it never closes: the peak of one mass, force / (2 zeta k)."""
+    model = rebounding(1.0, 1e3, 0.04)
+    start = solve(model, 0.985, 1, 64)
+    found = resonance_in_time(family_of(model), replace(SETTINGS, harmonics=1), start)
+    assert found.highest == pytest.approx(1 / 0.04, rel=1e-2)
+    assert 2 * np.pi * found.frequency == pytest.approx(1.0, rel=5e-3)
+    assert found.error < 0.05
+
+
+def test_where_nothing_can_be_marched_there_is_no_resonance(folding):
+    """Normal loads that are prescribed."""
+    model = single_mass()
+    point = solve(model, 0.9, 3, 64)
+    assert resonance_in_time(family_of(model), SETTINGS, point) is None
+
+
+def test_a_resonance_sought_in_time_is_the_one_of_the_curve(monkeypatch):
+    sought = ResonanceInTime(101.0, 1.9e-3, 2e-3, 0.07, 8, 5, 900)
+    curve = loads_module.Curve(
+        load=9.0, mass=None, settings=replace(SETTINGS, error=np.inf), sought=sought,
+        peak=SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1,
+                             states={"slip": 0, "lift": 3}),
+        halved=0.3, stability=np.array(["stable"]), multiplier=np.ones(1),
+        bifurcation=np.array([""]), branch=np.zeros(1, int),
+        **{name: np.ones(1) for name in ("frequency", "amplitude", "first", "converged", "method",
+           "route", "residual", "iterations", "slipping", "drift", "dissipated", "imbalance",
+           "estimated", "tolerated", "checked")},
+    )  # fmt: skip
+    assert (curve.peak_frequency, curve.peak_amplitude) == (101.0, 2e-3)
+    assert curve.balance_amplitude == 1e-3 and curve.error == pytest.approx(0.07)
+    row = points_of(curve).iloc[-1]
+    assert (row["method"], row["frequency"], row["amplitude"]) == (MARCHED, 101.0, 2e-3)
+    assert points_of(replace(curve, sought=None))["method"].tolist() == [1.0]
+    assert "at 101 Hz the blade keeps between 1900 and 2000 um" in sought.sentence
