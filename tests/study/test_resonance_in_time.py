@@ -19,7 +19,6 @@ from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.pipeline.resonance_in_time import ResonanceInTime, resonance_in_time
 
-
 BAND = (249.0, 431.0)
 SETTINGS = Settings(10, 15, 512, "rigid")
 
