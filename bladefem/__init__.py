@@ -8,6 +8,10 @@ cheap.
 from __future__ import annotations
 
 from .util.lazy import lazy_getattr
+from .util.processor import use_wide_registers
+
+# before NumPy is loaded
+use_wide_registers()
 
 __version__ = "0.1.0"
 

@@ -23,7 +23,13 @@ from .compat import MPI, shared_matrix
 from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
 from .open_matrix import OpenMatrix, entries
-from .schur import Bridge, replace_dense_solve, schur_complement, solve_through_boundary
+from .schur import (
+    Bridge,
+    drop_complement,
+    replace_dense_solve,
+    schur_complement,
+    solve_through_boundary,
+)
 from .separators import (
     Separators,
     eliminate_separators,
@@ -140,13 +146,12 @@ def eliminate_interior(
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)
     negative = factor.negative
     separators = None
-    if shared is None:
-        S = schur_complement(factor, len(rim))
-    else:
-        # handed over, not kept: it can be as large as two cut faces
-        S, separators = eliminate_separators(
-            shared.cut, schur_complement(factor, len(rim)), definite
-        )
+    S = schur_complement(factor, len(rim))
+    bridge = replace_dense_solve(factor, len(rim)) if definite else None
+    # with several ranks it can be as large as two cut faces
+    drop_complement(factor, len(rim))
+    if shared is not None:
+        S, separators = eliminate_separators(shared.cut, S, definite)
         give_back()
         negative = shared.cut.comm.allreduce(negative) + separators.negative
     return Core(
@@ -155,7 +160,7 @@ def eliminate_interior(
         rim,
         S,
         A[rim][:, inner].tocsr(),
-        replace_dense_solve(factor, len(rim)) if definite else None,
+        bridge,
         order,
         negative,
         shared,

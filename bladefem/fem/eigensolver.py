@@ -35,6 +35,9 @@ KNOWN_OPTIONS = ("-eps_monitor", "-eps_ncv", "-eps_tol", "-eps_type", "-eps_view
 MAX_RESTARTS = 100
 # basis vectors beyond twice the pairs wanted: fewer restart once more, more are not needed
 MORE_VECTORS = 2
+# share of the basis that a restart keeps: nearly all, so that convergence is looked at every second
+# or third vector; with SLEPc's half a run ends only after eight more
+KEPT_SHARE = 0.9
 # columns that a growing block of vectors has room for at first
 FIRST_BASIS_VECTORS = 48
 # relative difference up to which a vector is a multiple of another: rounding
@@ -381,6 +384,7 @@ def _make_solver(
     eps.setTarget(0.0)
     basis = settings.vectors or basis_size(count)
     eps.setDimensions(count, max(basis, count + 1))
+    eps.setKrylovSchurRestart(KEPT_SHARE)
     eps.setTolerances(tolerance, MAX_RESTARTS)
     # done here, for all vectors in one batch
     eps.setPurify(False)

@@ -16,6 +16,7 @@ from scipy.linalg import qr
 
 from ..errors import InputError
 from .body import rigid_modes
+from .compat import PETSc
 from .constraint import Constrained, expand_to_mesh, unknowns
 from .linalg import (
     Factor,
@@ -24,8 +25,10 @@ from .linalg import (
     factorise,
     inner_products,
     mean_diagonal,
+    release,
     solve_together,
 )
+from .memory import give_back
 
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
 UNHELD_FREQUENCY_RATIO = 1e-12
@@ -84,6 +87,17 @@ def flexible(con: Constrained, prop: float = 1.0, settled: bool = True) -> Flexi
         flex = Flexibility(con, factor, R, apply_block(con.M, R))
     _check_settled(flex)
     return flex
+
+
+def discard(flex: Flexibility) -> None:
+    """Give the memory of a factorisation and its matrix back, which nobody will use again
+    (collective).
+    """
+    release(flex.con.K, flex.factor)
+    # of several ranks it would wait for a garbage collection
+    if isinstance(flex.con.K, PETSc.Mat):
+        flex.con.K.destroy()
+    give_back()
 
 
 def _check_settled(flex: Flexibility) -> None:

@@ -22,10 +22,14 @@ those of blades.
 from __future__ import annotations
 
 import ctypes
+import mmap
 import os
 import shutil
+import sys
 from dataclasses import dataclass
 from pathlib import Path
+
+import numpy as np
 
 from ..errors import InputError
 from .compat import MPI
@@ -79,6 +83,19 @@ def give_back() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
+
+
+def drop_values(values: np.ndarray) -> None:
+    """Give the memory of an array that its owner keeps back to the system; its values are lost."""
+    advise = getattr(ctypes.CDLL(None), "madvise", None)
+    # Linux only: elsewhere the advice means something else
+    if advise is None or not sys.platform.startswith("linux"):
+        return
+    page = mmap.PAGESIZE
+    first = -(-values.ctypes.data // page) * page
+    last = (values.ctypes.data + values.nbytes) // page * page
+    if last > first:
+        advise(ctypes.c_void_p(first), ctypes.c_size_t(last - first), mmap.MADV_DONTNEED)
 
 
 @dataclass(frozen=True)

@@ -21,10 +21,16 @@ from typing import TypeVar
 import numpy as np
 
 from ..errors import NotSolvedError
+from .compat import PETSc, no_error_messages
+from .memory import drop_values
 from .mumps import Factorised, petsc_call, set_operation, solve_matrix
 
 # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
 MATSOLVE = (109, 100)
+# MATOP_LUFACTOR, MATOP_CHOLESKYFACTOR
+DENSE_FACTORS = (11, 12)
+# MAT_FACTOR_CHOLESKY
+CHOLESKY = 2
 # of a dense matrix that is copied, to spare memory
 ROWS_AT_A_TIME = 256
 CALLBACK = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_void_p)
@@ -42,8 +48,8 @@ class Bridge:
     answers: list[Answer]
     # an exception, Ctrl-C too, cannot pass through C: it waits here
     raised: list[BaseException]
-    # keeps the C function alive
-    callback: object
+    # keep the C functions alive
+    callbacks: tuple[object, ...]
 
 
 def schur_complement(factor: Factorised, n: int) -> np.ndarray:
@@ -70,10 +76,15 @@ def _symmetric_copy(A: np.ndarray) -> np.ndarray:
     return out
 
 
+def drop_complement(factor: Factorised, n: int) -> None:
+    """Give the memory of PETSc's Schur complement (n, n) back, which nobody reads any more."""
+    _use_complement(factor, lambda handle: drop_values(_dense_array(handle, (n, n))))
+
+
 def replace_dense_solve(factor: Factorised, n: int) -> Bridge | None:
     """Put a call back in place of PETSc's dense solve; None where PETSc does not take it.
 
-    The Schur complement inside PETSc is destroyed: copy it first.
+    The Schur complement inside PETSc is of no use afterwards: copy it first.
     """
     answers: list[Answer] = []
     raised: list[BaseException] = []
@@ -93,27 +104,34 @@ def replace_dense_solve(factor: Factorised, n: int) -> Bridge | None:
             raised.append(error)
         return 0
 
-    def ones(handle: int) -> None:
-        # of floating bodies S is singular; PETSc must factorise it
-        _dense_array(handle, (n, n))[:] = np.eye(n)
-
     callback = CALLBACK(answer)
-    _use_complement(factor, ones)
-    petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
+    # PETSc wants factors, which nobody will use; of floating bodies S is singular
+    nothing = CALLBACK(lambda *_: 0)
+
+    def leave_factors_out(handle: int) -> None:
+        for place in DENSE_FACTORS:
+            set_operation(handle, place, nothing)
 
     def redirect(handle: int) -> None:
+        petsc_call("MatSetFactorType", handle, CHOLESKY)
         for place in MATSOLVE:
             set_operation(handle, place, callback)
 
-    _use_complement(factor, redirect)
-    made = Bridge(factor, n, answers, raised, callback)
+    made = Bridge(factor, n, answers, raised, (callback, nothing))
     heard: list[int] = []
 
     def listen(r: np.ndarray) -> np.ndarray:
         heard.append(1)
         return r
 
-    solve_through_boundary(made, np.zeros((factor.matrix.size[0], 1)), listen)
+    try:
+        with no_error_messages():
+            _use_complement(factor, leave_factors_out)
+            petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
+            _use_complement(factor, redirect)
+            solve_through_boundary(made, np.zeros((factor.matrix.size[0], 1)), listen)
+    except (PETSc.Error, NotSolvedError):
+        return None
     return made if heard else None
 
 

@@ -18,6 +18,7 @@ from bladefem.fem.flexibility import flexible
 from bladefem.fem.memory import (
     available_memory,
     check_memory,
+    drop_values,
     modal_solve_memory,
     storage_remark,
 )
@@ -133,3 +134,15 @@ def test_large_blocks_go_back_to_the_system():
     library.free(large)
     assert resident() - before < LARGE_BLOCK
     library.free(above)
+
+
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no /proc")
+def test_values_that_nobody_reads_give_their_memory_back():
+    """Whole pages only: what stands before and behind them stays."""
+    values = np.ones(4 * LARGE_BLOCK // 8)
+    inside = values[7:-7]
+    before = resident()
+    drop_values(inside)
+    assert before - resident() > 3.9 * LARGE_BLOCK
+    assert (values[:7] == 1).all() and (values[-7:] == 1).all()
+    drop_values(np.ones(3))

@@ -50,3 +50,16 @@ def test_one_rank_computes_and_all_have_it():
     found = on_one_rank(bodies, lambda some: ran.append(1) or some.still_blade.comm.size)
     assert found == 1
     assert MPI.COMM_WORLD.allreduce(len(ran)) == 1
+
+
+def test_ranks_that_share_a_blade_give_the_factors_of_its_rest_back():
+    """One rank seats the damper with its own; the stiffness under rotation is that of one rank."""
+    scene = load_scene("scenes/wedge.toml", COARSE)
+    mesh = build_mesh(scene, MPI.COMM_WORLD)
+    assert scene.operation.speed > 0
+    norms = []
+    for comm in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        bodies = Bodies(scene, mesh, comm)
+        norms.append(bodies.blade.K.norm())
+        assert ("still" in vars(bodies)) == (comm.size == 1)
+    assert norms[0] == pytest.approx(norms[1], rel=1e-12)

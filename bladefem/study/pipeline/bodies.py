@@ -147,6 +147,7 @@ class Bodies:
         if self.scene.operation.preload == "nonlinear":
             return body_under_rotation(self.still_blade, speed, "clamp", spin_axis(self.mesh))
         u0 = speed**2 * self.swell + self.thermal_displacement
+        self._release_still()
         return replace(
             self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh))
         )
@@ -194,6 +195,19 @@ class Bodies:
         from ...fem.flexibility import flexible
 
         return flexible(in_step(self.still_blade))
+
+    def _release_still(self) -> None:
+        """Give the factors of the blade at rest back where ranks share them: one rank seats the
+        damper with its own.
+        """
+        from ...fem.compat import MPI
+        from ...fem.flexibility import discard
+
+        if (self.comm or MPI.COMM_WORLD).size == 1 or not self.fits_one_rank:
+            return
+        still = vars(self).pop("still", None)
+        if still is not None:
+            discard(still)
 
     def factorised(self, diameter: int) -> Flexibility:
         """The blade in one nodal diameter, or clamped at its root;
