@@ -39,17 +39,26 @@ def reduced():
     return replace(run, scene=scene)
 
 
-def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced):
-    """Damped waves of the engine order; every blade of the wheel moves as the sector."""
-    scene = reduced.scene
+@pytest.mark.parametrize("finest", [2, None])
+def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced, finest):
+    """Damped waves of the engine order; every blade of the wheel moves as the sector, and so does
+    the model that limit cycles are found with; the points of the scene, and those joined from all
+    nodes.
+    """
+    scene = vary(reduced.scene, contact__points=finest)
     patches = list(reduced.contact.problem.patches)
     bodies = Bodies(scene, reduced.mesh)
     (case,) = load_cases(scene, reduced.mesh, reduced.contact)
-    settings = reduced.settings
+    settings = replace(reduced.settings, points=None if finest else 4)
     family = family_of_case(scene, reduced.mesh, reduced.reduced, patches, case)
     model = family_member(family, settings).model
     omega = 1.02 * model.side(1).omega[0]
     one = solve(model, omega, 1, 72)
+    flow = scene_flow(scene, COUNT)
+    own = replace(reduced, scene=scene, settings=settings)
+    waved = subject._wave_model(own, reduced.reduced, patches, case, flow, 9, 0)
+    same = solve(waved, omega, 1, 72)
+    np.testing.assert_allclose(same.probe, one.probe, atol=1e-7 * abs(one.probe).max())
     sector = reduce_wheel(bodies, patches, settings.modes, reduced.clamped, 3)
     wheel = whole_wheel(scene, reduced.mesh, sector, patches, case, settings)
     found = solve_wheel(wheel, omega, 1, 72)
