@@ -73,6 +73,10 @@ CAPTIONS = {
     "of the balance, diamonds where the mode turns back in amplitude. Right: resonance amplitude "
     "and forced response by the mode alone next to the "
     "balance.",
+    "contact/fit": "The contact fitted to measured responses: over the scene's values; in the "
+    "picture the readings, lines of the fitted contact, dotted lines of the scene's.",
+    "contact/fit_readings": "Each reading, and its amplitude by the contact of the scene and by "
+    "the fitted one.",
     "wheel/whole_wheel": "The whole wheel with its pattern: the highest blade next to the tuned "
     "wheel, and the alternating stress of its whole damped motion.",
     "wheel/blades": "Each blade: deviation of its first family, largest amplitude over the band, "

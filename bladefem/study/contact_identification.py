@@ -22,8 +22,16 @@ from ..hbm.solve import solve
 from ..util.arrays import RealArray
 from .fit_intervals import Knowledge, what_is_known
 
-# factors that can be fitted, see `hbm.parameters`
-CONTACT_PARAMETERS = ("mu", "kt", "kn", "load")
+# factors that can be fitted: of the friction coefficient, the tangential and the normal stiffness,
+# both of these at once, and the normal load; each with its names in `hbm.parameters`
+CONTACT_PARAMETERS = {
+    "mu": ("mu",),
+    "kt": ("kt",),
+    "kn": ("kn",),
+    "stiffness": ("kt", "kn"),
+    "load": ("load",),
+}
+STIFFNESSES = ("kt", "kn", "stiffness")
 # largest factor either way
 MAX_FACTOR = 100.0
 # factors of the contact stiffness from which the fit may start, the best of them first: resonances
@@ -61,7 +69,9 @@ class ContactFit:
     knowledge: Knowledge
     # root of the mean square of the misfit over the stated error [1]
     misfit: float
-    # of each level (k,), by the fitted contact [m]; NaN where it was not solved
+    # of each level (k,), by the contact that the fit began with and by the fitted one [m]; NaN
+    # where it was not solved
+    before: list[RealArray]
     fitted: list[RealArray]
 
     def sentence(self) -> str:
@@ -90,7 +100,8 @@ class _Fit:
         for i, level in enumerate(self.levels):
             model = level.model
             for name, factor in zip(self.names, np.exp(x), strict=True):
-                model = vary(model, name, float(factor))
+                for part in CONTACT_PARAMETERS[name]:
+                    model = vary(model, part, float(factor))
             for omega, amplitude in zip(level.omega, level.amplitude, strict=True):
                 value, slope = self._reading(i, model, float(omega))
                 lost = not value > 0
@@ -99,6 +110,14 @@ class _Fit:
                 slopes.append(slope / self.error if lost else slope / (value * self.error))
         return np.array(values), np.array(slopes)
 
+    def amplitudes(self, misfit: np.ndarray) -> list[RealArray]:
+        """Of each level, the amplitudes that have these deviations [m]; NaN where not solved."""
+        ratios = np.exp(self.error * misfit)
+        ratios[np.isclose(ratios, LOST_RATIO, rtol=1e-9, atol=0)] = np.nan
+        cuts = np.cumsum([len(level.omega) for level in self.levels])[:-1]
+        measured = np.concatenate([level.amplitude for level in self.levels])
+        return np.split(ratios * measured, cuts)
+
     def _reading(self, i: int, model: ReducedModel, omega: float) -> tuple[float, np.ndarray]:
         """Amplitude [m] and its derivatives (p,) at one frequency; zeros where it is not solved."""
         start = min(self.known[i], key=lambda s: abs(s.omega - omega), default=None)
@@ -106,14 +125,15 @@ class _Fit:
         if not point.converged:
             return 0.0, np.zeros(len(self.names))
         self.known[i] = [s for s in self.known[i] if s.omega != omega] + [point]
-        by = sensitivities(model, point, self.names)
+        parts = [CONTACT_PARAMETERS[name] for name in self.names]
+        by = sensitivities(model, point, {part for few in parts for part in few})
         size = float(np.linalg.norm(point.probe[1:, 0]))
-        return size, np.array([by[name].size[0] for name in self.names])
+        return size, np.array([sum(by[part].size[0] for part in few) for few in parts])
 
 
 def fit_contact(
     levels: Sequence[MeasuredLevel],
-    names: Sequence[str] = CONTACT_PARAMETERS,
+    names: Sequence[str] = ("mu", "kt", "kn", "load"),
     H: int = 3,
     samples: int = 128,
     error: float = 0.05,
@@ -131,30 +151,29 @@ def fit_contact(
     chosen = tuple(names)
     _check_levels(levels, chosen, error)
     fit = _Fit(levels, chosen, H, samples, error, [[] for _ in levels])
+    begun, _ = fit.misfit(np.zeros(len(chosen)))
     ends: list[OptimizeResult] = []
     for start in _starts(fit):
         ends.append(_least_squares(fit, start))
         if np.mean(ends[-1].fun ** 2) < ENOUGH_MISFIT**2:
             break
     end = min(ends, key=lambda one: float(one.cost))
-    ratios = np.exp(error * end.fun)
-    lost = ratios <= LOST_RATIO
-    if lost.all():
+    fitted = fit.amplitudes(end.fun)
+    if all(np.isnan(part).all() for part in fitted):
         raise NotSolvedError("no measured level could be solved with any contact")
-    cuts = np.cumsum([len(level.omega) for level in levels])[:-1]
-    measured = np.concatenate([level.amplitude for level in levels])
     return ContactFit(
         chosen,
         np.exp(end.x),
         what_is_known(end.x, lambda x: fit.misfit(x)[0], end.jac, chosen),
         float(np.sqrt(np.mean(end.fun**2))),
-        np.split(np.where(lost, np.nan, ratios) * measured, cuts),
+        fit.amplitudes(begun),
+        fitted,
     )
 
 
 def _starts(fit: _Fit) -> list[np.ndarray]:
     """Logarithms of the factors to start from, those next to the readings first."""
-    stiff = np.array([float(name in ("kt", "kn")) for name in fit.names])
+    stiff = np.array([float(name in STIFFNESSES) for name in fit.names])
     if not stiff.any():
         return [0 * stiff]
     starts = [np.log(factor) * stiff for factor in START_STIFFNESS]
@@ -184,6 +203,8 @@ def _least_squares(fit: _Fit, start: np.ndarray) -> OptimizeResult:
 
 def _check_levels(levels: Sequence[MeasuredLevel], names: tuple[str, ...], error: float) -> None:
     unknown = [name for name in names if name not in CONTACT_PARAMETERS]
+    if {"kt", "kn"} & set(names) and "stiffness" in names:
+        raise InputError("parameters: 'stiffness' is both kt and kn, expected it or these")
     if unknown or not names:
         raise InputError(f"parameters {list(names)}: expected some of {list(CONTACT_PARAMETERS)}")
     if not 0 < error < np.inf:

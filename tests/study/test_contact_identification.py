@@ -128,8 +128,12 @@ def test_sticking_contacts_tell_their_stiffness_alone():
 
 def test_bad_readings_are_refused(readings):
     (level, *others) = levels_of(readings)
-    with pytest.raises(InputError, match=r"expected some of \['mu', 'kt', 'kn', 'load'\]"):
+    with pytest.raises(
+        InputError, match=r"expected some of \['mu', 'kt', 'kn', 'stiffness', 'load'\]"
+    ):
         fit_contact([level], ("friction",))
+    with pytest.raises(InputError, match="'stiffness' is both kt and kn"):
+        fit_contact([level], ("kt", "stiffness"))
     with pytest.raises(InputError, match="8 frequencies and 3 amplitudes"):
         fit_contact([replace(level, amplitude=np.ones(3))])
     with pytest.raises(InputError, match="level 1: expected positive finite"):
