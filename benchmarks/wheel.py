@@ -24,6 +24,7 @@ from mpi4py import MPI
 
 from bladefem.data import Elements, RigidBody
 from bladefem.hbm.model import Damping
+from bladefem.hbm.solver.newton import Options
 from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.wheel.model import Pattern, Wheel, engine_order, tuned_wheel
 from bladefem.wheel.resonance import find_wheel_peak
@@ -31,6 +32,8 @@ from bladefem.wheel.solve import solve_wheel
 from bladefem.wheel.statistics import wheel_respond
 
 MODES = 20
+# those of a scene whose accuracy is 5 %
+SCENE_OPTIONS = Options(tolerance=1e-6)
 
 
 def random_wheel(count: int, nodes: int, seed: int = 0) -> Wheel:
@@ -116,7 +119,7 @@ def measure_resonance(wheel: Wheel, H: int, exchange: TimedExchange) -> None:
     """One line on the highest blade, closed in to 0.5 %."""
     omega, pattern = mistuned(wheel)
     grid = omega * np.linspace(0.985, 1.03, 15)
-    respond = wheel_respond(wheel, pattern, H, 64)
+    respond = wheel_respond(wheel, pattern, H, 64, SCENE_OPTIONS)
     peak, seconds, waiting, memory = timed(lambda: find_wheel_peak(respond, grid), exchange)
     unknowns = wheel.count * wheel.nodes * wheel.directions * (2 * H + 1)
     if exchange.rank == 0:

@@ -93,7 +93,8 @@ CAPTIONS = {
     "drawn wheels with 95 % intervals; dashed the tuned optimum, dotted the robust one with its "
     "interval in grey.",
     "wheel/scatter_histogram": "How often an amplification occurs at the tuned wheel's best load.",
-    "wheel/wheel_motion": "The wheel at its highest point, seen along its axis.",
+    "wheel/wheel_motion": "The wheel at its highest point, seen along its axis. On the screen: all "
+    "blades in motion as plates that bend by the amplitude at the probe; play, or move the phase.",
     "wheel/fatigue_of_the_worst_blade": "The places of the highest blade that use most of what the "
     "material lasts, as for the tuned wheel.",
     "wheel/utilisation_of_the_worst_blade": "Alternating stress of the highest blade over the "
