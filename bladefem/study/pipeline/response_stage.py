@@ -11,6 +11,7 @@ from geometry.mesh import Mesh, sector_of
 from ...data import Patch
 from ...errors import NotSolvedError
 from ...io.stage_cache import on_root
+from ...scene.aerodynamics import has_flow
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...util.message import method
@@ -170,7 +171,7 @@ def _load_responses(
     others: dict[int, tuple[ClassVerdict, ...]] = {}
     if scene.study.stability:
         order = scene.excitation.engine_order
-        judged = judged_disturbances(models, settings, order, sectors)
+        judged = judged_disturbances(models, settings, order, sectors, has_flow(scene))
         with clock("response"):
             # of the lowest resonance, which the report begins with
             k = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
