@@ -20,6 +20,7 @@ from bladefem.study.pipeline import flutter as subject
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
+from bladefem.study.pipeline.coriolis import has_coriolis, with_coriolis
 from bladefem.study.pipeline.damped_motion import damped_motion
 from bladefem.study.pipeline.flow import scene_flow
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
@@ -79,8 +80,10 @@ def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced, finest):
     assert blade.mismatch < 2e-3
 
 
-def test_limit_cycle_is_where_the_balance_ends_without_force(reduced):
+@pytest.mark.parametrize("coriolis", [False, True])
+def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
     """The resonance of fed waves under less and less force tends to the limit cycle."""
+    reduced = replace(reduced, scene=vary(reduced.scene, operation__coriolis=coriolis))
     patches = list(reduced.contact.problem.patches)
     keep = StageRunner(None, None, StageClock({}, []))
     found = subject.find_flutter(reduced, Bodies(reduced.scene, reduced.mesh), patches, keep)
@@ -99,6 +102,8 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced):
     sector = subject.reduce_sector(
         Bodies(reduced.scene, reduced.mesh), patches, wanted, reduced.settings.modes
     )
+    sector = with_coriolis(reduced.scene, sector)
+    assert has_coriolis(sector) == coriolis
     (case,) = load_cases(reduced.scene, reduced.mesh, reduced.contact)
     for one in (held, largest):
         model = subject._wave_model(reduced, sector, patches, case, flow, one.wave, 0)
