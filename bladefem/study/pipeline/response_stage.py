@@ -30,7 +30,13 @@ from .linear_limits import linear_limits
 from .loads import Curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
-from .response_remarks import best_load_remarks, load_of, response_remarks, stress_message
+from .response_remarks import (
+    best_load_remarks,
+    load_of,
+    lower_studied_remarks,
+    response_remarks,
+    stress_message,
+)
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
 from .stability_remarks import Disturbances, judged_disturbances
@@ -76,6 +82,7 @@ def run_response(
         )
     sectors = sector_of(mesh).count if is_wheel(mesh) else 0
     response = _load_responses(scene, cases, family, settings, keep, softer, sectors, best)
+    clock.messages.extend(lower_studied_remarks(scene, best, response.curves))
     with clock("influences"):
         found = _influences(scene, mesh, before.contact, family, best, keep)
     curves = response.curves
