@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 
 from . import backbone, commands, ranks, scatter, study
+from .fit import add_fit, fit
 from .look import add_look, look
 
 _EXAMPLES = """examples:
@@ -82,6 +83,11 @@ _COMMANDS = {
         "bladefem backbone scenes/wedge.toml",
         backbone.backbone,
     ),
+    "fit": (
+        "contact from measured responses: friction, stiffness and normal load with intervals",
+        "bladefem fit scenes/wedge.toml --measured readings.csv --parameters mu,stiffness",
+        fit,
+    ),
     "chart": (
         "chart of CPU time against error, for methods, models and the automatic choice",
         "bladefem chart scenes/plane.toml --budget 60",
@@ -136,6 +142,7 @@ def parser() -> argparse.ArgumentParser:
             "--pdf", action="store_true", help="also print the report as PDF, by Chromium"
         )
     _modes_arguments(subs.choices["modes"])
+    add_fit(subs.choices["fit"])
     study.add_study(subs.choices["study"])
     _chart_arguments(subs.choices["chart"])
     info = _add_command(

@@ -8,6 +8,9 @@ given, its own equation tells both unknowns,
 
 and all other modes answer the contact forces through a flexibility without that mode, which is
 regular at the resonance: w_1 = phi_r a - G' f_1. zeta is the damping of friction alone.
+
+Coriolis forces, which do no work, couple the mode with the others: these follow it, which changes
+phi_r, and add to its own equation. Both unknowns then stand on both sides of that.
 """
 
 from __future__ import annotations
@@ -26,6 +29,10 @@ from .linear.woodbury import bodies_of
 from .model import ReducedModel
 from .solver.residual import contact_forces
 
+# rounds in which frequency and damping are found where Coriolis forces couple the modes, and their
+# relative change at the end
+COUPLED_ROUNDS = 60
+COUPLED_CHANGE = 1e-14
 # relative step of frequency and damping in differences of the flexibility
 DIFFERENCE_STEP = 1e-7
 # frequency at which the mean is condensed, over the mode's own: no multiple of it is a resonance
@@ -46,6 +53,8 @@ class ModeFrame:
     # (m, m) and (m,) of the mean
     A0: np.ndarray
     stuck0: np.ndarray
+    # (S, k, k) Coriolis forces of the blade's modes [1/s]; None without
+    coriolis: np.ndarray | None = None
 
     @property
     def still(self) -> np.ndarray:
@@ -58,6 +67,17 @@ class ModeFrame:
     def moving(self) -> np.ndarray:
         """(N,) True for harmonics above the mean."""
         return np.tile(np.arange(2 * self.H + 1) > 0, len(self.stuck0))
+
+
+@dataclass(frozen=True)
+class _Following:
+    """How the other modes follow the mode in harmonic 1, at one frequency and damping."""
+
+    # (m,) motion of the contacts with the mode, and forces of the contacts as the mode feels them
+    shape: np.ndarray
+    reading: np.ndarray
+    # what the other modes' answer adds to the squared frequency [1/s^2]
+    added: complex
 
 
 @dataclass(frozen=True)
@@ -79,15 +99,17 @@ def mode_frame(
     samples: int,
 ) -> ModeFrame:
     bodies = bodies_of(model, H)
-    if any(body.coupled is not None for body in bodies):
-        raise InputError("damping that couples modes: expected modal damping for nonlinear modes")
+    if any(body.coupled is not None for body in bodies[1:]):
+        raise InputError("damping that couples modes: expected modal damping of a damper")
     if model.circulatory:
         raise InputError("unsymmetric stiffness: expected a symmetric one for nonlinear modes")
     # any frequency tells the mean; the mode's own is a resonance
     still = condense(_unloaded(model), OFF_RESONANCE * float(model.side(1).omega[mode]), H)
     shape = model.blades(H).shapes[_of(model.blades(H), 1)][model.blades(H).contact][:, mode]
     mean = flexibility_of_mean(still.condensed.flex)
-    return ModeFrame(model, mode, H, samples, bodies, shape, mean, still.stuck[0].real)
+    # what has a loss is damping, and left out
+    coriolis = coriolis_part(bodies[0])
+    return ModeFrame(model, mode, H, samples, bodies, shape, mean, still.stuck[0].real, coriolis)
 
 
 def _unloaded(model: ReducedModel) -> ReducedModel:
@@ -109,22 +131,78 @@ def _flexibility(
 ) -> np.ndarray:
     """(m, m) flexibility of both bodies in harmonic h, in harmonic 1 without the mode itself."""
     G: np.ndarray = np.zeros(())
-    w = h * omega
     for i, body in enumerate(frame.bodies):
-        s = _of(body, h)
-        shapes = body.shapes[s][body.contact]
-        Z = body.omega[s] ** 2 - w**2 - 2j * zeta * omega * w
-        if i == 0 and h == 1:
-            # left out
-            Z[frame.mode] = np.inf
-        inverse = 1 / Z
+        shapes = body.shapes[_of(body, h)][body.contact]
+        inverse = _inverse(frame, i, h, omega, zeta)
         residual = body.residual[_of_residual(body, h)][body.contact, body.contact]
-        G = G + (shapes * inverse) @ shapes.conj().T + residual
+        G = G + shapes @ inverse @ shapes.conj().T + residual
     return G
+
+
+def _inverse(frame: ModeFrame, i: int, h: int, omega: float, zeta: float) -> np.ndarray:
+    """(k, k) inverse modal impedance of a body in harmonic h; zero for the mode itself in harmonic
+    1.
+    """
+    body = frame.bodies[i]
+    w = h * omega
+    Z = body.omega[_of(body, h)] ** 2 - w**2 - 2j * zeta * omega * w
+    kept = np.ones(len(Z), dtype=bool)
+    if i == 0 and h == 1:
+        kept[frame.mode] = False
+    found = np.zeros((len(Z), len(Z)), dtype=complex)
+    if i > 0 or frame.coriolis is None:
+        found[kept, kept] = 1 / Z[kept]
+        return found
+    full = np.diag(Z) + 1j * w * frame.coriolis[_of(body, h)]
+    some = np.ix_(kept, kept)
+    found[some] = np.linalg.inv(full[some])
+    return found
+
+
+def _followed(frame: ModeFrame, omega: float, zeta: float) -> _Following:
+    """Without Coriolis forces they do not."""
+    if frame.coriolis is None:
+        return _Following(frame.shape, frame.shape.conj(), 0.0)
+    body = frame.bodies[0]
+    shapes = body.shapes[_of(body, 1)][body.contact]
+    coupling = 1j * omega * frame.coriolis[_of(body, 1)]
+    inverse = _inverse(frame, 0, 1, omega, zeta)
+    following = inverse @ coupling[:, frame.mode]
+    felt = coupling[frame.mode] @ inverse
+    return _Following(
+        frame.shape - shapes @ following,
+        frame.shape.conj() - felt @ shapes.conj().T,
+        complex(coupling[frame.mode, frame.mode] - coupling[frame.mode] @ following),
+    )
 
 
 def _of_residual(stack: Stack, h: int) -> int:
     return min(h, len(stack.residual) - 1)
+
+
+def mode_with_others(blades: Stack, mode: int, omega: float, zeta: float) -> np.ndarray:
+    """(k,) amplitudes of the blade's modes in harmonic 1 that follow one of amplitude 1 through
+    Coriolis forces.
+    """
+    coriolis = coriolis_part(blades)
+    found = np.zeros(blades.omega.shape[1], dtype=complex)
+    found[mode] = 1.0
+    if coriolis is None:
+        return found
+    own = _of(blades, 1)
+    others = np.arange(len(found)) != mode
+    Z = 1j * omega * coriolis[own]
+    Z = Z + np.diag(blades.omega[own] ** 2 - omega**2 - 2j * zeta * omega**2)
+    found[others] = -np.linalg.solve(Z[np.ix_(others, others)], Z[others, mode])
+    return found
+
+
+def coriolis_part(blades: Stack) -> np.ndarray | None:
+    """(S, k, k) what couples the modes without a loss [1/s]; None without."""
+    if blades.coupled is None:
+        return None
+    found = (blades.coupled - blades.coupled.conj().swapaxes(1, 2)) / 2
+    return found if found.any() else None
 
 
 def mode_residual(
@@ -147,8 +225,7 @@ def mode_residual(
     # the mean as in the balance, w = stuck - A p
     p = f[:, 0].real - springs * motion[:, 0].real
     r[:, 0] = motion[:, 0].real - frame.stuck0 + frame.A0 @ p
-    r += _flexed(frame, f, omega, zeta)
-    r[:, 1] -= frame.shape * amplitude
+    r += _moved(frame, f, omega, zeta, amplitude)
     return ModeState(w, f, forces.jacobian, omega, zeta, to_real(r).ravel())
 
 
@@ -159,9 +236,24 @@ def _frequency(
 ) -> tuple[float, float]:
     """Frequency [rad/s] and damping [1] that close the mode's own equation."""
     own = frame.bodies[0].omega[_of(frame.bodies[0], 1)][frame.mode] ** 2
-    drive = frame.shape.conj() @ f / amplitude
-    squared = max(own + drive.real, 0.01 * own)
-    return float(np.sqrt(squared)), float(drive.imag / (2 * squared))
+    if frame.coriolis is None:
+        return _from_squared(own, own + frame.shape.conj() @ f / amplitude)
+    omega, zeta = float(np.sqrt(own)), 0.0
+    for _ in range(COUPLED_ROUNDS):
+        before = omega, zeta
+        rest = _followed(frame, omega, zeta)
+        omega, zeta = _from_squared(own, own + rest.added + rest.reading @ f / amplitude)
+        if abs(omega / before[0] - 1) + abs(zeta - before[1]) < COUPLED_CHANGE:
+            break
+    return omega, zeta
+
+
+def _from_squared(own: float, squared: complex) -> tuple[float, float]:
+    """Frequency and damping of omega^2 (1 + 2i zeta), which is kept from falling far below the
+    mode's own.
+    """
+    real = max(squared.real, 0.01 * own)
+    return float(np.sqrt(real)), float(squared.imag / (2 * real))
 
 
 def mode_jacobian(
@@ -203,11 +295,34 @@ def _through_frequency(
     """The part by omega and zeta: two columns of differences times the rows of phi^H df / a."""
     n, d, _K = state.w.shape
     first = state.dfdw[:, :, 1] - 1j * state.dfdw[:, :, 2]
-    shape = frame.shape.conj().reshape(n, d, 1, 1)
-    drive = (shape * first).sum(axis=1).ravel() / amplitude
-    by_omega = drive.real / (2 * state.omega)
-    by_zeta = drive.imag / (2 * state.omega**2) - state.zeta / state.omega**2 * drive.real
-    return _frequency_columns(frame, state) @ np.vstack([by_omega, by_zeta])
+    reading = _followed(frame, state.omega, state.zeta).reading.reshape(n, d, 1, 1)
+    drive = (reading * first).sum(axis=1).ravel() / amplitude
+    rows = _of_drive(frame, state, amplitude) @ np.vstack([drive.real, drive.imag])
+    return _frequency_columns(frame, state, amplitude) @ rows
+
+
+def _of_drive(frame: ModeFrame, state: ModeState, amplitude: float) -> np.ndarray:
+    """(2, 2) changes of omega and zeta by the real and the imaginary part of what the forces add to
+    the squared frequency.
+    """
+    omega, zeta = state.omega, state.zeta
+    changes = np.array([[2 * omega, 0.0], [4 * zeta * omega, 2 * omega**2]])
+    if frame.coriolis is not None:
+        here = _squared_by_others(frame, state.f[:, 1], omega, zeta, amplitude)
+        step = DIFFERENCE_STEP * omega
+        faster = _squared_by_others(frame, state.f[:, 1], omega + step, zeta, amplitude)
+        damped = _squared_by_others(frame, state.f[:, 1], omega, zeta + DIFFERENCE_STEP, amplitude)
+        by_omega, by_zeta = (faster - here) / step, (damped - here) / DIFFERENCE_STEP
+        changes -= np.array([[by_omega.real, by_zeta.real], [by_omega.imag, by_zeta.imag]])
+    return np.linalg.inv(changes)
+
+
+def _squared_by_others(
+    frame: ModeFrame, f: np.ndarray, omega: float, zeta: float, amplitude: float
+) -> complex:
+    """What forces and the other modes add to the squared frequency [1/s^2]."""
+    rest = _followed(frame, omega, zeta)
+    return complex(rest.added + rest.reading @ f / amplitude)
 
 
 def amplitude_derivative(
@@ -216,21 +331,20 @@ def amplitude_derivative(
     amplitude: float,
 ) -> np.ndarray:
     """(N,) derivative of the residual by the amplitude at given displacements."""
-    own = frame.bodies[0].omega[_of(frame.bodies[0], 1)][frame.mode] ** 2
-    by_omega = -(state.omega**2 - own) / (2 * state.omega * amplitude)
-    by_zeta = -state.zeta / amplitude - 2 * state.zeta * by_omega / state.omega
+    rest = _followed(frame, state.omega, state.zeta)
+    drive = -(rest.reading @ state.f[:, 1]) / amplitude**2
     direct = np.zeros((len(frame.shape), frame.H + 1), dtype=complex)
-    direct[:, 1] = -frame.shape
-    through = _frequency_columns(frame, state) @ np.array([by_omega, by_zeta])
-    return to_real(direct).ravel() + through
+    direct[:, 1] = -rest.shape
+    change = _of_drive(frame, state, amplitude) @ np.array([drive.real, drive.imag])
+    return to_real(direct).ravel() + _frequency_columns(frame, state, amplitude) @ change
 
 
-def _frequency_columns(frame: ModeFrame, state: ModeState) -> np.ndarray:
+def _frequency_columns(frame: ModeFrame, state: ModeState, amplitude: float) -> np.ndarray:
     """(N, 2) derivatives of the residual by omega and zeta, by differences."""
-    here = _flexed(frame, state.f, state.omega, state.zeta)
+    here = _moved(frame, state.f, state.omega, state.zeta, amplitude)
     step = DIFFERENCE_STEP * state.omega
-    faster = _flexed(frame, state.f, state.omega + step, state.zeta)
-    damped = _flexed(frame, state.f, state.omega, state.zeta + DIFFERENCE_STEP)
+    faster = _moved(frame, state.f, state.omega + step, state.zeta, amplitude)
+    damped = _moved(frame, state.f, state.omega, state.zeta + DIFFERENCE_STEP, amplitude)
     columns = [
         to_real((faster - here) / step).ravel(),
         to_real((damped - here) / DIFFERENCE_STEP).ravel(),
@@ -238,16 +352,19 @@ def _frequency_columns(frame: ModeFrame, state: ModeState) -> np.ndarray:
     return np.column_stack(columns)
 
 
-def _flexed(
+def _moved(
     frame: ModeFrame,
     f: np.ndarray,
     omega: float,
     zeta: float,
+    amplitude: float,
 ) -> np.ndarray:
-    """(m, H+1) moving displacements by forces, without the mode itself."""
+    """(m, H+1) moving displacements by forces, without the mode, less those with the mode."""
+    rest = _followed(frame, omega, zeta)
     out = np.zeros_like(f)
     for h in range(1, frame.H + 1):
         out[:, h] = _flexibility(frame, h, omega, zeta) @ f[:, h]
+    out[:, 1] -= rest.shape * amplitude
     return out
 
 
@@ -282,10 +399,10 @@ def probe_amplitudes(
     out = np.zeros((frame.H + 1, blades.probe.stop - blades.probe.start), dtype=complex)
     for h in range(1, frame.H + 1):
         s = _of(blades, h)
-        w = h * state.omega
-        Z = blades.omega[s] ** 2 - w**2 - 2j * state.zeta * state.omega * w
-        modal = -(blades.shapes[s][blades.contact].conj().T @ state.f[:, h])
-        modal = modal / Z
+        force = -(blades.shapes[s][blades.contact].conj().T @ state.f[:, h])
+        if h == 1 and frame.coriolis is not None:
+            force = force - 1j * state.omega * frame.coriolis[s][:, frame.mode] * amplitude
+        modal = _inverse(frame, 0, h, state.omega, state.zeta) @ force
         if h == 1:
             modal[frame.mode] = amplitude
         residual = blades.residual[_of_residual(blades, h)][blades.probe, blades.contact]

@@ -12,7 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from .mode_equations import ModeFrame, mode_frame, mode_residual, probe_amplitudes
+from .mode_equations import (
+    ModeFrame,
+    mode_frame,
+    mode_residual,
+    mode_with_others,
+    probe_amplitudes,
+)
 from .mode_path import PathSpot, follow_mode
 from .model import ReducedModel
 from .validate_model import check_point
@@ -111,13 +117,46 @@ def _as_mode(frame: ModeFrame, spot: PathSpot) -> NonlinearMode:
     )
 
 
+def modal_damping(model: ReducedModel, points: Sequence[NonlinearMode]) -> np.ndarray:
+    """(points,) damping of the modes of one branch by bodies and flow, over the motion of the blade
+    mode [1/s]; friction damps the modes that follow it by Coriolis forces as well.
+    """
+    blades = model.blades(1)
+    own = blades.viscous[-1]
+    if blades.coupled is not None:
+        own = own + np.diagonal(blades.coupled[-1]).real
+    rates = [own + blades.hysteretic[-1] / p.omega for p in points]
+    return np.array(
+        [
+            rate @ part + 2 * p.zeta * p.omega * (part.sum() - 1)
+            for rate, part, p in zip(rates, _moving_parts(model, points), points, strict=True)
+        ]
+    )
+
+
+def _moving_parts(model: ReducedModel, points: Sequence[NonlinearMode]) -> list[np.ndarray]:
+    """Of each point (k,), the squared size of each mode over that of the blade mode."""
+    blades = model.blades(1)
+    return [abs(mode_with_others(blades, p.mode, p.omega, p.zeta)) ** 2 for p in points]
+
+
 def force_at_resonance(model: ReducedModel, point: NonlinearMode) -> float:
     """Size of the modal force that keeps this motion up at its resonance, damping of the bodies
     included [N kg^-1/2].
     """
-    blades = model.blades(1)
-    own = blades.viscous[-1][point.mode] + blades.hysteretic[-1][point.mode] / point.omega
+    (own,) = modal_damping(model, [point])
     return float((2 * point.zeta * point.omega + own) * point.omega * point.amplitude)
+
+
+def modal_forces(model: ReducedModel, points: Sequence[NonlinearMode]) -> np.ndarray:
+    """(points,) sizes of the model's excitation on the mode and on those that follow it
+    [N kg^-1/2].
+    """
+    blades = model.blades(1)
+    force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]
+    return np.array(
+        [abs(mode_with_others(blades, p.mode, p.omega, p.zeta).conj() @ force) for p in points]
+    )
 
 
 def mode_response(
@@ -131,11 +170,9 @@ def mode_response(
     The single nonlinear mode's equation |omega_n^2 - Omega^2 + 2i zeta omega_n Omega| a = |phi^H
     F|; the forced response is the contour 1.
     """
-    blades = model.blades(1)
-    force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]
+    forces, rates = modal_forces(model, points), modal_damping(model, points)
     found = np.empty((len(omegas), len(points)))
     for i, p in enumerate(points):
-        own = blades.viscous[-1][p.mode] * omegas + blades.hysteretic[-1][p.mode]
-        Z = p.omega**2 - omegas**2 + 1j * (2 * p.zeta * p.omega * omegas + own)
-        found[:, i] = abs(Z) * p.amplitude / abs(force[p.mode])
+        Z = p.omega**2 - omegas**2 + 1j * (2 * p.zeta * p.omega + rates[i]) * omegas
+        found[:, i] = abs(Z) * p.amplitude / forces[i]
     return found

@@ -84,7 +84,7 @@ def march_operations(
     return 2.0 * periods * instants * (4 * M**2 + 4 * M * m + 5 * m**2)
 
 
-def _never(motion: np.ndarray) -> bool:
+def never_enough(motion: np.ndarray) -> bool:
     """No motion is enough."""
     return False
 
@@ -94,7 +94,7 @@ def march_ring(
     start: RingState,
     periods: int,
     instants: int = INSTANTS_PER_PERIOD,
-    enough: Callable[[np.ndarray], bool] = _never,
+    enough: Callable[[np.ndarray], bool] = never_enough,
     most: float = np.inf,
 ) -> RingMarch:
     """March under the drive of a state.
@@ -173,6 +173,20 @@ def driven_anew(model: ReducedModel, state: RingState, drive: Drive) -> RingStat
     return RingState(drive, state.modal + before - after, forces)
 
 
+def steps_are_resolved(model: ReducedModel, omega: float, instants: int) -> bool:
+    """Whether steps with so many instants a period are short enough for forces that are linear in
+    them.
+    """
+
+    def longest() -> float:
+        system = _system(model)
+        springs = np.tile(model.springs.ravel(), system.blades)
+        bodies = (system.stiffness_matrix, system.contact.T, system.residual)
+        return longest_linear_step(*bodies, springs)
+
+    return 2 * np.pi / omega / instants <= model.once("longest linear step", longest)
+
+
 def _system(model: ReducedModel) -> SectorModes:
     return model.once("ring", lambda: sector_modes(model))
 
@@ -192,9 +206,7 @@ def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tupl
     free, free_probe = (_of_blades(amplitudes, r, S) for amplitudes in steady)
     preload = np.tile(model.preload, r)
     dt = 2 * np.pi / omega / S
-    springs = np.tile(model.springs.ravel(), r)
-    bodies = (system.stiffness_matrix, system.contact.T, system.residual)
-    resolved = dt <= longest_linear_step(*bodies, springs)
+    resolved = steps_are_resolved(model, omega, S)
     E, G0, G1 = linear_steps(system, dt, mean=not resolved)
     e = model.elements
     extra = start.forces[:, : 1 + e.tangents].ravel() - preload

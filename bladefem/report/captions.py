@@ -73,6 +73,10 @@ CAPTIONS = {
     "of the balance, diamonds where the mode turns back in amplitude. Right: resonance amplitude "
     "and forced response by the mode alone next to the "
     "balance.",
+    "contact/fit": "The contact fitted to measured responses: over the scene's values; in the "
+    "picture the readings, lines of the fitted contact, dotted lines of the scene's.",
+    "contact/fit_readings": "Each reading, and its amplitude by the contact of the scene and by "
+    "the fitted one.",
     "wheel/whole_wheel": "The whole wheel with its pattern: the highest blade next to the tuned "
     "wheel, and the alternating stress of its whole damped motion.",
     "wheel/blades": "Each blade: deviation of its first family, largest amplitude over the band, "
@@ -89,7 +93,8 @@ CAPTIONS = {
     "drawn wheels with 95 % intervals; dashed the tuned optimum, dotted the robust one with its "
     "interval in grey.",
     "wheel/scatter_histogram": "How often an amplification occurs at the tuned wheel's best load.",
-    "wheel/wheel_motion": "The wheel at its highest point, seen along its axis.",
+    "wheel/wheel_motion": "The wheel at its highest point, seen along its axis. On the screen: all "
+    "blades in motion as plates that bend by the amplitude at the probe; play, or move the phase.",
     "wheel/fatigue_of_the_worst_blade": "The places of the highest blade that use most of what the "
     "material lasts, as for the tuned wheel.",
     "wheel/utilisation_of_the_worst_blade": "Alternating stress of the highest blade over the "

@@ -20,12 +20,13 @@ from ..view import mesh, modes, optimum, response, speed
 from ..view.influence import draw_influences
 from ..view.live_curves import live_diameters, live_loops, live_optimum, live_responses
 from ..view.live_shapes import live_motion, live_shapes
+from ..view.live_wheel import live_wheel
 from ..view.motion import draw_motion
 from .fatigue import utilisation_drawing
 from .flow import flow_drawing
 from .nodes import draw_hysteresis, draw_wear, seat_loops
 from .pressure import PICTURE, draw_seats
-from .wheel import pattern_drawings
+from .wheel import WHEEL_FIGURE, pattern_drawings, shown_response
 
 # the figure of the blade's motion under the best load
 MOTION_FIGURE = "response/damped_motion"
@@ -74,21 +75,36 @@ def live_figures(
         "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
         **({} if shapes is None else {"modes/first_modes": shapes}),
         **({} if motions is None else {MOTION_FIGURE: motions}),
+        **_live_wheel(result),
     }
+
+
+def _live_wheel(result: SolvedRun) -> dict[str, dict[str, Any]]:
+    """All blades of a mistuned wheel at its highest point."""
+    if result.wheel is None:
+        return {}
+    r = shown_response(result.wheel)
+    title = f"{r.load:.4g} N per seat, {r.solution.frequency:.5g} Hz"
+    return {WHEEL_FIGURE: live_wheel(r.solution.probe[:, 1:, 0], title)}
 
 
 def _motions(result: SolvedRun) -> dict[str, ComplexArray]:
     """Title to the motion at the resonance of each load whose stress was computed, the lowest
-    resonance first.
+    resonance first; last that of the highest blade of a mistuned wheel.
     """
     curves = result.response.curves
     order = sorted(result.damped, key=lambda number: curves[number].peak_amplitude)
-    return {
+    found = {
         f"{result.damped[number].load:.4g} N per seat, {curves[number].peak_frequency:.5g} Hz": (
             result.damped[number].motion
         )
         for number in order
     }
+    if result.wheel is not None:
+        r = shown_response(result.wheel)
+        name = f"blade {r.peak.blade + 1} of the mistuned wheel, {r.load:.4g} N"
+        found[name] = r.stress.motion
+    return found
 
 
 def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:

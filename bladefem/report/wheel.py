@@ -23,6 +23,8 @@ from ..wheel.statistics import (
 )
 from .headlines import Headline
 
+# all blades at the highest point
+WHEEL_FIGURE = "wheel/wheel_motion"
 # quantiles of a scatter
 SCATTER_QUANTILES = (0.5, 0.95, 0.99)
 
@@ -96,18 +98,23 @@ def pattern_headlines(
     return numbers
 
 
+def shown_response(found: Sequence[PatternResponse]) -> PatternResponse:
+    """That of the load whose highest blade is lowest."""
+    return min(found, key=lambda one: one.peak.height)
+
+
 def pattern_drawings(
     found: Sequence[PatternResponse],
 ) -> dict[str, Callable[[Path], object]]:
-    """Pictures of the load whose highest blade is lowest."""
-    r = min(found, key=lambda one: one.peak.height)
+    """Pictures of `shown_response`."""
+    r = shown_response(found)
     first = r.solution.probe[:, 1, 0]
     title = f"{r.load:g} N: blade {r.peak.blade + 1} is {r.factor:.3g} times the tuned wheel"
     return {
         "wheel/blades": lambda file: view.draw_blades(
             r.peak.by_blade, r.deviation[:, 0], r.tuned, title, file
         ),
-        "wheel/wheel_motion": lambda file: view.draw_wheel_motion(
+        WHEEL_FIGURE: lambda file: view.draw_wheel_motion(
             r.solution.size(), np.angle(first), f"{r.solution.frequency:.5g} Hz, {r.load:g} N", file
         ),
     }

@@ -14,15 +14,18 @@ from functools import partial
 import numpy as np
 
 from ..hbm.model import ReducedModel
-from ..hbm.nonlinear_modes import force_at_resonance, nonlinear_mode
+from ..hbm.nonlinear_modes import (
+    force_at_resonance,
+    modal_damping,
+    modal_forces,
+    nonlinear_mode,
+)
 from ..io.stage_cache import cached_stage, found_remark, on_root
 from ..util.arrays import BooleanArray, RealArray
 from ..util.communicator import Communicator
-from ..util.message import warning
 from ..util.progress import Progress, without_progress
 from .adaptive.family import family_member
 from .pipeline.case_models import family_of_case, load_cases
-from .pipeline.coriolis import without_coriolis
 from .pipeline.loads import Curve
 from .pipeline.run_records import SolvedRun
 from .pipeline.stage_inputs import stage_key
@@ -107,8 +110,8 @@ def run_backbones(
     comm: Communicator | None = None,
     progress: Progress = without_progress,
 ) -> tuple[list[Backbone], list[str]]:
-    """The nonlinear mode under every load of a run, and remarks on what they leave out and on those
-    that were found in the folder; computed on one rank.
+    """The nonlinear mode under every load of a run, and remarks on those that were found in the
+    folder; computed on one rank.
 
     Raises:
         InputError: a model is too large for dense factors, or its mode is no elastic one.
@@ -121,18 +124,10 @@ def run_backbones(
     cases = {(case.load, case.mass): case for case in load_cases(scene, run.mesh, run.contact)}
     found = []
     remarks: list[str] = []
-    reduced = without_coriolis(run.reduced)
-    if reduced is not run.reduced:
-        remarks.append(
-            warning(
-                "nonlinear modes leave out the Coriolis forces that the responses have: "
-                "resonances predicted by them lie beside those of the balance"
-            )
-        )
 
     def alone(curve: Curve) -> Backbone:
         case = cases[curve.load, curve.mass]
-        family = family_of_case(scene, run.mesh, reduced, patches, case)
+        family = family_of_case(scene, run.mesh, run.reduced, patches, case)
         model = family_member(family, curve.settings).model
         return curve_backbone(model, curve, scene.excitation.mode - 1, ends)
 
@@ -168,9 +163,6 @@ def curve_backbone(
     wanted = [float(a) / seen for a in np.geomspace(*ends, AMPLITUDES_PER_LOAD)]
     H = max(curve.settings.harmonics, *model.excitation)
     points = list(nonlinear_mode(model, wanted, mode, H, curve.settings.samples))
-    force = blades.shapes[-1, blades.load].conj().T @ model.loads(1)[1]
-    viscous = float(blades.viscous[-1][mode])
-    hysteretic = float(blades.hysteretic[-1][mode])
     omega = np.array([p.omega for p in points])
     return Backbone(
         curve.load,
@@ -178,8 +170,8 @@ def curve_backbone(
         np.array([np.linalg.norm(p.probe[1:, 0]) for p in points]),
         omega / (2 * np.pi),
         np.array([p.zeta for p in points]),
-        (viscous + hysteretic / omega) / (2 * omega),
-        np.array([force_at_resonance(model, p) for p in points]) / abs(force[mode]),
+        modal_damping(model, points) / (2 * omega),
+        np.array([force_at_resonance(model, p) for p in points]) / modal_forces(model, points),
         np.array([p.converged for p in points]),
         np.array([p.fold for p in points]),
         (curve.peak_amplitude, curve.peak_frequency),

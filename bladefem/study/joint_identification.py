@@ -13,11 +13,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 from scipy.optimize import least_squares
 
 from ..errors import InputError
 from ..friction.closed_form import jenkins
+from .fit_intervals import UNKNOWN_LOG_HALF_WIDTH, half_widths
 
 # frequency with the joint stuck [Hz], damping without friction [1], joint's share of the modal
 # stiffness [1], amplitude at which all of it slips [m], exponent of the distribution [1]
@@ -32,8 +32,6 @@ FINEST_LIMIT_RATIO = 1e-3
 # by more than an instrument, with every loading and temperature
 FREQUENCY_ERROR = 1e-3
 DAMPING_ERROR = 0.05
-# half width of the 95 % interval of a logarithm from which a parameter counts as unknown: times 2
-UNKNOWN_LOG_HALF_WIDTH = np.log(2.0)
 # slopes q from which the fit starts; the lowest end wins
 START_SLOPES = (0.4, 0.8, 1.6)
 # clearances over the largest amplitude, and shares of the stop, from which the fit starts
@@ -142,7 +140,7 @@ def fit_joint(
         least_squares(misfit, np.clip(start, low, high), bounds=(low, high)) for start in starts
     ]
     best = min(ends, key=lambda end: end.cost)
-    half = _half_widths(best.jac, best.fun)
+    half = half_widths(best.jac, best.fun)
     return JointFit(
         _values(best.x),
         np.exp(np.column_stack([best.x - half, best.x + half])),
@@ -176,16 +174,3 @@ def _starts(
 def _values(x: np.ndarray) -> np.ndarray:
     """Parameters from their logarithms."""
     return np.exp(x)
-
-
-def _half_widths(J: np.ndarray, misfit: np.ndarray) -> np.ndarray:
-    """(p,) half widths of the 95 % intervals of the logarithms; infinite where the data are blind.
-
-    The scatter is that of the misfit, but at least that of the stated errors of measurement.
-    """
-    freedom = max(len(misfit) - J.shape[1], 1)
-    scatter = max(1.0, float(np.sum(misfit**2)) / freedom)
-    _, sizes, V = np.linalg.svd(J, full_matrices=False)
-    with np.errstate(divide="ignore", over="ignore"):
-        variance = ((V.T / sizes) ** 2).sum(axis=1) * scatter
-    return np.minimum(stats.t.ppf(0.975, freedom) * np.sqrt(variance), 50.0)

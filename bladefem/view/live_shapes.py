@@ -53,14 +53,14 @@ def live_shapes(
         found.append(
             {
                 "title": mode_title(modes, i, families[i] if i < len(families) else ""),
-                "harmonics": [{"order": 1, **_packed_shape(drawn)}],
+                "harmonics": [{"order": 1, **packed_shape(drawn)}],
             }
         )
     return {
         "kind": "shape",
         "choice": "mode",
-        "points": _pack_numbers(surface.points, np.float32),
-        "triangles": _pack_numbers(surface.triangles, np.uint32),
+        "points": pack_numbers(surface.points, np.float32),
+        "triangles": pack_numbers(surface.triangles, np.uint32),
         "modes": found,
         "eye": [float(x) for x in view_of(mesh)],
         "up": [1.0, 0.0, 0.0],
@@ -89,8 +89,8 @@ def live_motion(
     return {
         "kind": "shape",
         "choice": "load",
-        "points": _pack_numbers(surface.points, np.float32),
-        "triangles": _pack_numbers(surface.triangles, np.uint32),
+        "points": pack_numbers(surface.points, np.float32),
+        "triangles": pack_numbers(surface.triangles, np.uint32),
         "modes": [
             {"title": title, **_packed_motion(mesh, motion, surface.nodes)}
             for title, motion in motions.items()
@@ -107,7 +107,7 @@ def _packed_motion(mesh: Mesh, motion: ComplexArray, nodes: IntegerArray) -> dic
     sizes = np.abs(motion).max(axis=(1, 2))
     kept = np.flatnonzero(sizes > HARMONIC_SHARE * sizes.max(initial=0.0))
     packed = [
-        {"order": int(h) + 1, **_packed_shape(factor * _solid(motion[h])[nodes])} for h in kept
+        {"order": int(h) + 1, **packed_shape(factor * _solid(motion[h])[nodes])} for h in kept
     ]
     return {
         "amplitude": 1e6 * float(amplitude.max(initial=0.0)),
@@ -121,19 +121,19 @@ def _solid(field: ComplexArray) -> ComplexArray:
     return np.pad(field, ((0, 0), (0, 3 - field.shape[1])))
 
 
-def _packed_shape(drawn: ComplexArray | RealArray) -> dict[str, Any]:
+def packed_shape(drawn: ComplexArray | RealArray) -> dict[str, Any]:
     """Real and imaginary displacement as drawn [m], in shares of their largest component."""
     largest = float(max(np.abs(drawn.real).max(), np.abs(drawn.imag).max(), 1e-300))
     parts = {
         "scale": largest / LARGEST_INT16,
-        "real": _pack_numbers(drawn.real * LARGEST_INT16 / largest, np.int16),
+        "real": pack_numbers(drawn.real * LARGEST_INT16 / largest, np.int16),
     }
     if np.iscomplexobj(drawn) and np.abs(drawn.imag).max() > 1e-6 * largest:
-        parts["imaginary"] = _pack_numbers(drawn.imag * LARGEST_INT16 / largest, np.int16)
+        parts["imaginary"] = pack_numbers(drawn.imag * LARGEST_INT16 / largest, np.int16)
     return parts
 
 
-def _pack_numbers(values: np.ndarray, kind: type) -> str:
+def pack_numbers(values: np.ndarray, kind: type) -> str:
     """Little-endian numbers in base64; whole ones rounded."""
     array = np.round(values) if np.issubdtype(kind, np.integer) else values
     return base64.b64encode(np.ascontiguousarray(array, dtype=kind).tobytes()).decode()

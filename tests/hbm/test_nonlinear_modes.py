@@ -2,6 +2,8 @@
 the resonances of the full balance.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from models import block, single_mass
@@ -10,8 +12,19 @@ from scipy import linalg
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.closed_form import jenkins
+from bladefem.hbm.mode_equations import (
+    amplitude_derivative,
+    mode_frame,
+    mode_jacobian,
+    mode_residual,
+)
 from bladefem.hbm.model import Damping, ReducedModel
-from bladefem.hbm.nonlinear_modes import force_at_resonance, mode_response, nonlinear_mode
+from bladefem.hbm.nonlinear_modes import (
+    force_at_resonance,
+    modal_forces,
+    mode_response,
+    nonlinear_mode,
+)
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.reduction.matrices import port_model_from_matrices
@@ -153,6 +166,89 @@ def test_folds_in_amplitude_are_followed_in_closed_form():
     # both parts between the folds, and on the far side
     between = [p for p in found if folds[0].omega > p.omega and p.amplitude < folds[0].amplitude]
     assert len(between) > 3 and found[-1].amplitude == pytest.approx(40.0)
+
+
+# readings of the probe of `whirling`
+SEEN = np.array([1.0, 0.3, 0.2])
+
+
+def whirling(turn, kt, limit):
+    """Three modes that Coriolis forces couple, on one Jenkins element; the coupling has a loss too,
+    which nonlinear modes leave out.
+    """
+    own = np.array([1.0, 1.3, 2.1])
+    shapes = np.array([0.8, 0.5, -0.6])
+    coupling = turn * np.array([[0.0, 1.0, 0.4], [-1.0, 0.0, -0.7], [-0.4, 0.7, 0.0]])
+    ports = {"contact": shapes[None], "load": np.array([0]), "probe": SEEN[None]}
+    C = coupling + 0.01 * np.eye(3)
+    body = port_model_from_matrices(np.eye(3), np.diag(own**2), ports, C=C)
+    elements = Elements(np.array([kt]), np.zeros(1), np.ones(1), np.array([limit]), tangents=1)
+    model = ReducedModel((body,), elements, {1: np.array([1.0])}, Damping(ratio=0.0))
+    return model, own, shapes, coupling
+
+
+@pytest.mark.parametrize("turn", [0.02, 0.15, -0.15])
+def test_coriolis_forces_in_closed_form(turn):
+    """With the complex stiffness of the element the motion is an eigenvector of a matrix that has
+    the frequency in it; amplitude, frequency, damping and the probe for each displacement of the
+    contact.
+    """
+    kt, limit = 0.6, 0.5
+    model, own, shapes, coupling = whirling(turn, kt, limit)
+    amplitudes = np.geomspace(0.3, 30, 12)
+    found = list(nonlinear_mode(model, amplitudes, 0, H=1, samples=0))
+    assert all(p.converged for p in found), [p.reason for p in found]
+    for p in found:
+        x = np.hypot(*p.w[0, 0, 1:3])
+        law = jenkins(np.array([x]), kt, limit)
+        stiffness = law.stiffness[0] + 1j * law.damping[0]
+        omega = p.omega
+        matrix = np.diag(own**2) + 1j * omega * coupling + stiffness * np.outer(shapes, shapes)
+        values, vectors = np.linalg.eig(matrix)
+        one = int(np.argmin(abs(values - omega**2)))
+        assert values[one] == pytest.approx(omega**2 * (1 + 2j * p.zeta), rel=1e-8)
+        vector = vectors[:, one] * x / abs(shapes @ vectors[:, one])
+        assert abs(vector[0]) == pytest.approx(p.amplitude, rel=1e-8)
+        assert abs(p.probe[1, 0]) == pytest.approx(abs(SEEN @ vector), rel=1e-7)
+    # the forces are felt
+    still = list(nonlinear_mode(whirling(0.0, kt, limit)[0], amplitudes, 0, H=1, samples=0))
+    assert abs(found[-1].omega / still[-1].omega - 1) > 1e-4
+
+
+@pytest.mark.parametrize("force", [0.02, 0.08, 0.4])
+def test_resonance_with_coriolis_forces_is_predicted(force):
+    """The balance of one harmonic, whose modes are damped as well; without Coriolis forces the
+    prediction is off by 2.6 % at most.
+    """
+    model = replace(whirling(0.15, 0.6, 0.5)[0], excitation={1: np.array([force])})
+    points = list(nonlinear_mode(model, np.geomspace(0.05, 60, 120), 0, H=1, samples=0))
+    drive = np.array([force_at_resonance(model, p) for p in points]) / modal_forces(model, points)
+    i = int(np.argmax(drive > 1))
+    assert i > 0
+    share = -np.log(drive[i - 1]) / np.log(drive[i] / drive[i - 1])
+    sizes = [abs(p.probe[1, 0]) for p in points[i - 1 : i + 1]]
+    predicted = sizes[0] * (sizes[1] / sizes[0]) ** share
+    omega = points[i - 1].omega + share * (points[i].omega - points[i - 1].omega)
+    peak = find_peak(model, omega, 1, 0)
+    assert predicted == pytest.approx(peak.height, rel=0.03)
+    assert omega == pytest.approx(peak.omega, rel=0.005)
+
+
+def test_derivatives_with_coriolis_forces_are_those_of_differences():
+    model, *_ = whirling(0.15, 0.6, 0.5)
+    frame = mode_frame(model, 0, 3, 256)
+    rng = np.random.default_rng(0)
+    w = 2.0 * rng.normal(size=7)
+    state = mode_residual(frame, w, 1.7)
+    J = mode_jacobian(frame, state, 1.7)
+    step = 1e-6
+    for k in range(7):
+        moved = np.eye(7)[k] * step
+        up, down = (mode_residual(frame, w + sign * moved, 1.7).r for sign in (1, -1))
+        np.testing.assert_allclose(J[:, k], (up - down) / (2 * step), atol=2e-5)
+    up, down = (mode_residual(frame, w, 1.7 + sign * step).r for sign in (1, -1))
+    slope = amplitude_derivative(frame, state, 1.7)
+    np.testing.assert_allclose(slope, (up - down) / (2 * step), atol=2e-5)
 
 
 def test_bad_input_is_refused():

@@ -1,6 +1,7 @@
 """Peaks and optima against brute force."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -283,3 +284,18 @@ def test_the_way_over_ripples_ends_at_another_peak():
     found = find_peak(model, 379.3, 7, 256, tolerance=1e-4)
     assert found.omega == pytest.approx(379.93, rel=2e-4)
     assert found.height == pytest.approx(1.0473e-4, rel=1e-3)
+
+
+def test_a_point_below_a_jump_is_no_corner():
+    """Readings on the shipped mistuned wheel under 50 N: 54 um where dampers stick, 198 um on the
+    falling side of a peak of 263 um between them. The tangent at the lower one ends just above the
+    higher one.
+    """
+    heights, slopes = np.array([53.979, 198.161]), np.array([0.0411, -0.0749])
+    low, high = (
+        peak_module._Look(SimpleNamespace(omega=HZ * at), size, slope * size / HZ)
+        for at, size, slope in zip((370.9535, 381.9926), heights, slopes, strict=True)
+    )
+    target, gain = peak_module._vertex_between(low, high, corner=True)
+    # the search goes on, on the rising side of the higher one
+    assert gain > 0.01 and HZ * 372 < target < HZ * 381.9

@@ -20,6 +20,7 @@ from bladefem.study.pipeline import flutter as subject
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
+from bladefem.study.pipeline.coriolis import has_coriolis, with_coriolis
 from bladefem.study.pipeline.damped_motion import damped_motion
 from bladefem.study.pipeline.flow import scene_flow
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
@@ -39,17 +40,26 @@ def reduced():
     return replace(run, scene=scene)
 
 
-def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced):
-    """Damped waves of the engine order; every blade of the wheel moves as the sector."""
-    scene = reduced.scene
+@pytest.mark.parametrize("finest", [2, None])
+def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced, finest):
+    """Damped waves of the engine order; every blade of the wheel moves as the sector, and so does
+    the model that limit cycles are found with; the points of the scene, and those joined from all
+    nodes.
+    """
+    scene = vary(reduced.scene, contact__points=finest)
     patches = list(reduced.contact.problem.patches)
     bodies = Bodies(scene, reduced.mesh)
     (case,) = load_cases(scene, reduced.mesh, reduced.contact)
-    settings = reduced.settings
+    settings = replace(reduced.settings, points=None if finest else 4)
     family = family_of_case(scene, reduced.mesh, reduced.reduced, patches, case)
     model = family_member(family, settings).model
     omega = 1.02 * model.side(1).omega[0]
     one = solve(model, omega, 1, 72)
+    flow = scene_flow(scene, COUNT)
+    own = replace(reduced, scene=scene, settings=settings)
+    waved = subject._wave_model(own, reduced.reduced, patches, case, flow, 9, 0)
+    same = solve(waved, omega, 1, 72)
+    np.testing.assert_allclose(same.probe, one.probe, atol=1e-7 * abs(one.probe).max())
     sector = reduce_wheel(bodies, patches, settings.modes, reduced.clamped, 3)
     wheel = whole_wheel(scene, reduced.mesh, sector, patches, case, settings)
     found = solve_wheel(wheel, omega, 1, 72)
@@ -70,8 +80,10 @@ def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced):
     assert blade.mismatch < 2e-3
 
 
-def test_limit_cycle_is_where_the_balance_ends_without_force(reduced):
+@pytest.mark.parametrize("coriolis", [False, True])
+def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
     """The resonance of fed waves under less and less force tends to the limit cycle."""
+    reduced = replace(reduced, scene=vary(reduced.scene, operation__coriolis=coriolis))
     patches = list(reduced.contact.problem.patches)
     keep = StageRunner(None, None, StageClock({}, []))
     found = subject.find_flutter(reduced, Bodies(reduced.scene, reduced.mesh), patches, keep)
@@ -90,6 +102,8 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced):
     sector = subject.reduce_sector(
         Bodies(reduced.scene, reduced.mesh), patches, wanted, reduced.settings.modes
     )
+    sector = with_coriolis(reduced.scene, sector)
+    assert has_coriolis(sector) == coriolis
     (case,) = load_cases(reduced.scene, reduced.mesh, reduced.contact)
     for one in (held, largest):
         model = subject._wave_model(reduced, sector, patches, case, flow, one.wave, 0)

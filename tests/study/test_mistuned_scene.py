@@ -62,18 +62,29 @@ def test_elements_that_the_scene_gives_can_be_joined(reduced):
     assert one.model.elements.kt == pytest.approx(case.elements.kt.reshape(2, 2).sum(axis=1))
 
 
-def test_whole_wheel_is_the_tuned_sector(reduced):
-    scene, run, patches, sector, case, settings = reduced
+TIGHT = replace(DEFAULT_OPTIONS, tolerance=1e-13)
+
+
+@pytest.mark.parametrize("finest", [2, None])
+@pytest.mark.parametrize("share", [0.99, 1.03])
+def test_whole_wheel_is_the_tuned_sector(reduced, finest, share):
+    """Sticking and slipping, with the points of the scene and with those joined from all nodes."""
+    scene, run, patches, sector, _, _ = reduced
+    scene = vary(scene, contact__points=finest)
+    (case,) = load_cases(scene, run.mesh, run.contact)
+    settings = first_settings(scene)
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
     family = family_of_case(scene, run.mesh, run.reduced, patches, case)
-    model = family_member(family, settings).model
-    omega = 0.99 * model.side(1).omega[0]
-    one = solve(model, omega, 1, 72)
-    found = solve_wheel(wheel, omega, 1, 72)
+    member = family_member(family, settings)
+    assert (len(member.groups) > len(member.model.elements.kt)) == (finest is None)
+    omega = share * member.model.side(1).omega[0]
+    one = solve(member.model, omega, 1, 72, options=TIGHT)
+    found = solve_wheel(wheel, omega, 1, 72, options=TIGHT)
     assert one.converged and found.converged
+    assert (one.states["slip"] > 0) == (share > 1)
     turn = np.exp(2j * np.pi * 9 / 36 * np.arange(36))
     np.testing.assert_allclose(
-        found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-7 * abs(one.probe).max()
+        found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-9 * abs(one.probe).max()
     )
 
 
@@ -99,18 +110,23 @@ def shapes(reduced):
     return WheelShapes(bodies, patches, all_modes(bodies), readings)
 
 
-def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes):
-    """No deviation: the utilisation at every node of every blade is that of the sector."""
-    scene, run, patches, sector, case, settings = reduced
+@pytest.mark.parametrize("finest", [2, None])
+def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes, finest):
+    """No deviation: the utilisation at every node of every blade is that of the sector, also where
+    contact points are joined from all nodes.
+    """
+    scene, run, patches, sector, _, _ = reduced
+    scene = vary(scene, contact__points=finest)
+    (case,) = load_cases(scene, run.mesh, run.contact)
+    settings = first_settings(scene)
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
     family = family_of_case(scene, run.mesh, run.reduced, patches, case)
     model = family_member(family, settings).model
     # all contacts slip there
     omega = 1.03 * model.side(1).omega[0]
-    tight = replace(DEFAULT_OPTIONS, tolerance=1e-13)
-    one = solve(model, omega, 1, 72, options=tight)
+    one = solve(model, omega, 1, 72, options=TIGHT)
     pattern = frequency_pattern(sector.families, np.zeros((36, 3)))
-    found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=tight)
+    found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=TIGHT)
     assert one.converged and one.states["slip"] == len(one.w)
     points = settings.points
     stress = damped_stress(shapes.bodies, patches, shapes.modes, case, one, points)

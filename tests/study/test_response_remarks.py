@@ -9,6 +9,7 @@ import numpy as np
 from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.response_remarks import (
     beyond_tolerance,
+    lower_studied_remarks,
     resonance_warnings,
     stiff_layer_sentence,
 )
@@ -109,3 +110,25 @@ def test_points_beyond_their_tolerance_are_counted_for_each_load():
     told = beyond_tolerance(curves)
     assert "9 N (2 of 3 points), 36 N (1 of 3 points); columns" in told
     assert beyond_tolerance(curves[1:2]) == ""
+
+
+def test_a_best_load_above_a_load_studied_is_told():
+    """The highest motion counts, stable or not; another damper's curves do not."""
+    scene = SimpleNamespace(accuracy=0.05)
+    best = SimpleNamespace(reason="", mass=0.02, load=50.0, amplitude=198e-6)
+    studied = [
+        SimpleNamespace(
+            mass=mass, load=load, amplitude=1e-6 * np.array(sizes), converged=np.array([True, True])
+        )
+        for mass, load, sizes in (
+            (0.02, 80.0, (150, 180)),
+            (0.02, 40.0, (570, 608)),
+            (0.01, 9.0, (1, 2)),
+        )
+    ]
+    (said,) = lower_studied_remarks(scene, [best], studied)
+    assert "198 um under 50 N is more than the 180 um under 80 N studied" in said
+    assert said.level == "warning"
+    assert not list(lower_studied_remarks(scene, [best], studied[1:]))
+    best = SimpleNamespace(reason="no peak", mass=0.02, load=np.nan, amplitude=np.nan)
+    assert not list(lower_studied_remarks(scene, [best], studied))

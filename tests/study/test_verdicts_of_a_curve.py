@@ -64,6 +64,20 @@ def test_the_sentence_says_which_disturbances_a_wave_was_judged_against():
     assert "blades" not in stability_sentence(verdicts)
 
 
+def test_the_sentence_says_why_nothing_could_be_judged():
+    """A wave that does not repeat within its harmonics, and waves in a flow."""
+    short = Family(
+        lambda s: Member(replace(bouncing_wave(), sides=bouncing_wave().sides[:3]), np.arange(1)),
+        3,
+        harmonics=2,
+    )
+    nothing = [(np.array([UNKNOWN]), np.array([np.nan]))]
+    said = stability_sentence(nothing, judged_disturbances(short, first_for(3)))
+    assert "since the travelling wave does not repeat within 3 harmonics" in said
+    said = stability_sentence(nothing, judged_disturbances(short, first_for(3), 9, 36, True))
+    assert "no point could be judged, since the flow's forces differ" in said
+
+
 def test_a_point_of_one_harmonic_is_judged_by_its_motion_with_more():
     model = bouncing()
     rough = solve(model, 1.2, 1, 64)

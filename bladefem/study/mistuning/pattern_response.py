@@ -9,6 +9,7 @@ from math import pi
 import numpy as np
 
 from ...hbm.linear_resonances import free_resonances
+from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.resonance import WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
@@ -110,6 +111,7 @@ def pattern_response(
     curve: Curve,
     stress: Callable[[Pattern, WheelSolution, int], DampedStress],
     others: OtherBlades | None = None,
+    options: Options = DEFAULT_OPTIONS,
 ) -> PatternResponse:
     """The wheel with one pattern, under the load of a curve.
 
@@ -119,6 +121,7 @@ def pattern_response(
         deviation: (N, q) relative deviations of these.
         stress: of a blade, by the pattern, the solution and the blade's number.
         others: blades of another shape, in addition.
+        options: when a point is accepted.
     """
     pattern = frequency_pattern(families, deviation)
     if others is not None:
@@ -129,16 +132,24 @@ def pattern_response(
     samples = max(settings.samples, 8 * (H + 1))
     spread = abs(deviation).max() + 0.005
     grid = frequency_grid(wheel, curve, pattern, spread)
-    solved = wheel_respond(wheel, pattern, H, samples)
+    solved = wheel_respond(wheel, pattern, H, samples, options)
     peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
     # the same way to the tuned one, so that the factor compares like with like
     tuned = find_wheel_peak(
-        wheel_respond(wheel, Pattern(), H, samples),
+        wheel_respond(wheel, Pattern(), H, samples, options),
         curve.peak.omega * np.array([0.998, 1.0, 1.002]),
         SEARCH_TOLERANCE,
     )
-    solution = solve_wheel(wheel, peak.omega, H, samples, pattern=pattern)
-    richer = solve_wheel(wheel, peak.omega, 2 * H + 1, 2 * samples, pattern=pattern, start=solution)
+    solution = solve_wheel(wheel, peak.omega, H, samples, pattern=pattern, options=options)
+    richer = solve_wheel(
+        wheel,
+        peak.omega,
+        2 * H + 1,
+        2 * samples,
+        pattern=pattern,
+        start=solution,
+        options=options,
+    )
     change = abs(richer.size().max() / solution.size().max() - 1)
     return PatternResponse(
         curve.load,

@@ -28,6 +28,7 @@ from ...wheel.statistics import (
     scatter_statistics,
     wheel_respond,
 )
+from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases
@@ -128,6 +129,7 @@ def _best_response(
         curve,
         lambda *of_blade: on_root(comm, lambda: stress(*of_blade)),
         others,
+        solver_options(run.scene.accuracy),
     )
 
 
@@ -181,6 +183,7 @@ def _kept_statistics(
     H = max(curve.settings.harmonics, *wheel.excitation)
     samples = max(curve.settings.samples, 8 * (H + 1))
     families = len(sector.families)
+    options = solver_options(scene.accuracy)
     if others is not None:
         spread += abs(others.frequencies(wheel.count, families)).max()
 
@@ -205,7 +208,7 @@ def _kept_statistics(
             def whole_peak(pattern: Pattern) -> float:
                 own = frequency_grid(wheel, curve, pattern, spread)
                 return find_wheel_peak(
-                    wheel_respond(wheel, pattern, H, samples), own, SEARCH_TOLERANCE
+                    wheel_respond(wheel, pattern, H, samples, options), own, SEARCH_TOLERANCE
                 ).height
 
             checks = scene.mistuning.checks
@@ -214,7 +217,7 @@ def _kept_statistics(
             {curve.load: wheel},
             {curve.load: patterns},
             lambda load, pattern: frequency_grid(wheel, curve, pattern, spread),
-            lambda wheel, pattern: wheel_respond(wheel, pattern, H, samples),
+            lambda wheel, pattern: wheel_respond(wheel, pattern, H, samples, options),
             comm,
             SEARCH_TOLERANCE,
             progress,

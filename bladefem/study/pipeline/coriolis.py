@@ -60,14 +60,6 @@ def with_coriolis(scene: Scene, reduced: Reduced) -> Reduced:
     return replace(reduced, sector=sector)
 
 
-def without_coriolis(reduced: Reduced) -> Reduced:
-    """The reduced sector as it is without Coriolis forces; itself where it has none."""
-    if not has_coriolis(reduced):
-        return reduced
-    still = {n: replace(body, damping=None) for n, body in reduced.sector.items()}
-    return replace(reduced, sector=still)
-
-
 def has_coriolis(reduced: Reduced) -> bool:
     """Responses of this sector have Coriolis forces."""
     return any(body.damping is not None for body in reduced.sector.values())

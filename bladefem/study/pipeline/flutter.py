@@ -17,7 +17,7 @@ import numpy as np
 from ...data import Patch
 from ...errors import InputError
 from ...hbm.model import ReducedModel
-from ...hbm.nonlinear_modes import NonlinearMode, nonlinear_mode
+from ...hbm.nonlinear_modes import NonlinearMode, modal_damping, nonlinear_mode
 from ...reduction.assemble import folded_diameter, pair_model
 from ...reduction.truncate import truncate_modes
 from ...util.arrays import IntegerArray, RealArray
@@ -26,6 +26,7 @@ from ..adaptive.settings import Settings
 from .assemble_model import LoadCase, joint_model
 from .bodies import Bodies
 from .case_models import load_cases
+from .coriolis import with_coriolis
 from .flow import Flow, family_numbers, port_shapes, scene_flow
 from .joined_contacts import joined_member
 from .reduced_sector import Reduced, reduce_sector, with_damper_mass
@@ -136,6 +137,7 @@ def find_flutter(
         stage_key("reduction", scene, "flutter", np.array(wanted), modes),
         lambda: reduce_sector(bodies, patches, wanted, modes),
     )
+    sector = with_coriolis(scene, sector)
     cases = load_cases(scene, run.mesh, run.contact)
 
     def compute() -> tuple[HeldFlutter, ...]:
@@ -163,8 +165,8 @@ def _held(
     (stuck,) = nonlinear_mode(model, [STICKING_AMPLITUDE], mode, 1, samples)
     slips = _slip_amplitude(model, stuck)
     amplitudes = slips * np.geomspace(LOWEST_RATIO, HIGHEST_RATIO, AMPLITUDES)
-    blades = model.blades(1)
-    damping = float(blades.viscous[-1][mode] / (2 * blades.omega[-1][mode]))
+    own = model.blades(1).omega[-1][mode]
+    damping = float(modal_damping(model, [stuck])[0] / (2 * own))
     points = _closed_in(model, amplitudes, mode, samples, damping)
     try:
         cycles = limit_cycles(points, damping)
@@ -237,7 +239,12 @@ def _wave_model(
     bodies = [truncate_modes(sector.sector[d], settings.modes) for d in (0, n)]
     if mirrored:
         body = bodies[1]
-        bodies[1] = replace(body, shapes=body.shapes.conj(), residual=body.residual.conj())
+        bodies[1] = replace(
+            body,
+            shapes=body.shapes.conj(),
+            residual=body.residual.conj(),
+            damping=None if body.damping is None else body.damping.conj(),
+        )
     sides = [
         pair_model(body, sector.following, phase)
         for body, phase in zip(bodies, (0.0, 2 * pi * wave / count), strict=True)

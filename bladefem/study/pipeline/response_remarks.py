@@ -230,6 +230,20 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         )
 
 
+def lower_studied_remarks(
+    scene: Scene, best: Sequence[BestLoad], curves: Sequence[Curve]
+) -> Iterator[str]:
+    """Loads studied whose highest motion, stable or not, is lower than under the best load."""
+    for b in (b for b in best if not b.reason):
+        tops = [(float(c.amplitude[c.converged].max()), c.load) for c in curves if c.mass == b.mass]
+        height, load = min(tops, default=(np.inf, 0.0))
+        if (1 + scene.accuracy) * height < b.amplitude:
+            yield warning(
+                f"best load: {1e6 * b.amplitude:.4g} um under {b.load:.4g} N is more than the "
+                f"{1e6 * height:.4g} um under {load:.4g} N studied: the search ended beside it"
+            )
+
+
 def stress_message(curves: list[Curve], stressed: dict[int, DampedStress]) -> str:
     """The stress of the lowest resonance, and how far it can be trusted."""
     best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)

@@ -12,6 +12,7 @@ from ...data import Patch
 from ...errors import NotSolvedError
 from ...hbm.parallel import share_work
 from ...io.stage_cache import on_root
+from ...scene.aerodynamics import has_flow
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...util.message import method
@@ -30,7 +31,13 @@ from .linear_limits import linear_limits
 from .loads import Curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
-from .response_remarks import best_load_remarks, load_of, response_remarks, stress_message
+from .response_remarks import (
+    best_load_remarks,
+    load_of,
+    lower_studied_remarks,
+    response_remarks,
+    stress_message,
+)
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads
 from .stability_remarks import Disturbances, judged_disturbances
@@ -80,6 +87,7 @@ def run_response(
     response = _load_responses(
         scene, cases, family, settings, keep, softer, sectors, best, searches
     )
+    clock.messages.extend(lower_studied_remarks(scene, response.best, response.curves))
     with clock("influences"):
         found = _influences(scene, mesh, before.contact, family, response.best, keep)
     curves = response.curves
@@ -181,7 +189,7 @@ def _load_responses(
     others: dict[int, tuple[ClassVerdict, ...]] = {}
     if scene.study.stability:
         order = scene.excitation.engine_order
-        judged = judged_disturbances(models, settings, order, sectors)
+        judged = judged_disturbances(models, settings, order, sectors, has_flow(scene))
         with clock("response"):
             # of the lowest resonance, which the report begins with
             k = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)

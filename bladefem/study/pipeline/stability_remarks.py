@@ -29,6 +29,8 @@ class Disturbances:
     # nodal diameters that they are made of, and how many the wheel has; none without a wheel
     diameters: tuple[int, ...] = ()
     possible: int = 0
+    # why no wave can be judged
+    reason: str = ""
 
     @property
     def sentence(self) -> str:
@@ -51,16 +53,22 @@ def judged_disturbances(
     settings: Settings,
     engine_order: int = 0,
     sectors: int = 0,
+    flow: bool = False,
 ) -> Disturbances:
     """What the verdicts on a family of models look at.
 
     Args:
         sectors: of the wheel; 0 without one.
+        flow: the waves have forces of a flow.
     """
+    if flow:
+        return Disturbances(
+            reason="the flow's forces differ between the waves that would have to be marched"
+        )
     try:
         blades = blades_of_wave(model_in_time(models, settings))
-    except InputError:
-        return Disturbances()
+    except InputError as error:
+        return Disturbances(reason=str(error))
     if not sectors:
         return Disturbances(blades)
     turned = ((h * engine_order) % sectors for h in range(blades))
@@ -85,6 +93,8 @@ def stability_sentence(
             "stability: normal loads are prescribed, so that each periodic motion is the only "
             "one, and stable"
         )
+    if counts[UNKNOWN] == len(verdict) and judged.reason:
+        return f"stability is unknown: no point could be judged, since {judged.reason}"
     if counts[UNKNOWN] == len(verdict):
         return (
             "stability is unknown: no point could be judged; it takes Coulomb's law, a wave that "

@@ -1,0 +1,149 @@
+"""Tables, picture, sentences and page of a contact that was fitted to measured responses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from ..scene.units import show
+from ..study.measured_responses import FittedScene
+from ..util.message import warning
+from ..view.measured import draw_measured
+from .headlines import Headline
+from .tables import write_tables
+from .write import Page, write_report
+
+# parameter to what it is called and the field of the scene that has it
+NAMES = {
+    "mu": "friction coefficient",
+    "kt": "tangential contact stiffness",
+    "kn": "normal contact stiffness",
+    "stiffness": "contact stiffness",
+    "load": "normal load",
+}
+FIELDS = {
+    "mu": ("mu", "1"),
+    "kt": ("kt_area", "N/m^3"),
+    "kn": ("kn_area", "N/m^3"),
+    "stiffness": ("kt_area", "N/m^3"),
+}
+
+
+def parameter_table(found: FittedScene) -> pd.DataFrame:
+    """One row a parameter: the factor on the scene's value, with its interval."""
+    fit = found.fit
+    return pd.DataFrame(
+        {
+            "parameter": [NAMES[name] for name in fit.names],
+            "over_scene": fit.factors,
+            "factor_low": fit.knowledge.intervals[:, 0],
+            "factor_high": fit.knowledge.intervals[:, 1],
+            "determined": ["yes" if known else "no" for known in fit.knowledge.known],
+        }
+    )
+
+
+def readings_table(found: FittedScene) -> pd.DataFrame:
+    """One row a reading."""
+    readings = found.readings
+    return pd.DataFrame(
+        {
+            "load": readings.load,
+            "excitation_force": readings.force,
+            "frequency": readings.frequency,
+            "measured_amplitude": readings.amplitude,
+            "scene_amplitude": found.before,
+            "fitted_amplitude": found.fitted,
+            "off": found.fitted / readings.amplitude - 1,
+        }
+    )
+
+
+def fit_sentences(found: FittedScene) -> list[str]:
+    """The contact, what it leaves, and what the readings cannot tell."""
+    fit = found.fit
+    off = found.fitted / found.readings.amplitude - 1
+    kept = np.isfinite(off)
+    sentences = [
+        f"{len(off)} readings, by the fitted contact off by {_percent(off)} (root of the mean "
+        f"square; by the scene's {_percent(found.before / found.readings.amplitude - 1)}); "
+        f"{100 * found.error:.3g} % were assumed as their error; {found.harmonics} harmonics",
+        fit.sentence(),
+    ]
+    if found.scene_values:
+        rows = (
+            f"{FIELDS[name][0]} = {_value(name, value)}"
+            for name, value in found.scene_values.items()
+        )
+        sentences.append(f"for the scene, under [contact]: {', '.join(rows)}")
+    if fit.misfit > 2:
+        sentences.append(
+            warning(
+                f"the readings are missed by {fit.misfit:.2g} times their error: something else "
+                "than the contact differs from the model"
+            )
+        )
+    if not kept.all():
+        sentences.append(warning(f"{int((~kept).sum())} of {len(off)} readings not solved"))
+    return sentences
+
+
+def _percent(off: np.ndarray) -> str:
+    return f"{100 * float(np.sqrt(np.nanmean(off**2))):.3g} %"
+
+
+def _value(name: str, value: float) -> str:
+    """As a scene writes it."""
+    unit = FIELDS[name][1]
+    return f"{value:.4g}" if unit == "1" else f'"{show(value, unit)}"'
+
+
+def write_fit(found: FittedScene, folder: Path) -> list[Path]:
+    """Tables, picture and page in a folder; returns the files."""
+    tables = {
+        "contact/fit": parameter_table(found),
+        "contact/fit_readings": readings_table(found),
+    }
+    for name, table in tables.items():
+        stem = name.split("/")[1]
+        write_tables(table, folder / stem, stem)
+    readings = found.readings
+    levels = {}
+    for load, force in sorted(set(zip(readings.load, readings.force, strict=True))):
+        rows = np.flatnonzero((readings.load == load) & (readings.force == force))
+        rows = rows[np.argsort(readings.frequency[rows])]
+        levels[f"{load:.4g} N, force {force:.4g} N"] = (
+            readings.frequency[rows],
+            readings.amplitude[rows],
+            found.before[rows],
+            found.fitted[rows],
+        )
+    picture = folder / "fit.png"
+    draw_measured(levels, found.run.scene.title, picture)
+    numbers = [
+        Headline(
+            NAMES[name],
+            f"{factor:.4g} times the scene's",
+            f"95 % interval {low:.3g} to {high:.3g}" if known else "the readings leave it open",
+            "",
+        )
+        for name, factor, (low, high), known in zip(
+            found.fit.names,
+            found.fit.factors,
+            found.fit.knowledge.intervals,
+            found.fit.knowledge.known,
+            strict=True,
+        )
+    ]
+    pages = write_report(
+        folder,
+        found.run.scene,
+        tables,
+        {"contact/fit": picture},
+        [*found.run.messages, *fit_sentences(found)],
+        found.run.timings,
+        page=Page(numbers=numbers, stem="report_fit"),
+    )
+    return [folder / "fit.csv", folder / "fit_readings.csv", picture, *pages]

@@ -1,0 +1,202 @@
+"""Measured responses of a scene's blade, from a file, and the contact that fits them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import pi
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..hbm.parameters import vary as vary_model
+from ..scene.tables import Scene
+from ..scene.toml import vary
+from ..scene.units import parse
+from ..util.arrays import RealArray
+from ..util.communicator import Communicator
+from ..util.progress import Progress, without_progress
+from .adaptive.family import family_member
+from .contact_identification import ContactFit, MeasuredLevel, fit_contact
+from .pipeline import pipeline
+from .pipeline.case_models import family_of_case, load_cases
+from .pipeline.run_records import ReducedRun
+from .pipeline.stage_runner import Folder
+
+# column of the file to the unit inside; the first two may be left out for those of the scene
+COLUMNS = {"load": "N", "force": "N", "frequency": "Hz", "amplitude": "m"}
+OPTIONAL_COLUMNS = ("load", "force")
+# of the balance: three harmonics leave up to 6 % of plane blades whose dampers lift off
+FEWEST_HARMONICS = 7
+FEWEST_SAMPLES = 128
+
+
+@dataclass(frozen=True)
+class Readings:
+    """k readings at the probe."""
+
+    # (k,) normal load of a seat and size of the excitation [N]
+    load: RealArray
+    force: RealArray
+    # (k,) [Hz], and root of the sum of squares of the moving harmonics [m]
+    frequency: RealArray
+    amplitude: RealArray
+
+
+@dataclass(frozen=True)
+class FittedScene:
+    """A scene's contact by measured responses."""
+
+    run: ReducedRun
+    readings: Readings
+    fit: ContactFit
+    # relative error of an amplitude that was assumed
+    error: float
+    # (k,) by the contact of the scene as it is, and by the fitted one [m]; NaN where not solved
+    before: RealArray
+    fitted: RealArray
+    # harmonics and samples of the balance
+    harmonics: int
+    samples: int
+
+    @property
+    def scene_values(self) -> dict[str, float]:
+        """Fitted values of those parameters that the scene gives as one number [SI]."""
+        contact = self.run.scene.contact
+        given = {
+            "mu": contact.mu,
+            "kt": contact.kt_area,
+            "kn": contact.kn_area,
+            "stiffness": contact.kt_area,
+        }
+        return {
+            name: float(factor) * value
+            for name, factor in zip(self.fit.names, self.fit.factors, strict=True)
+            if (value := given.get(name)) is not None
+        }
+
+
+def read_readings(path: str | Path, scene: Scene) -> Readings:
+    """A CSV file with the columns of COLUMNS, each with its unit: "frequency [Hz]"; "#" starts a
+    comment.
+
+    Raises:
+        InputError: the file is missing, or its columns are not those or no positive numbers.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"--measured {path}: there is no such file")
+    rows = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
+    if len(cells) < 2:
+        raise InputError(f"--measured {path}: expected a row of names and readings")
+    try:
+        values = np.array(cells[1:], dtype=float)
+    except ValueError:
+        raise InputError(
+            f"--measured {path}: expected {len(cells[0])} numbers in each row"
+        ) from None
+    if values.ndim != 2 or values.shape[1] != len(cells[0]) or not (values > 0).all():
+        raise InputError(
+            f"--measured {path}: expected {len(cells[0])} positive numbers in each row"
+        )
+    found = {}
+    for head, column in zip(cells[0], values.T, strict=True):
+        name, _, unit = (part.strip(" ]") for part in head.partition("["))
+        if name not in COLUMNS:
+            raise InputError(
+                f"--measured {path}: column '{head}', expected {', '.join(COLUMNS)}, each with "
+                "its unit: 'amplitude [um]'"
+            )
+        where = f"--measured {path}: column '{head}'"
+        found[name] = parse(f"1 {unit}", COLUMNS[name], where) * column
+    missing = [name for name in COLUMNS if name not in found and name not in OPTIONAL_COLUMNS]
+    if missing:
+        raise InputError(f"--measured {path}: expected a column '{missing[0]}'")
+    if "load" not in found:
+        found["load"] = np.full(len(values), _only_load(scene, path))
+    found.setdefault("force", np.full(len(values), scene.excitation.force))
+    return Readings(**found)
+
+
+def _only_load(scene: Scene, path: Path) -> float:
+    loads = scene.study.loads or ()
+    if len(loads) != 1:
+        raise InputError(
+            f"--measured {path}: no column 'load [N]', expected it, or one load in study.loads"
+        )
+    return float(loads[0])
+
+
+def fit_scene(
+    scene: Scene,
+    readings: Readings,
+    names: Sequence[str],
+    error: float,
+    folder: Folder = None,
+    comm: Communicator | None = None,
+    progress: Progress = without_progress,
+) -> FittedScene:
+    """The contact of a scene that comes closest to measured amplitudes at its probe.
+
+    Args:
+        names: of the parameters to fit, see `contact_identification`; empty for all that the
+            scene has.
+        error: relative error of a measured amplitude.
+
+    Raises:
+        InputError: the scene, the readings or the names cannot be used.
+    """
+    if len(scene.study.masses or ()) > 1:
+        raise InputError(
+            f"study.masses: {len(scene.study.masses or ())} damper masses, expected one for "
+            "'bladefem fit'"
+        )
+    loads = tuple(float(load) for load in np.unique(readings.load))
+    run = pipeline.run(vary(scene, study__loads=loads), folder, "reduction", comm, progress)
+    levels, order = _levels(run, readings)
+    chosen = tuple(names) or _parameters_of(scene, levels)
+    if "kt" in chosen and scene.contact.kn_area is None:
+        raise InputError(
+            "--parameters kt: the normal stiffness follows the tangential one in this scene, "
+            "expected 'stiffness', or contact.kn_area in the scene"
+        )
+    H = max(run.settings.harmonics, FEWEST_HARMONICS)
+    samples = max(run.settings.samples, FEWEST_SAMPLES, 8 * (H + 1))
+    fit = fit_contact(levels, chosen, H, samples, error)
+    before, fitted = (np.empty(len(order)) for _ in range(2))
+    before[order] = np.concatenate(fit.before)
+    fitted[order] = np.concatenate(fit.fitted)
+    return FittedScene(run, readings, fit, error, before, fitted, H, samples)
+
+
+def _parameters_of(scene: Scene, levels: Sequence[MeasuredLevel]) -> tuple[str, ...]:
+    """All that can be fitted: one stiffness where the scene gives the other by it."""
+    if scene.contact.kn_area is None:
+        return ("mu", "stiffness", "load")
+    if all((level.model.elements.kn > 0).any() for level in levels):
+        return ("mu", "kt", "kn", "load")
+    return ("mu", "kt", "load")
+
+
+def _levels(run: ReducedRun, readings: Readings) -> tuple[list[MeasuredLevel], np.ndarray]:
+    """Readings by load and force with their models, and the numbers of the readings in that
+    order.
+    """
+    scene = run.scene
+    patches = list(run.contact.problem.patches)
+    models = {}
+    for case in load_cases(scene, run.mesh, run.contact):
+        family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+        models[case.load] = family_member(family, run.settings).model
+    levels, order = [], []
+    for load, model in models.items():
+        for force in np.unique(readings.force[readings.load == load]):
+            rows = np.flatnonzero((readings.load == load) & (readings.force == force))
+            rows = rows[np.argsort(readings.frequency[rows])]
+            driven = vary_model(model, "force", float(force) / scene.excitation.force)
+            omega = 2 * pi * readings.frequency[rows]
+            levels.append(MeasuredLevel(driven, omega, readings.amplitude[rows]))
+            order.append(rows)
+    return levels, np.concatenate(order)

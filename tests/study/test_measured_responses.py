@@ -1,0 +1,84 @@
+"""A scene's contact from readings in a file: made by a run with another contact, by other settings;
+bad files.
+"""
+
+import numpy as np
+import pandas as pd
+import pytest
+from mistuned import COARSE_MISTUNED, MISTUNED
+
+from bladefem.cli.main import main
+from bladefem.errors import InputError
+from bladefem.scene.toml import load_scene
+from bladefem.study.measured_responses import read_readings
+from bladefem.study.pipeline import pipeline
+
+COARSE = (
+    *COARSE_MISTUNED,
+    "study.loads=80 N, 160 N",
+    "study.influences=false",
+    "model.harmonics=5",
+    "model.samples=256",
+)
+TRUE = {"mu": 0.36, "stiffness": 1.4}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """Readings between the half heights of both resonances, with the contact of TRUE."""
+    scene = load_scene(MISTUNED, COARSE)
+    stiff = scene.contact.kt_area * TRUE["stiffness"]
+    true = load_scene(
+        MISTUNED, [*COARSE, f"contact.mu={TRUE['mu']}", f"contact.kt_area={stiff} N/m^3"]
+    )
+    curves = pipeline.run(true, None).response.curves
+    rows = ["load [N], frequency [Hz], amplitude [um]"]
+    for curve in curves:
+        high = curve.converged & (curve.amplitude > 0.4 * curve.peak_amplitude)
+        chosen = np.flatnonzero(high)
+        chosen = chosen[np.linspace(0, len(chosen) - 1, 7).round().astype(int)]
+        for i in np.unique(chosen):
+            rows.append(f"{curve.load}, {curve.frequency[i]}, {1e6 * curve.amplitude[i]}")
+    file = tmp_path_factory.mktemp("measured") / "readings.csv"
+    file.write_text("# made by a run\n" + "\n".join(rows) + "\n")
+    return scene, file
+
+
+def test_command_finds_the_contact_of_the_readings(measured, tmp_path, capsys):
+    scene, file = measured
+    arguments = ["fit", str(MISTUNED), "-o", str(tmp_path), "--measured", str(file)]
+    arguments += ["--parameters", "mu, stiffness", "--error", "2 %"]
+    for override in COARSE:
+        arguments += ["--set", override]
+    assert main(arguments) == 0
+    table = pd.read_csv(tmp_path / "fit.csv")
+    factors = table["over_scene"].to_numpy()
+    assert factors == pytest.approx([TRUE["mu"] / scene.contact.mu, TRUE["stiffness"]], rel=0.03)
+    assert (table["factor_low"] < factors).all() and (factors < table["factor_high"]).all()
+    assert list(table["determined"]) == ["yes", "yes"]
+    readings = pd.read_csv(tmp_path / "fit_readings.csv")
+    assert abs(readings["off"]).max() < 0.05
+    said = capsys.readouterr().out
+    assert "for the scene, under [contact]: mu = 0.3" in said
+    assert (tmp_path / "fit.png").is_file() and (tmp_path / "report_fit.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("frequency [Hz]\n200\n", "expected a column 'amplitude'"),
+        ("frequency [Hz], amplitude [kg]\n200, 1\n", "amplitude .kg.*unit"),
+        ("frequency [Hz], height [um]\n200, 1\n", "column 'height .um.', expected load, force"),
+        ("frequency [Hz], amplitude [um]\n200\n", "expected 2 .*numbers in each row"),
+        ("frequency [Hz], amplitude [um]\n200, -1\n", "expected 2 positive numbers"),
+        ("frequency [Hz], amplitude [um]\n", "expected a row of names and readings"),
+        ("frequency [Hz], amplitude [um]\n200, 1\n", "no column 'load .N.', expected it"),
+    ],
+)
+def test_bad_files_are_refused(text, message, tmp_path):
+    file = tmp_path / "readings.csv"
+    file.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_readings(file, load_scene(MISTUNED, COARSE))
+    with pytest.raises(InputError, match="there is no such file"):
+        read_readings(tmp_path / "nowhere.csv", load_scene(MISTUNED, COARSE))
