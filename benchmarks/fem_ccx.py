@@ -50,6 +50,15 @@ sides in one run on another machine:
      49 632  0 to 12    curved      285.7          11.9   24.0  0.56    1.20   3.4e-07      6.9e-05
      49 632  5          straight     22.2           4.6    4.8  0.46    1.10   2.4e-07      9.3e-06
 
+With nested dissection into halves of more equal size and restarts of SLEPc that keep nearly all of
+the basis, both sides in one run beside other work:
+
+     49 632  5          curved       16.8           3.4    4.9  0.44    1.05   3.4e-07      6.4e-05
+     49 632  0          curved       18.0           2.8    6.5  0.44    1.05   2.4e-07      6.3e-05
+     49 632  0 to 12    curved      214.7           7.8   27.4  0.54    1.15   3.4e-07      6.9e-05
+     49 632  5          straight     17.6           3.3    5.3  0.44    1.05   2.4e-07      9.3e-06
+    148 773  5          curved       90.2          14.1    6.4  1.32    0.82   3.5e-07      1.3e-05
+
     python benchmarks/fem_ccx.py 45000 151000      both sides in one run, some 12 minutes
 """
 

@@ -5,12 +5,12 @@ Peak of the modes of one complex nodal diameter [GB], wedge sector, proven by th
 inertia, measured and (modelled); benchmarks/fem_cost.py remakes the first row, million.py there
 single points of the first two:
 
-    dofs                      49 632         148 482        472 299        1 032 705
-    in memory                 0.557 (0.557)  1.68 (1.68)
-    factors on disk           0.454 (0.457)  1.28 (1.25)    4.05 (4.28)    10.4 (10.4)
-    two ranks, both together  0.773 (0.772)  2.13 (2.26)
+    dofs                      49 632         148 773        495 732        1 032 705
+    in memory                 0.441 (0.429)  1.32 (1.37)    6.20 (6.06)    - (15.6)
+    factors on disk           0.370 (0.360)  0.90 (0.94)    3.41 (3.36)    - (7.8)
+    two ranks, both together  0.682 (0.682)  2.01 (2.01)
 
-Factors on disk take 0.57 GB at 148 482 degrees of freedom, and a twentieth more processor time
+Factors on disk take 0.53 GB at 148 773 degrees of freedom, and a twentieth more processor time
 where the system can keep the file in memory that nobody else needs. MUMPS's block low rank takes no
 less memory than exact factors at this size: 748 and 794 MB at thresholds of 1e-6 and 1e-9, 759
 without, and its solves are wrong by 4e-3 and 2e-7; so it is not among the ways.
@@ -37,9 +37,9 @@ from .compat import MPI
 # interpreter and libraries of one rank [bytes]
 BYTES_PER_RANK = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
-ONE_RANK = (5.0e3, 103.5)
-SEVERAL_RANKS = (4.29e3, 175.0)
-ON_DISK = (5.0e3, 49.0)
+ONE_RANK = (1.25e3, 135.6)
+SEVERAL_RANKS = (2.18e3, 183.0)
+ON_DISK = (3.37e3, 39.9)
 # on disk: bytes b dofs^(4/3)
 FACTOR_BYTES = 100.0
 

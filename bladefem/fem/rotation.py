@@ -203,13 +203,11 @@ def linear_tangent(
     strain = ufl.sym(gradient) - _thermal_strain(body, degree[0]) * ufl.Identity(body.dim)
     geometric = ufl.inner(ufl.grad(v) * stress(strain), ufl.grad(w))
     elastic, inertial = _integral_measures(body, degree)
-    out = assemble_matrix(
+    stiffness = assemble_matrix(
         depth * (moved + geometric) * elastic
         - depth * rho * speed2 * ufl.inner(across * v, w) * inertial
     )
-    if body.spring is not None:
-        out.axpy(1.0, body.spring, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
-    return out
+    return _with_springs(body, stiffness)
 
 
 def preload(
@@ -223,7 +221,8 @@ def preload(
     """The nonlinear static state under a steady rotation and heat, by Newton's method with load
     steps that halve when it fails.
 
-    A body with the pair "cyclic" moves alike in all sectors (nodal diameter 0).
+    A body with the pair "cyclic" moves alike in all sectors (nodal diameter 0). Springs to the
+    ground keep the directions that they have on the body at rest.
 
     Args:
         speed: [rad/s].
@@ -238,10 +237,6 @@ def preload(
             the message says where.
     """
     _check_speed(speed)
-    if body.spring is not None:
-        raise InputError(
-            "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
-        )
     if speed == 0 and not has_thermal_strain(body):
         return Preload(np.zeros((len(body.mesh.points), body.dim)), speed, 0, 0, 0.0)
     forms = _potential_forms(body, axis, quadrature)
@@ -298,7 +293,7 @@ def tangent(
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
     forms = _potential_forms(body, axis, quadrature)
     forms.heating.value = 1.0
-    return _tangent_matrix(forms, state.displacement, state.speed**2)
+    return _tangent_matrix(body, forms, state.displacement, state.speed**2)
 
 
 def body_under_rotation(
@@ -368,7 +363,8 @@ def _solve_newton(
         return 0.0 if near and state.error > state.before / 2 else state.error
 
     def advance(state: _Trial) -> _Trial:
-        held = in_step(replace(con.body, K=_tangent_matrix(forms, state.u, speed2)), clamp)
+        stiffness = _tangent_matrix(con.body, forms, state.u, speed2)
+        held = in_step(replace(con.body, K=stiffness), clamp)
         try:
             step = compliance(flexible(held, settled=False), -state.unbalanced)
         except NotSolvedError as failure:
@@ -469,7 +465,18 @@ def _unbalanced_force(
 ) -> np.ndarray:
     """(n_points*dim, 1) unbalanced force in mesh numbering [N]."""
     _set_state(forms, u, speed2)
-    return _in_mesh_numbering(body, assemble_vector(forms.force).array).reshape(-1, 1)
+    force = assemble_vector(forms.force).array
+    if body.spring is not None:
+        force = force + _spring_force(body.spring, forms)
+    return _in_mesh_numbering(body, force).reshape(-1, 1)
+
+
+def _spring_force(spring: PETSc.Mat, forms: _Forms) -> np.ndarray:
+    """This rank's rows of the springs' forces [N] in the state that is set."""
+    moved, force = spring.createVecs()
+    moved.array = forms.u.x.array[: moved.getLocalSize()]
+    spring.mult(moved, force)
+    return np.asarray(force.array)
 
 
 def _in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
@@ -482,12 +489,20 @@ def _in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
 
 
 def _tangent_matrix(
+    body: Body,
     forms: _Forms,
     u: np.ndarray,
     speed2: float,
 ) -> PETSc.Mat:
     _set_state(forms, u, speed2)
-    return assemble_matrix(forms.stiffness)
+    return _with_springs(body, assemble_matrix(forms.stiffness))
+
+
+def _with_springs(body: Body, stiffness: PETSc.Mat) -> PETSc.Mat:
+    """The stiffness with that of the springs to the ground, in its own memory."""
+    if body.spring is not None:
+        stiffness.axpy(1.0, body.spring, structure=PETSc.Mat.Structure.SUBSET_NONZERO_PATTERN)
+    return stiffness
 
 
 def _set_state(

@@ -71,11 +71,9 @@ def _check_title(scene: Scene) -> Iterator[str]:
 
 
 def _check_supports(scene: Scene) -> Iterator[str]:
-    """Their texts can be read, and a nonlinear preload knows of clamps alone."""
+    """Their texts can be read, and a body that turns has a place."""
     springs = list(area_springs(scene.support))
     held_letters(scene.support)
-    if springs and scene.operation.preload == "nonlinear":
-        yield "operation.preload = 'nonlinear' knows no support.springs, expected 'linear'"
     free = not (scene.support.clamp or springs or scene.support.directions)
     if free and scene.operation.stiffening and scene.operation.speed > 0:
         yield (

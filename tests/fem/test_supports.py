@@ -87,8 +87,50 @@ def test_an_elastic_root_under_rotation(bar):
     )
     clamped = modes(constrain(body_under_rotation(bar, 500.0, linear=True)), 2).frequencies
     assert (turning < clamped).all() and abs(turning / still - 1).max() < 0.05
-    with pytest.raises(InputError, match="nonlinear"):
-        preload(body, 500.0)
+
+
+def test_a_block_on_soft_springs_flies_outwards():
+    """k A u = m Omega^2 (x + u), far beyond small displacements, and Newton's steps are few."""
+    mesh = box((4, 2, 2), SIZE, "tetra10")
+    # its centre on the x axis
+    mesh = replace(mesh, points=mesh.points - [0, SIZE[1] / 2, SIZE[2] / 2])
+    soft = 2e9
+    body = supported(assemble(mesh, "blade", STEEL), "", [AreaSpring("clamp", soft, soft)])
+    mass, stiffness = STEEL.rho * np.prod(SIZE), soft * SIZE[1] * SIZE[2]
+    speed = np.sqrt(stiffness / mass) / 2
+    state = preload(body, speed)
+    # mass Omega^2 is a quarter of the stiffness, and the centre is in the middle
+    flight = SIZE[0] / 2 / (4 - 1)
+    assert state.displacement[:, 0].mean() == pytest.approx(flight, rel=2e-3)
+    assert abs(state.displacement[:, 1:]).max() < 1e-3 * flight
+    assert state.iterations < 8
+
+
+@pytest.mark.parametrize("speed, tolerance", [(20.0, 1e-7), (100.0, 2e-6)])
+def test_springs_under_a_nonlinear_preload_that_is_small(bar, speed, tolerance):
+    """Both preloads agree, but for the square of the displacement."""
+    body = supported(bar, "", [AreaSpring("clamp", 1e13, 1e13)])
+    near, exact = (
+        modes(constrain(body_under_rotation(body, speed, linear=linear)), 4).frequencies
+        for linear in (True, False)
+    )
+    np.testing.assert_allclose(near, exact, rtol=tolerance)
+
+
+def test_stiff_springs_are_a_clamp_under_a_nonlinear_preload(bar):
+    """Its displacement and its frequencies come nearer as the springs grow stiffer."""
+    speed = 3000.0
+    clamped = modes(constrain(body_under_rotation(bar, speed)), 3).frequencies
+    rest = preload(bar, speed).displacement
+    errors = []
+    for stiffness in (1e15, 1e17):
+        body = supported(bar, "", [AreaSpring("clamp", stiffness, stiffness)])
+        found = modes(constrain(body_under_rotation(body, speed)), 3).frequencies
+        moved = preload(body, speed).displacement
+        errors.append(
+            [(1 - found / clamped).max(), abs(moved - rest).max() / abs(rest).max()],
+        )
+    assert (np.array(errors[1]) < 0.02 * np.array(errors[0])).all() and max(errors[1]) < 2e-3
 
 
 def test_what_turns_with_the_sector_is_not_held_on_its_cut():
