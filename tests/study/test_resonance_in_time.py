@@ -32,7 +32,7 @@ def folding():
     return SimpleNamespace(model=model, truth=max(map(size, found.points)))
 
 
-@pytest.mark.parametrize("omega", [360.0, 330.0, 300.0])
+@pytest.mark.parametrize("omega", [380.0, 360.0, 330.0, 300.0, 280.0])
 def test_the_peak_of_a_fold_is_found_from_a_motion_far_below(folding, omega):
     """From the top of what a sweep sees, and from motions at which nothing points to it."""
     start = solve(folding.model, omega, 15, 512)
@@ -43,6 +43,13 @@ def test_the_peak_of_a_fold_is_found_from_a_motion_far_below(folding, omega):
     assert off / 2 < found.error < 0.05
     assert found.lowest > 0.95 * found.highest
     assert found.frequency == pytest.approx(52.6, rel=5e-3)
+
+
+def test_a_search_that_is_not_closed_in_says_so(folding):
+    """From far below the resonance, where the low amplitude makes the steps far too long."""
+    start = solve(folding.model, 250.0, 15, 512)
+    found = resonance_in_time(family_of(folding.model), SETTINGS, start)
+    assert found.highest < 0.9 * folding.truth and found.error == np.inf
 
 
 def test_a_response_that_falls_smoothly_has_its_linear_peak():

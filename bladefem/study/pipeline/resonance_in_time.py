@@ -65,6 +65,10 @@ MOST_STEPS = 10
 # share of the amplitude before, below which a step has led to another motion: along one it falls by
 # some 11 %
 JUMP_SHARE = 0.7
+# of the relative fall to a neighbour: rise that is possible on the way
+RISE_BEHIND_SHARE = 0.25
+# steps towards a jump with twice the contact points
+FINER_STEPS = 2
 # relative gain of height by the vertex of a parabola that is marched as well
 WORTH_A_MARCH = 0.01
 # error over the change by twice the contact points, where there are more of them still
@@ -123,18 +127,29 @@ class _Top:
     """Where a climb ended."""
 
     best: _Settled
-    # a lower motion of the same kind next to it
+    # a lower motion next to it
     neighbour: _Settled
-    # step of the circular frequency that led the blade to a lower motion; 0 where the amplitude
-    # falls smoothly on both sides
+    # circular frequency on the other side, from that of the best motion on, at which the blade has
+    # jumped to a lower one; 0 where the amplitude falls smoothly on both sides
     jump: float = 0.0
+    # nothing higher is expected next to it
+    closed_in: bool = True
 
     @property
     def rise_ahead(self) -> float:
-        """Relative rise that is possible before the jump, by the slope between the two motions."""
+        """Relative rise that is possible before the jump, by the slope up to here."""
         run = abs(self.best.omega - self.neighbour.omega)
-        rise = self.best.mean / self.neighbour.mean - 1
-        return rise * abs(self.jump) / run if run else abs(self.jump) / self.best.omega
+        return (self.best.mean / self.neighbour.mean - 1) * abs(self.jump) / run
+
+    @property
+    def rise_behind(self) -> float:
+        """The same towards the neighbour, where the amplitude falls already before the jump."""
+        return (self.best.mean / self.neighbour.mean - 1) * RISE_BEHIND_SHARE if self.jump else 0.0
+
+    @property
+    def left(self) -> float:
+        """Relative rise that may have been missed."""
+        return max(self.rise_ahead, self.rise_behind)
 
 
 @dataclass
@@ -175,13 +190,12 @@ def resonance_in_time(
         if len(family_member(models, settings).model.springs) != len(model.springs):
             start = carried_motion(models, settings, motion, settings_here)
         work = _Work()
-        top = _climbed(model, start, work)
+        top = _highest(model, start, work)
         best = _settled(model, top.best.state, work, INSTANTS_PER_PERIOD)
         if top.jump:
             # the frequency of a jump hangs on the steps in time
             work.instants = INSTANTS_PER_PERIOD
-            top = _up_to_jump(model, replace(top, best=best), work)
-            top = _between(model, top, work)
+            top = _refined(model, replace(top, best=best), work)
             best = top.best
         error = _error(models, settings_here, model, top, best, work)
     except (InputError, _MarchFailedError):
@@ -197,24 +211,46 @@ def resonance_in_time(
     )
 
 
-def _climbed(model: ReducedModel, start: Solution, work: _Work) -> _Top:
-    """The highest motion uphill of a start.
+def _highest(model: ReducedModel, start: Solution, work: _Work) -> _Top:
+    """The highest motion uphill of a start; driven hard once more where that has led far away.
 
     Raises:
         _MarchFailedError: it was not closed in.
     """
-    omega = start.omega
-    bend = bend_of_mode(model, omega)
+    bend = bend_of_mode(model, start.omega)
     if bend <= 0:
         raise _MarchFailedError
-    state = driven_anew(model, state_of_solution(model, start), Drive(omega, OVERDRIVE))
+    state = state_of_solution(model, start)
+    here = _overdriven(model, state, start.omega, work)
+    width = np.sqrt(2 / bend)
+    top = _climbed(model, here, STEP_SHARE * width / here.mean, work)
+    if abs(top.best.omega - here.omega) * here.mean < width:
+        return top
+    again = _overdriven(model, top.best.state, top.best.omega, work)
+    if JUMP_SHARE * again.mean < top.best.mean:
+        return top
+    return _climbed(model, again, STEP_SHARE * width / again.mean, work)
+
+
+def _overdriven(model: ReducedModel, state: RingState, omega: float, work: _Work) -> _Settled:
+    """What the blade keeps to after it was driven harder."""
+    state = driven_anew(model, state, Drive(omega, OVERDRIVE))
     state = _march(model, state, OVERDRIVEN_PERIODS, work).end
-    known = {0: _settled(model, driven_anew(model, state, Drive(omega)), work)}
-    step = STEP_SHARE * np.sqrt(2 / bend) / known[0].mean
+    return _settled(model, driven_anew(model, state, Drive(omega)), work)
+
+
+def _climbed(model: ReducedModel, start: _Settled, step: float, work: _Work) -> _Top:
+    """The highest motion uphill of a start, by steps of the circular frequency.
+
+    Raises:
+        _MarchFailedError: it was not closed in.
+    """
+    known = {0: start}
     for side in (1, -1):
         place = side
         while abs(place) <= MOST_STEPS and not work.exhausted:
-            known[place] = _moved(model, known[place - side], omega + place * step, work)
+            omega = start.omega + place * step
+            known[place] = _moved(model, known[place - side], omega, work)
             if known[place].mean < known[place - side].mean:
                 break
             place += side
@@ -224,14 +260,12 @@ def _climbed(model: ReducedModel, start: Solution, work: _Work) -> _Top:
     place = max(known, key=lambda k: known[k].mean)
     if place - 1 not in known or place + 1 not in known:
         raise _MarchFailedError
-    best, beside = known[place], (known[place - 1], known[place + 1])
-    along = [one for one in beside if one.mean > JUMP_SHARE * best.mean]
-    neighbour = max(along, key=lambda one: one.mean, default=best)
-    if len(along) == 2:
-        return _Top(_at_vertex(model, best, *beside, work), neighbour)
-    jumped = min(beside, key=lambda one: one.mean)
-    # in smaller steps the blade follows further
-    return _up_to_jump(model, _Top(best, neighbour, (jumped.omega - best.omega) / 2), work)
+    best = known[place]
+    lower, neighbour = sorted((known[place - 1], known[place + 1]), key=lambda one: one.mean)
+    if lower.mean > JUMP_SHARE * best.mean:
+        best = _at_vertex(model, best, known[place - 1], known[place + 1], work)
+        return _Top(best, neighbour)
+    return _refined(model, _Top(best, neighbour, lower.omega - best.omega), work)
 
 
 def _at_vertex(
@@ -247,29 +281,32 @@ def _at_vertex(
     return max(best, found, key=lambda one: one.mean)
 
 
-def _up_to_jump(model: ReducedModel, top: _Top, work: _Work) -> _Top:
-    """The highest motion before the blade jumps to a lower one, by steps that are halved where it
-    jumps, until another one promises little.
+def _refined(model: ReducedModel, top: _Top, work: _Work, most: int = MOST_STEPS) -> _Top:
+    """The highest motion before the blade jumps to a lower one: the ways to the jump and to the
+    neighbour are halved, the one that promises more, until neither promises much.
+
+    A blade that has jumped after a large step may follow in a small one: in the end the frequency
+    of the jump is marched again, and what is beyond it where the blade follows.
     """
-    for _ in range(MOST_STEPS):
-        if work.exhausted or top.rise_ahead < WORTH_A_MARCH:
-            break
-        found = _moved(model, top.best, top.best.omega + top.jump, work)
-        if found.mean > top.best.mean:
-            top = _Top(found, top.best, top.jump)
+    for _ in range(most):
+        best = top.best
+        if work.exhausted:
+            return replace(top, closed_in=False)
+        if top.left < WORTH_A_MARCH:
+            found = _moved(model, best, best.omega + top.jump, work)
+            if found.mean <= best.mean:
+                return replace(top, closed_in=True)
+            top = _Top(found, best, 2 * top.jump)
+            continue
+        ahead = top.rise_ahead >= top.rise_behind
+        way = top.jump if ahead else top.neighbour.omega - best.omega
+        found = _moved(model, best, best.omega + way / 2, work)
+        if found.mean > best.mean:
+            # the one left behind becomes the end of the other way
+            top = _Top(found, best, way / 2) if ahead else _Top(found, top.neighbour, -way / 2)
         else:
-            top = replace(top, jump=top.jump / 2)
-    return top
-
-
-def _between(model: ReducedModel, top: _Top, work: _Work) -> _Top:
-    """The top itself, or the motion in the middle between it and its neighbour where that is
-    higher: the amplitude may fall already before the blade jumps.
-    """
-    if top.best.mean / top.neighbour.mean - 1 < WORTH_A_MARCH or work.exhausted:
-        return top
-    found = _moved(model, top.best, (top.best.omega + top.neighbour.omega) / 2, work)
-    return replace(top, best=found) if found.mean > top.best.mean else top
+            top = replace(top, jump=way / 2) if ahead else replace(top, neighbour=found)
+    return replace(top, closed_in=False)
 
 
 def _error(
@@ -285,6 +322,8 @@ def _error(
     Args:
         best: the motion at the top with shorter steps.
     """
+    if not top.closed_in:
+        return float(np.inf)
     below = driven_anew(model, best.state, Drive(best.omega, UNDERDRIVE))
     below = _march(model, below, UNDERDRIVEN_PERIODS, work).end
     other = _settled(model, driven_anew(model, below, Drive(best.omega)), work)
@@ -292,7 +331,7 @@ def _error(
     same = other.mean > JUMP_SHARE * top.best.mean
     error = abs(other.mean / top.best.mean - 1) if same else SETTLED_CHANGE
     # single periods that are higher may come
-    error += (best.highest - best.lowest) / (2 * best.highest) + top.rise_ahead
+    error += (best.highest - best.lowest) / (2 * best.highest) + top.left
     error += abs(best.mean / top.best.mean - 1)
     if not best.resolved:
         finer = _settled(model, best.state, work, 2 * INSTANTS_PER_PERIOD)
@@ -318,7 +357,7 @@ def _change_by_points(models: Family, settings: Settings, top: _Top, work: _Work
     if own is not top.best:
         return factor * abs(found.mean / own.mean - 1) + 1 - own.mean / top.best.mean
     if top.jump:
-        found = _up_to_jump(model, replace(top, best=found), work).best
+        found = _refined(model, replace(top, best=found), work, FINER_STEPS).best
     return factor * abs(found.mean / own.mean - 1)
 
 
