@@ -191,15 +191,16 @@ def resonance_in_time(
             start = carried_motion(models, settings, motion, settings_here)
         work = _Work()
         top = _highest(model, start, work)
-        best = _settled(model, top.best.state, work, INSTANTS_PER_PERIOD)
+        above = top.best
+        top = replace(top, best=_settled(model, above.state, work, INSTANTS_PER_PERIOD))
         if top.jump:
             # the frequency of a jump hangs on the steps in time
             work.instants = INSTANTS_PER_PERIOD
-            top = _refined(model, replace(top, best=best), work)
-            best = top.best
-        error = _error(models, settings_here, model, top, best, work)
+            top = _refined(model, top, work)
+        error = _error(models, settings_here, model, top, above, work)
     except (InputError, _MarchFailedError):
         return None
+    best = top.best
     return ResonanceInTime(
         best.omega / (2 * np.pi),
         best.lowest,
@@ -314,25 +315,26 @@ def _error(
     settings: Settings,
     model: ReducedModel,
     top: _Top,
-    best: _Settled,
+    above: _Settled,
     work: _Work,
 ) -> float:
     """Estimated relative error of the highest amplitude.
 
     Args:
-        best: the motion at the top with shorter steps.
+        above: what the climb ended on, with longer steps in time, on its way down.
     """
     if not top.closed_in:
         return float(np.inf)
+    best = top.best
     below = driven_anew(model, best.state, Drive(best.omega, UNDERDRIVE))
     below = _march(model, below, UNDERDRIVEN_PERIODS, work).end
-    other = _settled(model, driven_anew(model, below, Drive(best.omega)), work)
-    # the blade may fall off to another motion, which says nothing of this one
-    same = other.mean > JUMP_SHARE * top.best.mean
-    error = abs(other.mean / top.best.mean - 1) if same else SETTLED_CHANGE
+    from_below = _settled(model, driven_anew(model, below, Drive(best.omega)), work)
+    # a motion at another frequency, or another one to which the blade fell, says nothing
+    others = [one for one in (above, from_below) if one.omega == best.omega]
+    changes = [abs(one.mean / best.mean - 1) for one in others if one.mean > JUMP_SHARE * best.mean]
+    error = max(changes, default=SETTLED_CHANGE)
     # single periods that are higher may come
     error += (best.highest - best.lowest) / (2 * best.highest) + top.left
-    error += abs(best.mean / top.best.mean - 1)
     if not best.resolved:
         finer = _settled(model, best.state, work, 2 * INSTANTS_PER_PERIOD)
         error += abs(finer.mean / best.mean - 1)
