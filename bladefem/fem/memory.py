@@ -6,8 +6,8 @@ inertia, measured and (modelled); benchmarks/fem_cost.py remakes the first row, 
 single points of the first two:
 
     dofs                      49 632         148 773        495 732        1 032 705
-    in memory                 0.441 (0.429)  1.32 (1.37)    6.20 (6.06)    - (15.6)
-    factors on disk           0.370 (0.360)  0.90 (0.94)    3.41 (3.36)    - (7.8)
+    in memory                 0.441 (0.454)  1.32 (1.40)    6.20 (5.87)    - (14.7)
+    factors on disk           0.370 (0.348)  0.90 (0.94)    3.41 (3.60)    - (8.7)
     two ranks, both together  0.682 (0.682)  2.01 (2.01)
 
 Factors on disk take 0.53 GB at 148 773 degrees of freedom, and a twentieth more processor time
@@ -37,9 +37,9 @@ from .compat import MPI
 # interpreter and libraries of one rank [bytes]
 BYTES_PER_RANK = 1.2e8
 # bytes: a dofs + b dofs^(4/3)
-ONE_RANK = (1.25e3, 135.6)
+ONE_RANK = (2.5e3, 115.0)
 SEVERAL_RANKS = (2.18e3, 183.0)
-ON_DISK = (3.37e3, 39.9)
+ON_DISK = (2.5e3, 57.0)
 # on disk: bytes b dofs^(4/3)
 FACTOR_BYTES = 100.0
 

@@ -36,6 +36,9 @@ MAX_STEP = 0.05
 # of the heights of two points that enclose a maximum, beyond which the higher one is not taken for
 # a corner: between 54 um and 198 um a response jumped up to 263 um
 MAX_HEIGHT_RATIO = 2.0
+# of the frequency: two points that are no farther apart enclose the jump itself, whose higher end
+# is the peak
+JUMP_WIDTH = 1e-4
 # of the frequency: where a search begins instead when its first point is not solved
 RETRY_RATIOS = (1.005, 1.01, 1.02, 0.99)
 
@@ -252,7 +255,8 @@ def _vertex_between(
 
     By the cubic through values and slopes; for a corner, where a contact begins to slip, where the
     tangents meet. Outside of the two they say that the higher one is the corner itself, which is
-    believed where the heights are alike: where the response jumps up between them it is not so.
+    believed where the heights are alike: where the response jumps up between them it is not so,
+    unless they are as near as that jump.
     """
     width = high.solution.omega - low.solution.omega
     down = low.line * width
@@ -260,8 +264,10 @@ def _vertex_between(
     rise = high.height**-2 - low.height**-2
     share, depth = tangents_meet(down, up, rise) if corner else cubic_minimum(down, up, rise)
     unlike = max(low.height, high.height) > MAX_HEIGHT_RATIO * min(low.height, high.height)
-    if corner and unlike and not 0 < share < 1:
-        share, depth = cubic_minimum(down, up, rise)
+    wide = abs(width) > JUMP_WIDTH * abs(low.solution.omega)
+    if corner and unlike and wide and not 0 < share < 1:
+        # halved: the cubic leads to its higher end alone
+        share, depth = 0.5, cubic_minimum(down, up, rise)[1]
     bottom = low.height**-2 + depth
     gain = max(low.height, high.height) ** -2 / bottom - 1 if bottom > 0 else np.inf
     target = low.solution.omega + float(np.clip(share, 0.02, 0.98)) * width

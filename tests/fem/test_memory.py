@@ -42,7 +42,7 @@ from bladefem.study.pipeline.bodies import Bodies
 )
 def test_model_follows_the_measured_peaks(dofs, ranks, on_disk, measured):
     """Wedge sector, one complex nodal diameter, all ranks together."""
-    assert modal_solve_memory(dofs, ranks, on_disk) == pytest.approx(measured, rel=0.05)
+    assert modal_solve_memory(dofs, ranks, on_disk) == pytest.approx(measured, rel=0.07)
 
 
 def test_a_million_is_predicted_to_fit_into_20_gib():

@@ -103,7 +103,8 @@ def test_a_block_on_soft_springs_flies_outwards():
     flight = SIZE[0] / 2 / (4 - 1)
     assert state.displacement[:, 0].mean() == pytest.approx(flight, rel=2e-3)
     assert abs(state.displacement[:, 1:]).max() < 1e-3 * flight
-    assert state.iterations < 8
+    # in each of the steps of its load
+    assert state.iterations <= 3 * state.steps
 
 
 @pytest.mark.parametrize("speed, tolerance", [(20.0, 1e-7), (100.0, 2e-6)])

@@ -66,7 +66,7 @@ def test_nodes_that_open_or_close_in_a_step_are_found_from_the_rest():
     flexibility = F, np.ascontiguousarray(F.T), F @ preload
     work = np.zeros(1)
     assert contact_forces(
-        c, flexibility, w, f, np.zeros_like(f), extra, table, load, load, preload, work
+        c, flexibility, w, f, np.zeros((2, *f.shape)), extra, table, load, load, preload, work
     )
     assert work[0] > 0
     law = {"c": c + F @ preload, "F": F, "table": table, "load": load}
@@ -79,7 +79,7 @@ def test_nodes_that_open_or_close_in_a_step_are_found_from_the_rest():
 def contact_forces_of(case, w, f, extra):
     load = case["load"]
     zero = np.zeros(len(extra))
-    change = np.zeros_like(f)
+    change = np.zeros((2, *f.shape))
     F = case["F"]
     flexibility = F, np.ascontiguousarray(F.T), F @ zero
     return contact_forces(

@@ -31,7 +31,7 @@ def curve_of(points) -> SimpleNamespace:
     }
     peak = max(columns["amplitude"])
     arrays = {name: np.array(values) for name, values in columns.items()}
-    return SimpleNamespace(**arrays, load=80.0, balance_amplitude=peak)
+    return SimpleNamespace(**arrays, load=80.0, balance_amplitude=peak, sought=None)
 
 
 def test_columns_give_what_the_paths_gave():

@@ -278,6 +278,7 @@ def test_a_motion_that_was_not_judged_is_no_lasting_one():
     # a curve says so where that motion is its resonance
     curve = SimpleNamespace(
         load=7.0,
+        sought=None,
         frequency=np.array([1.0, 1.0, 2.0]),
         amplitude=heights,
         stability=np.array([UNKNOWN, STABLE, STABLE]),
