@@ -130,8 +130,7 @@ def pattern_response(
     settings = curve.settings
     H = max(settings.harmonics, *wheel.excitation)
     samples = max(settings.samples, 8 * (H + 1))
-    spread = abs(deviation).max() + 0.005
-    grid = frequency_grid(wheel, curve, pattern, spread)
+    grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005)
     solved = wheel_respond(wheel, pattern, H, samples, options)
     peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
     # the same way to the tuned one, so that the factor compares like with like

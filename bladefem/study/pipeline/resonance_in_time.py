@@ -67,7 +67,7 @@ MOST_STEPS = 10
 JUMP_SHARE = 0.7
 # of the relative fall to a neighbour: rise that is possible on the way
 RISE_BEHIND_SHARE = 0.25
-# steps towards a jump with twice the contact points
+# steps towards a jump with more contact points
 FINER_STEPS = 2
 # relative gain of height by the vertex of a parabola that is marched as well
 WORTH_A_MARCH = 0.01
