@@ -4,12 +4,16 @@ knows AMD only.
 METIS is there already, as a library that PETSc's own libraries load. Factors of sectors' interiors
 by AMD, by METIS as it is, and by METIS with halves of more equal size (two seeds each):
 
-    dofs             49 395             73 119           144 159       148 218
-    entries [1e6]    13.7, 14.4, 13.7   -, 23.8, 24.4    -, 66.8, 68   -, 69.3, 65.1
-    flops [1e9]      8.0, 10.1, 7.5     -, 20.2, 22.1    -, 95, 102    -, 99, 73.8
+    dofs                  49 395      73 119      144 159        148 218
+    entries [1e6]   AMD   15.1                                   82.7
+                    METIS 14.4, 14.8  24.0, 23.6  68.0, 65.6     68.5, 70.1
+                    equal 13.7, 13.7  24.1, 24.6  69.0, 68.2     65.8, 64.5
+    flops [1e9]     AMD   11.6                                   143
+                    METIS 9.4, 10.9   21.3, 19.0  103.9, 86.3    93.6, 104.6
+                    equal 7.6, 7.5    21.1, 23.1  102.3, 102.5   76.8, 70.7
 
-Of the whole factor the last front, which has the rows left out beside it, takes up to a third:
-equal halves were never much worse where that did not decide.
+The first front of the root has the rows left out beside it: where that decides, equal halves spare
+up to a third of the operations; elsewhere they cost up to a fifth more.
 """
 
 from __future__ import annotations
