@@ -77,6 +77,24 @@ class FittedScene:
         }
 
 
+def _positive_numbers(row: list[str], count: int, path: Path) -> list[float]:
+    """The cells of one row.
+
+    Raises:
+        InputError: they are not so many positive numbers.
+    """
+    try:
+        numbers = [float(cell) for cell in row]
+    except ValueError:
+        numbers = []
+    if len(numbers) != count or not all(0 < number < np.inf for number in numbers):
+        raise InputError(
+            f"--measured {path}: row '{', '.join(row)}', expected {count} positive numbers in each "
+            "row"
+        )
+    return numbers
+
+
 def read_readings(path: str | Path, scene: Scene) -> Readings:
     """A CSV file with the columns of COLUMNS, each with its unit: "frequency [Hz]"; "#" starts a
     comment.
@@ -91,16 +109,7 @@ def read_readings(path: str | Path, scene: Scene) -> Readings:
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
     if len(cells) < 2:
         raise InputError(f"--measured {path}: expected a row of names and readings")
-    try:
-        values = np.array(cells[1:], dtype=float)
-    except ValueError:
-        raise InputError(
-            f"--measured {path}: expected {len(cells[0])} numbers in each row"
-        ) from None
-    if values.ndim != 2 or values.shape[1] != len(cells[0]) or not (values > 0).all():
-        raise InputError(
-            f"--measured {path}: expected {len(cells[0])} positive numbers in each row"
-        )
+    values = np.array([_positive_numbers(row, len(cells[0]), path) for row in cells[1:]])
     found = {}
     for head, column in zip(cells[0], values.T, strict=True):
         name, _, unit = (part.strip(" ]") for part in head.partition("["))
