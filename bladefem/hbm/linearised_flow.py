@@ -224,9 +224,32 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
     """One step of a node with two tangents: new force, and the share of the step for which the old
     state lasts; derivatives are filled.
     """
-    N0, N1, _, _ = loads
     before, now, load = tangents
+    force, share, across, by = slopes_2d(x, y, dx, dy, loads[0], loads[1], mu)
+    by_force, by_motion, by_load0, by_load1 = by
+    for a in range(2):
+        for b in range(2):
+            before[a, b] = by_force * across[a + b]
+            now[a, b] = by_motion * across[a + b]
+        load[a, 0] = by_load0[a]
+        load[a, 1] = by_load1[a]
+    return force[0], force[1], share
+
+
+@njit(**INNER_KERNEL)
+def slopes_2d(x, y, dx, dy, N0, N1, mu):
+    """One step of a node with two tangents, in numbers alone: most of a march is spent here.
+
+    Returns:
+        the new force; the share of the step for which the old state lasts; three entries xx, xy,
+        yy of a symmetric matrix A, and the derivatives of the new force by the old one and by the
+        motion over A, and by both loads.
+    """
     fx, fy, slips = step_2d(x, y, dx, dy, N0, N1, mu)
+    nothing = (0.0, 0.0)
+    whole = (1.0, 0.0, 1.0)
+    if slips == 0.0 and N0 > 0.0 and mu * N1 > 0.0:
+        return (fx, fy), 0.5, whole, (1.0, 1.0, nothing, nothing)
     share = 0.5
     if (N0 > 0.0) != (N1 > 0.0):
         share = N0 / (N0 - N1)
@@ -236,26 +259,15 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
         # a node that slipped before goes on
         if margin > 1e-9 * mu * N0:
             share = margin / (margin + over)
-    before[:] = 0.0
-    now[:] = 0.0
-    load[:] = 0.0
     if mu * N1 <= 0.0:
-        return fx, fy, share
-    if slips == 0.0 and N0 > 0.0:
-        before[0, 0] = 1.0
-        before[1, 1] = 1.0
-        now[0, 0] = 1.0
-        now[1, 1] = 1.0
-        return fx, fy, share
+        return (fx, fy), share, whole, (0.0, 0.0, nothing, nothing)
     # of the step, in contact
     part = 1.0 if N0 > 0.0 else N1 / (N1 - N0)
     if slips == 0.0:
-        for c in range(2):
-            step = dx if c == 0 else dy
-            now[c, c] = part
-            load[c, 0] = step * part / (N1 - N0)
-            load[c, 1] = -step * N0 / (N1 - N0) ** 2
-        return fx, fy, share
+        rise = (N1 - N0) ** 2
+        by_load0 = (dx * part / (N1 - N0), dy * part / (N1 - N0))
+        by_load1 = (-dx * N0 / rise, -dy * N0 / rise)
+        return (fx, fy), share, whole, (0.0, part, by_load0, by_load1)
     # across the force the direction of the motion is approached over a length of limit over
     # stiffness; along it the force is the limit
     sliding = 1.0 - share if N0 > 0.0 and share != 0.5 else 1.0
@@ -265,11 +277,6 @@ def _step_2d(x, y, dx, dy, loads, mu, tangents):
     gained = (1.0 - kept) / path if path > 1e-5 else 1.0 - 0.5 * path
     nx = fx / (mu * N1)
     ny = fy / (mu * N1)
-    for a in range(2):
-        for b in range(2):
-            across = (a == b) - (nx if a == 0 else ny) * (nx if b == 0 else ny)
-            before[a, b] = kept * across if N0 > 0.0 else 0.0
-            now[a, b] = part * gained * across
-    load[0, 1] = mu * nx
-    load[1, 1] = mu * ny
-    return fx, fy, share
+    across = (1.0 - nx * nx, -nx * ny, 1.0 - ny * ny)
+    by_force = kept if N0 > 0.0 else 0.0
+    return (fx, fy), share, across, (by_force, part * gained, nothing, (mu * nx, mu * ny))

@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from ..util.numba_options import INNER_KERNEL, KERNEL
-from .linearised_flow import _step_2d
+from .linearised_flow import slopes_2d
 
 # most sweeps over the nodes in a step
 SWEEPS = 60
@@ -86,31 +86,29 @@ def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, lar
     n = len(f)
     m = len(c)
     d = m // n
-    B = np.zeros((3, 3))
-    gap = np.zeros(3)
-    tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
     w[:] = c + pressed
     for i in range(n):
-        for a in range(d):
-            if f[i, a] != 0.0:
-                _subtract(columns[i * d + a], f[i, a], w)
+        if f[i, 0] != 0.0 or f[i, 1] != 0.0 or f[i, 2] != 0.0:
+            _subtract(columns, i * d, d, f[i, 0], f[i, 1], f[i, 2], w)
     # a first sweep says nothing of how fast they settle
     before = 0.0
     for _ in range(SWEEPS):
         change = 0.0
         for i in range(n):
             first = i * d
-            if _stays_open(f[i], load1[i] + table[i, 1] * w[first]):
+            open_before = f[i, 0] == 0.0 and f[i, 1] == 0.0 and f[i, 2] == 0.0
+            if open_before and load1[i] + table[i, 1] * w[first] <= 0.0:
                 continue
-            loads = (load0[i] + table[i, 1] * old[1][first], load1[i])
-            _violation(w, f[i], first, d, old[1], old[0][i], (table[i], loads), B, gap, tangents)
-            _own_step(F, first, d, B, gap)
+            gap, B = _violation(w, f, i, d, old, table, load0, load1)
+            x, y, z = _own_step(F, first, d, B, gap)
             work[0] += NODE_OPERATIONS + 2.0 * d * m
+            f[i, 0] += x
+            f[i, 1] += y
+            f[i, 2] += z
             for a in range(d):
-                f[i, a] += gap[a]
                 extra[first + a] = f[i, a] - preload[first + a]
-                change = max(change, abs(gap[a]))
-                _subtract(columns[first + a], gap[a], w)
+            change = max(change, abs(x), abs(y), abs(z))
+            _subtract(columns, first, d, x, y, z, w)
         # by how much the next one would change a force, if it falls again as it did
         ahead = change * min(change / before, 1.0) if before > 0.0 else change
         if ahead <= SETTLED * largest:
@@ -120,46 +118,45 @@ def _in_turn(c, flexibility, w, f, extra, table, load0, load1, preload, old, lar
 
 
 @njit(**INNER_KERNEL)
-def _stays_open(f, load):
-    """A node without force whose normal load is none either."""
-    return load <= 0.0 and f[0] == 0.0 and f[1] == 0.0 and f[2] == 0.0
-
-
-@njit(**INNER_KERNEL)
-def _subtract(column, factor, target):
-    """target (m,) becomes target less the factor times the column (m,)."""
+def _subtract(columns, first, d, x, y, z, target):
+    """target (m,) becomes target less the columns of a node's forces times these; z is zero where
+    there is one tangent.
+    """
+    last = first + d - 1
     for k in range(len(target)):
-        target[k] -= factor * column[k]
+        target[k] -= columns[first, k] * x + columns[first + 1, k] * y + columns[last, k] * z
 
 
 @njit(**INNER_KERNEL)
 def _own_step(F, first, d, B, gap):
-    """The solution of (1 + B F) x = gap with a node's own flexibility replaces gap (3,), whose last
-    entry is zero where there is one tangent, as are the last row and column of B (3, 3).
+    """The solution of (1 + B F) x = gap with a node's own flexibility; gap, B as of `_violation`.
 
-    By Cramer's rule in scalars: most of a march is spent in such steps.
+    By Cramer's rule in numbers alone.
     """
     last = first + d - 1
     n0, n1, n2 = F[first, first], F[first, first + 1], F[first, last]
     s0, s1, s2 = F[first + 1, first], F[first + 1, first + 1], F[first + 1, last]
     t0, t1, t2 = F[last, first], F[last, first + 1], F[last, last]
-    a00 = 1.0 + B[0, 0] * n0
-    a01 = B[0, 0] * n1
-    a02 = B[0, 0] * n2
-    a10 = B[1, 0] * n0 + B[1, 1] * s0 + B[1, 2] * t0
-    a11 = 1.0 + B[1, 0] * n1 + B[1, 1] * s1 + B[1, 2] * t1
-    a12 = B[1, 0] * n2 + B[1, 1] * s2 + B[1, 2] * t2
-    a20 = B[2, 0] * n0 + B[2, 1] * s0 + B[2, 2] * t0
-    a21 = B[2, 0] * n1 + B[2, 1] * s1 + B[2, 2] * t1
-    a22 = 1.0 + B[2, 0] * n2 + B[2, 1] * s2 + B[2, 2] * t2
+    b00, b10, b20, b11, b12, b22 = B
+    a00 = 1.0 + b00 * n0
+    a01 = b00 * n1
+    a02 = b00 * n2
+    a10 = b10 * n0 + b11 * s0 + b12 * t0
+    a11 = 1.0 + b10 * n1 + b11 * s1 + b12 * t1
+    a12 = b10 * n2 + b11 * s2 + b12 * t2
+    a20 = b20 * n0 + b12 * s0 + b22 * t0
+    a21 = b20 * n1 + b12 * s1 + b22 * t1
+    a22 = 1.0 + b20 * n2 + b12 * s2 + b22 * t2
     c0 = a11 * a22 - a12 * a21
     c1 = a12 * a20 - a10 * a22
     c2 = a10 * a21 - a11 * a20
     scale = 1.0 / (a00 * c0 + a01 * c1 + a02 * c2)
     x, y, z = gap
-    gap[0] = scale * (x * c0 + y * (a02 * a21 - a01 * a22) + z * (a01 * a12 - a02 * a11))
-    gap[1] = scale * (x * c1 + y * (a00 * a22 - a02 * a20) + z * (a02 * a10 - a00 * a12))
-    gap[2] = scale * (x * c2 + y * (a01 * a20 - a00 * a21) + z * (a00 * a11 - a01 * a10))
+    return (
+        scale * (x * c0 + y * (a02 * a21 - a01 * a22) + z * (a01 * a12 - a02 * a11)),
+        scale * (x * c1 + y * (a00 * a22 - a02 * a20) + z * (a02 * a10 - a00 * a12)),
+        scale * (x * c2 + y * (a01 * a20 - a00 * a21) + z * (a00 * a11 - a01 * a10)),
+    )
 
 
 @njit(**INNER_KERNEL)
@@ -217,7 +214,6 @@ def _violations(c, F, w, f, extra, table, load0, load1, preload, old, B, gap):
     """
     n = len(f)
     d = len(c) // n
-    tangents = (np.zeros((2, 2)), np.zeros((2, 2)), np.zeros((2, 2)))
     for i in range(n):
         for a in range(d):
             extra[i * d + a] = f[i, a] - preload[i * d + a]
@@ -226,36 +222,42 @@ def _violations(c, F, w, f, extra, table, load0, load1, preload, old, B, gap):
         first = i * d
         for a in range(first, first + d):
             w[a] = c[a] - _product(F[a], extra)
-        loads = (load0[i] + table[i, 1] * old[1][first], load1[i])
-        own = gap[first : first + d]
-        _violation(w, f[i], first, d, old[1], old[0][i], (table[i], loads), B[i], own, tangents)
+        own, (b00, b10, b20, b11, b12, b22) = _violation(w, f, i, d, old, table, load0, load1)
+        rows = ((b00, 0.0, 0.0), (b10, b11, b12), (b20, b12, b22))
         for a in range(d):
+            gap[first + a] = own[a]
             total += own[a] ** 2
+            for k in range(d):
+                B[i, a, k] = rows[a][k]
     return np.sqrt(total)
 
 
 @njit(**INNER_KERNEL)
-def _violation(w, f, first, d, old_w, old_f, node, B, gap, tangents):
-    """What the friction law wants more of the forces f of a node at its displacements w: gap (d,),
-    and its derivative B (d, d) by them.
+def _violation(w, f, i, d, old, table, load0, load1):
+    """What the friction law wants more of the forces of node i at its displacements: normal and two
+    tangential ones, the second zero where there is one tangent.
+
+    Returns:
+        these, and their derivatives by the displacements: normal by normal, tangential by normal,
+        and xx, xy, yy of the tangential ones.
     """
-    parameters, loads = node
-    kt, kn, mu = parameters
-    N0, load = loads
-    _, now, by_load = tangents
-    N1 = load + kn * w[first]
+    first = i * d
+    old_f, old_w = old
+    kt, kn, mu = table[i, 0], table[i, 1], table[i, 2]
+    N0 = load0[i] + kn * old_w[first]
+    N1 = load1[i] + kn * w[first]
     dx = kt * (w[first + 1] - old_w[first + 1])
     dy = kt * (w[first + 2] - old_w[first + 2]) if d > 2 else 0.0
-    x, y, _ = _step_2d(old_f[1], old_f[2], dx, dy, (N0, N1, 0.0, 0.0), mu, tangents)
-    gap[0] = max(N1, 0.0) - f[0]
-    gap[1] = x - f[1]
-    if d > 2:
-        gap[2] = y - f[2]
-    B[0, 0] = kn if N1 > 0.0 else 0.0
-    for a in range(1, d):
-        B[a, 0] = by_load[a - 1, 1] * kn
-        for b in range(1, d):
-            B[a, b] = now[a - 1, b - 1] * kt
+    force, _, across, by = slopes_2d(old_f[i, 1], old_f[i, 2], dx, dy, N0, N1, mu)
+    _, by_motion, _, by_load = by
+    stiff = kt * by_motion
+    gap = (max(N1, 0.0) - f[i, 0], force[0] - f[i, 1], force[1] - f[i, 2])
+    normal = kn if N1 > 0.0 else 0.0
+    xx = stiff * across[0]
+    if d == 2:
+        return gap, (normal, by_load[0] * kn, 0.0, xx, 0.0, 0.0)
+    xy, yy = stiff * across[1], stiff * across[2]
+    return gap, (normal, by_load[0] * kn, by_load[1] * kn, xx, xy, yy)
 
 
 # the order of the sum is free, so that it is vectorised
