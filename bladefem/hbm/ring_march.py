@@ -20,6 +20,7 @@ from scipy import sparse
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
 from ..util.numba_options import INNER_KERNEL, KERNEL
+from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_envelope, scatter
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
@@ -60,8 +61,10 @@ class RingState:
 class RingMarch:
     """Motion of the first probe of each blade."""
 
-    # (periods, r, instants) [m], those that were marched
+    # (periods, r, instants) [m], those that were marched since the last leap
     motion: np.ndarray
+    # that were marched in all
+    periods: int
     # the forces of each step were found
     settled: bool
     # steps are short enough for forces that are linear in them; else they are constant
@@ -96,6 +99,7 @@ def march_ring(
     instants: int = INSTANTS_PER_PERIOD,
     enough: Callable[[np.ndarray], bool] = never_enough,
     most: float = np.inf,
+    leaps: bool = False,
 ) -> RingMarch:
     """March under the drive of a state.
 
@@ -106,6 +110,8 @@ def march_ring(
             PERIODS_AT_ONCE.
         most: operations; where the first period shows that all would take more, no more are
             marched.
+        leaps: along the slow envelope (`bladefem.hbm.envelope`), where what the blades do on their
+            way does not matter; ``enough`` sees what was marched since the last one.
 
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
@@ -115,25 +121,43 @@ def march_ring(
     S = r * -(-instants // r)
     y, forces = start.modal.copy(), start.forces.copy()
     resolved, prepared = _prepared(model, start, S)
+    w, probe, contact = prepared[0], prepared[-1][0], _system(model).contact
     motion = np.empty((periods, S, r))
     work = np.zeros(1)
     m, M = _system(model).contact.shape
     of_bodies = 8.0 * periods * S * M * (M + m)
     operations = of_bodies
-    settled, done = True, 0
+    settled, done, leapt = True, 0, 0
+    envelope: list[complex] = []
+    at_once = PERIODS_OF_PART if leaps else PERIODS_AT_ONCE
     while settled and done < periods:
         # the first period tells what the others take
-        following = min(done - done % PERIODS_AT_ONCE + PERIODS_AT_ONCE, periods) if done else 1
+        following = min(done - done % at_once + at_once, periods) if done else 1
         settled = bool(_march(y, forces, *prepared, motion[done:following], work))
         done = following
         operations = of_bodies + work[0] * periods / done
         if operations > most:
             break
-        whole = done % PERIODS_AT_ONCE == 0 or done == periods
-        if whole and enough(motion[:done].transpose(0, 2, 1)):
+        whole = done % at_once == 0 or done == periods
+        if whole and enough(motion[leapt:done].transpose(0, 2, 1)):
             break
+        if not (whole and leaps):
+            continue
+        part = first_amplitudes(motion[done - at_once : done].transpose(0, 2, 1))
+        envelope.append(part.mean())
+        # what follows has to tell where it led
+        left = periods - done >= 3 * at_once
+        leap = leap_from_end(envelope, scatter(part)) if left else 0.0
+        if leap:
+            moved = moved_envelope(_system(model), probe, y, start.drive.omega, leap)
+            # contacts move along, so that no step of theirs is a large one
+            w += contact @ (moved - y)[:M]
+            y[:] = moved
+            envelope, leapt = [], done
     end = RingState(start.drive, y, forces)
-    return RingMarch(motion[:done].transpose(0, 2, 1), settled, resolved, operations, end)
+    return RingMarch(
+        motion[leapt:done].transpose(0, 2, 1), done, settled, resolved, operations, end
+    )
 
 
 def state_of_solution(

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import InputError
+from ...hbm.envelope import PERIODS_OF_PART, first_amplitudes, way_to_limit
 from ...hbm.model import ReducedModel
 from ...hbm.peak_ripples import bend_of_mode
 from ...hbm.ring_march import (
     INSTANTS_PER_PERIOD,
-    PERIODS_AT_ONCE,
     Drive,
     RingMarch,
     RingState,
@@ -51,10 +51,12 @@ UNDERDRIVEN_PERIODS = 25
 # under 18 N, by 1 % under 9 N, where no period is like another
 CLIMBING_INSTANTS = 128
 # after which a motion is taken as it is
-MOST_PERIODS = 400
-# relative change of the ends of the band of amplitudes, from one PERIODS_AT_ONCE to the next, that
-# is none
+MOST_PERIODS = 396
+# relative change that is none: of the ends of the band of amplitudes, from one part of a march to
+# the next, and on the way to the limit of the mean amplitude
 SETTLED_CHANGE = 5e-3
+# of the width of a band: change of its ends that bouncing alone makes
+SETTLED_BAND_SHARE = 0.25
 # periods whose amplitudes count
 COUNTED_PERIODS = 50
 # harmonics of which the amplitude of a period is made
@@ -65,8 +67,6 @@ MOST_STEPS = 10
 # share of the amplitude before, below which a step has led to another motion: along one it falls by
 # some 11 %
 JUMP_SHARE = 0.7
-# of the relative fall to a neighbour: rise that is possible on the way
-RISE_BEHIND_SHARE = 0.25
 # steps towards a jump with more contact points
 FINER_STEPS = 2
 # relative gain of height by the vertex of a parabola that is marched as well
@@ -121,6 +121,13 @@ class _Settled:
     state: RingState
     # steps were short enough for forces that are linear in them
     resolved: bool
+    # relative way that the mean seems to have left
+    left: float
+
+    @property
+    def expected(self) -> float:
+        """The mean at the lower end of what it seems to come to [m]."""
+        return self.mean * (1 - self.left)
 
 
 @dataclass(frozen=True)
@@ -130,6 +137,8 @@ class _Top:
     best: _Settled
     # a lower motion next to it
     neighbour: _Settled
+    # second derivative of 1 / height^2 by the circular frequency, of the blade alone
+    bend: float
     # circular frequency on the other side, from that of the best motion on, at which the blade has
     # jumped to a lower one; 0 where the amplitude falls smoothly on both sides
     jump: float = 0.0
@@ -144,8 +153,13 @@ class _Top:
 
     @property
     def rise_behind(self) -> float:
-        """The same towards the neighbour, where the amplitude falls already before the jump."""
-        return (self.best.mean / self.neighbour.mean - 1) * RISE_BEHIND_SHARE if self.jump else 0.0
+        """The same towards the neighbour, by a parabola of 1 / height^2 through both, bent as that
+        of the blade alone: the blade may have come from above.
+        """
+        run = abs(self.best.omega - self.neighbour.omega)
+        higher = self.neighbour.mean**-2 - self.best.mean**-2
+        vertex = run / 2 - higher / (self.bend * run)
+        return self.bend / 4 * (max(vertex, 0.0) * self.best.mean) ** 2 if self.jump else 0.0
 
     @property
     def left(self) -> float:
@@ -225,13 +239,13 @@ def _highest(model: ReducedModel, start: Solution, work: _Work) -> _Top:
     state = state_of_solution(model, start)
     here = _overdriven(model, state, start.omega, work)
     width = np.sqrt(2 / bend)
-    top = _climbed(model, here, STEP_SHARE * width / here.mean, work)
+    top = _climbed(model, here, bend, work)
     if abs(top.best.omega - here.omega) * here.mean < width:
         return top
     again = _overdriven(model, top.best.state, top.best.omega, work)
     if JUMP_SHARE * again.mean < top.best.mean:
         return top
-    return _climbed(model, again, STEP_SHARE * width / again.mean, work)
+    return _climbed(model, again, bend, work)
 
 
 def _overdriven(model: ReducedModel, state: RingState, omega: float, work: _Work) -> _Settled:
@@ -241,12 +255,13 @@ def _overdriven(model: ReducedModel, state: RingState, omega: float, work: _Work
     return _settled(model, driven_anew(model, state, Drive(omega)), work)
 
 
-def _climbed(model: ReducedModel, start: _Settled, step: float, work: _Work) -> _Top:
+def _climbed(model: ReducedModel, start: _Settled, bend: float, work: _Work) -> _Top:
     """The highest motion uphill of a start, by steps of the circular frequency.
 
     Raises:
         _MarchFailedError: it was not closed in.
     """
+    step = STEP_SHARE * np.sqrt(2 / bend) / start.mean
     known = {0: start}
     for side in (1, -1):
         place = side
@@ -264,23 +279,39 @@ def _climbed(model: ReducedModel, start: _Settled, step: float, work: _Work) -> 
         raise _MarchFailedError
     best = known[place]
     lower, neighbour = sorted((known[place - 1], known[place + 1]), key=lambda one: one.mean)
-    if lower.mean > JUMP_SHARE * best.mean:
-        best = _at_vertex(model, best, known[place - 1], known[place + 1], work)
-        return _Top(best, neighbour)
-    return _refined(model, _Top(best, neighbour, lower.omega - best.omega), work)
+    if lower.expected > JUMP_SHARE * best.mean:
+        return _with_vertex(model, best, (lower, neighbour), bend, work)
+    return _refined(model, _Top(best, neighbour, bend, lower.omega - best.omega), work)
+
+
+def _with_vertex(
+    model: ReducedModel,
+    best: _Settled,
+    beside: tuple[_Settled, _Settled],
+    bend: float,
+    work: _Work,
+) -> _Top:
+    """The top where the amplitude falls smoothly from the best motion on both sides."""
+    low, high = sorted(beside, key=lambda one: one.omega)
+    found = _at_vertex(model, best, low, high, work)
+    top = max(best, found, key=lambda one: one.mean)
+    neighbour = max(beside, key=lambda one: one.mean)
+    # one that is far higher than its neighbours has a resonance of its own
+    return _Top(top, neighbour, bend, closed_in=neighbour.mean > JUMP_SHARE * top.mean)
 
 
 def _at_vertex(
     model: ReducedModel, best: _Settled, low: _Settled, high: _Settled, work: _Work
 ) -> _Settled:
-    """The motion at the vertex of 1 / height^2 through three, where that is higher."""
+    """The motion at the vertex of 1 / height^2 through three; the best of these where that is not
+    expected to be higher.
+    """
     left, right = best.omega - low.omega, high.omega - best.omega
     level = best.mean**-2
     slope, half = parabola_at_middle(left, right, low.mean**-2 - level, high.mean**-2 - level)
     if half <= 0 or slope**2 / (4 * half) < 2 * WORTH_A_MARCH * level or work.exhausted:
         return best
-    found = _moved(model, best, best.omega - slope / (2 * half), work)
-    return max(best, found, key=lambda one: one.mean)
+    return _moved(model, best, best.omega - slope / (2 * half), work)
 
 
 def _refined(model: ReducedModel, top: _Top, work: _Work, most: int = MOST_STEPS) -> _Top:
@@ -298,16 +329,22 @@ def _refined(model: ReducedModel, top: _Top, work: _Work, most: int = MOST_STEPS
             found = _moved(model, best, best.omega + top.jump, work)
             if found.mean <= best.mean:
                 return replace(top, closed_in=True)
-            top = _Top(found, best, 2 * top.jump)
+            top = _Top(found, best, top.bend, 2 * top.jump)
             continue
         ahead = top.rise_ahead >= top.rise_behind
         way = top.jump if ahead else top.neighbour.omega - best.omega
         found = _moved(model, best, best.omega + way / 2, work)
         if found.mean > best.mean:
             # the one left behind becomes the end of the other way
-            top = _Top(found, best, way / 2) if ahead else _Top(found, top.neighbour, -way / 2)
+            jump, beside = (way / 2, best) if ahead else (-way / 2, top.neighbour)
+            top = _Top(found, beside, top.bend, jump)
+        elif not ahead:
+            top = replace(top, neighbour=found)
+        elif found.expected > JUMP_SHARE * best.mean:
+            # what fell far below was a steep flank
+            return _with_vertex(model, best, (found, top.neighbour), top.bend, work)
         else:
-            top = replace(top, jump=way / 2) if ahead else replace(top, neighbour=found)
+            top = replace(top, jump=way / 2)
     return replace(top, closed_in=False)
 
 
@@ -326,9 +363,9 @@ def _error(model: ReducedModel, top: _Top, above: _Settled, work: _Work) -> floa
     # a motion at another frequency, or another one to which the blade fell, says nothing
     others = [one for one in (above, from_below) if one.omega == best.omega]
     changes = [abs(one.mean / best.mean - 1) for one in others if one.mean > JUMP_SHARE * best.mean]
-    error = max(changes, default=SETTLED_CHANGE)
+    error = max([SETTLED_CHANGE, *changes])
     # single periods that are higher may come
-    error += (best.highest - best.lowest) / (2 * best.highest) + top.left
+    error += (best.highest - best.lowest) / (2 * best.highest) + top.left + best.left
     if not best.resolved:
         finer = _settled(model, best.state, work, 2 * INSTANTS_PER_PERIOD)
         error += abs(finer.mean / best.mean - 1)
@@ -389,7 +426,8 @@ def _settled(
     last = heights[-min(COUNTED_PERIODS, len(heights) // 2) :]
     work.frequencies.add(state.drive.omega)
     ends = float(last.min()), float(last.mean()), float(last.max())
-    return _Settled(state.drive.omega, *ends, march.end, march.resolved)
+    left = _left_to_limit(march.motion)
+    return _Settled(state.drive.omega, *ends, march.end, march.resolved, left)
 
 
 def _march(
@@ -409,9 +447,10 @@ def _march(
     instants = instants or work.instants
     if not steps_are_resolved(model, state.drive.omega, instants):
         instants = max(instants, INSTANTS_PER_PERIOD)
-    march = march_ring(model, state, periods, instants, enough, MOST_OF_ONE_MARCH)
-    work.operations += march.operations * len(march.motion) / periods
-    work.periods += len(march.motion)
+    leaps = enough is not never_enough
+    march = march_ring(model, state, periods, instants, enough, MOST_OF_ONE_MARCH, leaps)
+    work.operations += march.operations * march.periods / periods
+    work.periods += march.periods
     found = march.settled and bool(np.isfinite(march.motion).all())
     if not found or march.operations > MOST_OF_ONE_MARCH:
         raise _MarchFailedError
@@ -419,11 +458,26 @@ def _march(
 
 
 def _has_settled(motion: RealArray) -> bool:
-    """The last parts of a march keep to one band, to which they drift no faster than before."""
-    heights = amplitudes_of_periods(motion, HARMONICS)
-    parts = heights.reshape(-1, PERIODS_AT_ONCE * heights.shape[-1])
-    if len(parts) < 3 or not np.isfinite(heights).all():
+    """The last two thirds of a march keep to one band, and the means of all thirds have come to
+    their limit.
+    """
+    if len(motion) < 3 * PERIODS_OF_PART:
         return False
-    ends = np.column_stack([parts.min(axis=1), parts.max(axis=1)])[-3:]
-    before, now = abs(np.diff(ends, axis=0)).max(axis=1)
-    return bool(now <= min(before, SETTLED_CHANGE * ends.max()))
+    third = len(motion) // 3
+    heights = amplitudes_of_periods(motion[-2 * third :], HARMONICS).reshape(2, -1)
+    if not np.isfinite(heights).all():
+        return False
+    ends = np.column_stack([heights.min(axis=1), heights.max(axis=1)])
+    width = float(ends[1, 1] - ends[1, 0])
+    steady = max(SETTLED_CHANGE * ends.max(), SETTLED_BAND_SHARE * width)
+    moved = float(abs(np.diff(ends, axis=0)).max())
+    return moved <= steady and _left_to_limit(motion) <= SETTLED_CHANGE
+
+
+def _left_to_limit(motion: RealArray) -> float:
+    """Relative way from the mean amplitude of the last third of a march to its limit."""
+    third = len(motion) // 3
+    if third == 0:
+        return 0.0
+    means = [complex(first_amplitudes(motion[-k * third :][:third]).mean()) for k in (3, 2, 1)]
+    return abs(way_to_limit(means) / means[-1])
