@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
+from itertools import islice
 from numbers import Integral
 
 import numpy as np
@@ -115,16 +116,19 @@ def newton(
     w: np.ndarray,
     options: Options = DEFAULT_OPTIONS,
     merit: str = "step",
+    walks: bool = True,
 ) -> Newton:
     """Solve the balance from the displacements w (n, d, K).
 
     Args:
+        walks: a free damper may walk; where its rest is compiled the walk is looked for by the
+            residual whatever the merit, so that once is enough.
         merit: what the line search lowers: "step", the Newton step that the last derivative would
             take next, which does not depend on how the equations are scaled (Deuflhard, Newton
             Methods for Nonlinear Problems, 2004, Sect. 3.3), or "residual".
     """
     if balance.walk is None and may_walk(balance):
-        return _newton_of_free_damper(balance, w, options, merit)
+        return _newton_of_free_damper(balance, w, options, merit, walks)
     end = newton_as_given(balance, w, options, merit)
     fault = walk_fault(balance, end.state) if end.converged else ""
     return replace(end, converged=False, reason=fault) if fault else end
@@ -135,11 +139,13 @@ def _newton_of_free_damper(
     w: np.ndarray,
     options: Options,
     merit: str,
+    walks: bool,
 ) -> Newton:
     """Newton for a damper that walks or rests, whichever the solution asks for."""
     iterations = 0
-    starts = list(_likely_starts(balance, w))
-    for variant, start in starts:
+    # rest comes first
+    tried = None if walks or not runs_compiled(balance) else 1
+    for variant, start in islice(_likely_starts(balance, w), tried):
         end = _newton_of_one_kind(variant, start, options, merit)
         iterations += end.iterations
         if end.converged:
@@ -149,7 +155,7 @@ def _newton_of_free_damper(
     iterations += led.iterations
     best = end
     if led.converged:
-        for variant, start in _likely_starts(balance, led.state.w):
+        for variant, start in islice(_likely_starts(balance, led.state.w), tried):
             end = _newton_of_one_kind(variant, start, options, merit)
             iterations += end.iterations
             if end.converged:
