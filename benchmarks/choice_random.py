@@ -4,30 +4,43 @@ with lift-off, against a fixed rich model.
     python benchmarks/choice_random.py [first seed] [last seed] [accuracy]
 
 The choice finds harmonics and samples for the highest resonance of the band, search included. The
-rich model sweeps the same band with 15 harmonics and 1024 samples. Contacts of these models are no
-neighbours on a surface, so that points and modes stay as they are.
+rich model sweeps the same band with 15 harmonics and 1024 samples, and closes in its maxima as the
+choice does. Contacts of these models are no neighbours on a surface, so that points and modes stay
+as they are.
 
-Of the seeds 0 to 66 at 2 % none was wrong of 61 that have their resonance inside the band, and no
-estimate is below half of the true error. CPU time over the rich model's: 0.17 in all, median 0.63,
-above 1.1 in 6. Of the seeds 0 to 32 at 0.1 % none was wrong, and one estimate (seed 25) is too low;
-0.37 in all, median 0.77, above 1.1 in 9 of 30 (an earlier version).
+Seeds 0 to 66 at 2 %, 0 to 32 at 0.1 %; of CPU time, that of the rich model is 1:
 
-Above 1.1 at 2 % (of the rich model's time; times of 20 ms scatter by a fifth on a busy machine):
+    accuracy    in the band    wrong    estimate too low    unknown    all     median    above 1.1
+    2 %         62             0        0                   2          0.20    0.65      6
+    0.1 %       30             0        0                   0          0.82    0.80      9
+
+Unknown are seeds 4 and 33 (true errors 0.7 and 2.3 %), whose damper walks: their richer models were
+not solved. Where a point of the rich model takes over 1 ms the median is 0.54 and 0.78; a third is
+reached by 12 of 39 and 2 of 17.
+
+Above 1.1 at 2 %:
     seed    ratio
-    13      1.6     the choice follows its curve round folds, the rich model is too large for that
-    34      6.2     the damper walks: a point of the rough sweep with one harmonic takes 0.6 s
-    53      1.6, was 3.3    a third for finding the peak of three harmonics, a third for the sweep
-    59      1.6, was 2.2    two sweeps, since the first misses harmonics on a flank; were three
-    61      1.4     of the judging peak of 31 harmonics one point takes a quarter of a second
-    62      1.3     16 ms, one mass on one spring
-Seeds 41 and 43 took 1.2 and 7.4: with two sweeps, and with settings chosen anew at a peak that
-already held. Estimates were below half of the true error
-for seeds 1, 10 and 63, since the peak that was judged lies on a shoulder, up to 0.6 % below the
-highest point of the curve; the difference is part of the estimate now.
+    13      1.8     the choice follows its curve round folds, the rich model is too large for that
+    34      1.5     the damper may walk, and one point of the band with one harmonic has no solution
+    41      1.2     lifts off at a flank: its harmonics are swept twice
+    43      1.1     a bouncing mass, on a fold that every richer model moves
+    61      1.1     of the judging peak of 31 harmonics one point takes a quarter of a second
+    62      1.4     10 ms, one mass on one spring
+and at 0.1 %: seed 21 takes 17 times as long, since a flank with an internal resonance asks for 31
+harmonics, with which the curve is followed round folds in 554 points; the others, 16 to 300 ms,
+up to twice.
 
-Where the fixed rich model has its curve in 12 to 35 ms (seeds 0, 2, 20, 42, 48, 54) a point of
-either takes 0.3 ms, nearly all of it Python, and both solve as many points. The choice adds a
-second sweep and four peaks found by exact slopes: 0.7 to 1.2 of the rich model.
+Where the fixed rich model has its curve in 8 to 20 ms a point of either takes 0.3 ms, nearly all of
+it Python, and both solve as many points. The choice adds a second sweep and three peaks found by
+exact slopes.
+
+What was above 1.1 before, and why: walks were looked for by a merit that leads to none (seed 34,
+6.1); a rough look climbed to a jump in 400 steps (57, 1.15); peaks at a fold were not closed in, so
+that every richer model seemed to lie a step farther (43, 53, 67, 85: 1.3 to 5.8); curves were swept
+again with the harmonics that had been taken back (59, 1.6); the modes, of which these families know
+nothing, were judged. Estimates were below half of the true error for seeds 1, 10 and 63, since the
+peak that was judged lies on a shoulder, up to 0.6 % below the highest point of the curve; the
+difference is part of the estimate now.
 """
 
 from __future__ import annotations
@@ -44,9 +57,11 @@ from branch_models import random_case
 from bladefem import balance as bf
 from bladefem.errors import NotSolvedError
 from bladefem.hbm.peak import find_peak
+from bladefem.hbm.precompile import compile_kernels
 from bladefem.study.adaptive.check_points import peak_of
+from bladefem.study.adaptive.choice import Checked
 from bladefem.study.adaptive.family import Family, Member
-from bladefem.study.adaptive.resonance_curve import resonance_curve
+from bladefem.study.adaptive.resonance_curve import MAXIMUM_SHARE, resonance_curve
 from bladefem.study.adaptive.settings import first_for
 
 HARMONICS = 15
@@ -58,13 +73,47 @@ TRUE_SAMPLES = 4096
 SAME_PEAK = 0.05
 # accuracy over the tolerance to which the choice closes in its peak, which no estimate contains
 SEARCHED = 80
+# CPU time over the rich model's that is too much
+SLOWER = 1.1
+# of a point of the rich model, from which the choice is to take a third of it [s]
+LONG_POINT = 1e-3
+# runs of a model whose time is short [s]
+REPEATS = 3
+SHORT = 0.3
+# models that load the kernels
+WARMING_SEEDS = (0, 1, 3, 13)
+HZ = 2 * np.pi
 Result = TypeVar("Result")
 
 
-def timed(compute: Callable[[], Result]) -> tuple[Result, float]:
-    """The result, and the CPU time that it took [s]."""
-    clock = time.process_time()
-    return compute(), time.process_time() - clock
+def timed(compute: Callable[[bf.ReducedModel], Result], seed: int) -> tuple[Result, float]:
+    """The result, and the CPU time that it took [s]: of a fresh model, which has nothing at hand
+    yet; the shortest of REPEATS where it is short, since 10 ms scatter by a fifth.
+    """
+    spent: list[float] = []
+    while not spent or (len(spent) < REPEATS and max(spent) < SHORT):
+        model = random_case(seed).model
+        clock = time.process_time()
+        result = compute(model)
+        spent.append(time.process_time() - clock)
+    return result, min(spent)
+
+
+def chosen_curve(model: bf.ReducedModel, band: tuple[float, float], accuracy: float) -> Checked:
+    """The automatic choice for the highest resonance of a band [rad/s], and its curve."""
+    nodes = np.arange(len(model.elements.kt))
+    family = Family(lambda _: Member(model, nodes), len(model.sides[0].omega))
+    start = replace(first_for(10), points=None, chosen=("harmonics", "samples"))
+    return resonance_curve(family, start, (band[0] / HZ, band[1] / HZ), 1, accuracy)
+
+
+def warm_up(accuracy: float) -> None:
+    """What numba compiles or loads on first use is nobody's time."""
+    compile_kernels()
+    for seed in WARMING_SEEDS:
+        case = random_case(seed)
+        list(bf.sweep(case.model, case.band, HARMONICS, SAMPLES))
+        chosen_curve(case.model, case.band, accuracy)
 
 
 def true_height(model: bf.ReducedModel, top: bf.Solution) -> float:
@@ -82,52 +131,64 @@ def true_height(model: bf.ReducedModel, top: bf.Solution) -> float:
 
 
 def main(first: int, last: int, accuracy: float) -> None:
-    wrong, unsure, unsolved, outside = [], [], [], []
+    wrong, unsure, unknown, unsolved, outside, slower = [], [], [], [], [], []
     ratios: list[float] = []
+    long_ratios: list[float] = []
     spent = np.zeros(2)
+    warm_up(accuracy)
     for seed in range(first, last):
         case = random_case(seed)
-        model = case.model
-        nodes = np.arange(len(model.elements.kt))
-        family = Family(lambda _, m=model, n=nodes: Member(m, n), len(model.sides[0].omega))
-        start = replace(first_for(10), points=None, chosen=("harmonics", "samples"))
-        hertz = case.band[0] / (2 * np.pi), case.band[1] / (2 * np.pi)
-        rich, expensive = timed(lambda: list(bf.sweep(model, case.band, HARMONICS, SAMPLES)))  # noqa: B023
+        band = case.band
+        rich, expensive = timed(
+            lambda model, band=band: list(
+                bf.sweep(model, band, HARMONICS, SAMPLES, peak=MAXIMUM_SHARE * accuracy)
+            ),
+            seed,
+        )
         try:
-            found, cheap = timed(lambda: resonance_curve(family, start, hertz, 1, accuracy))  # noqa: B023
+            found, cheap = timed(lambda model, band=band: chosen_curve(model, band, accuracy), seed)
         except NotSolvedError as error:
             unsolved.append(seed)
             print(f"seed {seed}, {case.name}: not solved, {error}", flush=True)
             continue
         places = [peak_of(points).omega for points in (rich, found.points)]
-        if min(places) <= case.band[0] or max(places) >= case.band[1]:
+        if min(places) <= band[0] or max(places) >= band[1]:
             # the choice follows a peak beyond the band
             outside.append(seed)
             continue
         spent += cheap, expensive
         ratios.append(cheap / expensive)
-        truth = true_height(model, peak_of(rich))
+        if expensive > LONG_POINT * len(rich):
+            long_ratios.append(cheap / expensive)
+        truth = true_height(case.model, peak_of(rich))
         error = abs(bf.size(peak_of(found.points)) / truth - 1)
         told = found.settings.error
-        bad = error > accuracy and (told is None or told <= accuracy)
+        if told is None or not np.isfinite(told):
+            unknown.append(seed)
+            told = np.inf
+        bad = error > accuracy >= told
+        slow = cheap > SLOWER * expensive
         wrong += [seed] * bad
-        unsure += [seed] * (told is not None and told < error / 2 and error > accuracy / SEARCHED)
-        if bad or cheap > 1.1 * expensive:
+        slower += [seed] * slow
+        unsure += [seed] * (told < error / 2 and error > accuracy / SEARCHED)
+        if bad or slow or not np.isfinite(told):
             print(
                 f"seed {seed}, {case.name}: error {error:.2%}, estimated {told:.2%}, "
                 f"H {found.settings.harmonics}, CPU {cheap:.3f} s against {expensive:.3f} s",
                 flush=True,
             )
-    slower = sum(r > 1.1 for r in ratios)
     print(
         f"accuracy {accuracy:.1%}, {len(ratios)} models, not solved: {unsolved}, resonance outside "
         f"the band: {outside}"
     )
     print(f"wrong beyond the accuracy and not said: {len(wrong)} {wrong}")
     print(f"estimate below half of the true error: {len(unsure)} {unsure}")
+    print(f"error unknown: {len(unknown)} {unknown}")
     print(
         f"CPU over the rich model's: {spent[0] / spent[1]:.2f} in all, median "
-        f"{np.median(ratios):.2f}, above 1.1 in {slower}"
+        f"{np.median(ratios):.2f}, above {SLOWER} in {len(slower)} {slower}; where a point of the "
+        f"rich model takes over 1 ms: {len(long_ratios)}, median {np.median(long_ratios):.2f}, "
+        f"above a third in {sum(r > 1 / 3 for r in long_ratios)}"
     )
 
 

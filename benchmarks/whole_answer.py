@@ -58,26 +58,28 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.scene.tables import Mistuning, Scene
 from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.check_points import heights_of, peak_of
-from bladefem.study.adaptive.choice import covered_band, default_band, solver_options
+from bladefem.study.adaptive.choice import Checked, covered_band, default_band, solver_options
 from bladefem.study.adaptive.family import Family, family_member
 from bladefem.study.adaptive.indicators import moved_solution
 from bladefem.study.adaptive.settings import Settings, restarted_settings, scene_line
 from bladefem.study.chart.cpu_clock import Clock, running_clock
 from bladefem.study.chart.rows import parabola_resonance
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.case_models import family_of_case, load_cases, reduced_sector
+from bladefem.study.pipeline.body_mesh import SofterBody, mode_errors
+from bladefem.study.pipeline.case_models import (
+    family_of_case,
+    load_cases,
+    reduced_sector,
+    softer_body,
+)
 from bladefem.study.pipeline.damper_contact import contact_patches
-from bladefem.study.pipeline.highest_stable import highest_lasting
+from bladefem.study.pipeline.error_in_time import Marches
+from bladefem.study.pipeline.judged_resonance import judged_resonance
 from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.normal_modes import excited_modes, find_modes, harmonic_diameters
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.seated_loads import seat_every_load
-from bladefem.study.pipeline.stability import (
-    judged_above,
-    model_in_time,
-    richer_models,
-    stability_of,
-)
+from bladefem.study.pipeline.stability import model_in_time
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
 
 ROOT = Path(__file__).parents[1]
@@ -118,6 +120,8 @@ class Prepared:
     seconds: float
     search: float
     dofs: int
+    # the body less the error of its stiffness, for the error by its mesh
+    softer: SofterBody | None
 
     @property
     def richest(self) -> Settings:
@@ -156,6 +160,9 @@ def prepare(scene: Scene, scale: float, clock: Clock) -> Prepared:
     start = clock.now()
     settings, reduced = reduced_sector(scene, bodies, cases[len(cases) // 2], patches, keep)
     search = clock.now() - start - sum(reducing)
+    excited = excited_modes(scene, mesh, find_modes(bodies, harmonic_diameters(scene, mesh, 1)))
+    errors = mode_errors(bodies, patches, excited)
+    softer = softer_body(scene, mesh, reduced, patches, errors)
     families = [family_of_case(scene, mesh, reduced, patches, case) for case in cases]
     return Prepared(
         scene,
@@ -166,6 +173,7 @@ def prepare(scene: Scene, scale: float, clock: Clock) -> Prepared:
         clock.now() - begun - search,
         search,
         mesh.dimension * len(mesh.points),
+        softer,
     )
 
 
@@ -222,7 +230,7 @@ def by_choice(known: Prepared, k: int) -> Answer:
     """The automatic choice, as a run makes it."""
     start = restarted_settings(known.settings)
     case, family = known.cases[k], known.families[k]
-    curve = curve_of(known.scene, case, lambda _: family, start)
+    curve = curve_of(known.scene, case, lambda _: family, start, known.softer)
     s = curve.settings
     model = family_member(family, s).model
     told = np.nan if curve.error is None else curve.error
@@ -231,18 +239,16 @@ def by_choice(known: Prepared, k: int) -> Answer:
 
 
 def by_settings(settings: Settings, known: Prepared, k: int) -> Answer:
-    """A sweep with given settings, and its highest point judged not unstable: all are judged as
-    those of a run, unstable ones again with more harmonics.
+    """A sweep with given settings, and its resonance judged as that of a run: where the highest
+    point is unstable, again with more harmonics, a march from there tells what the blade keeps to.
     """
     scene, family = known.scene, known.families[k]
     model = family_member(family, settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, scene.accuracy)
-    in_time, richer = model_in_time(family, settings), richer_models(family, settings)
-    marks = stability_of(in_time, points, richer)
-    marks = judged_above(in_time, points, richer, marks, 0.0)
-    number = highest_lasting(heights_of(points), marks.verdict)
-    top = peak_of(points) if number is None else points[number]
-    return Answer(size(top), top.frequency, asking(model, settings, top))
+    found = judged_resonance(Marches(family), Checked(settings, points, {}), scene)
+    top, kept = found.point, found.kept
+    amplitude = kept.highest if found.contradicted and kept is not None else size(top)
+    return Answer(amplitude, top.frequency, asking(model, settings, top))
 
 
 def by_loop(settings: Settings, known: Prepared, k: int) -> Answer:

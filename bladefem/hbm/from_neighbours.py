@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from itertools import islice
 
 from ..errors import NotSolvedError
 from .frequency_walk import walk_in_frequency
@@ -47,9 +46,12 @@ def solve_from(
 
 def nearest_neighbours(points: Iterable[Solution], omega: float) -> list[Solution]:
     """The converged point that is nearest to a frequency, and the nearest on its other side."""
-    near = sorted((p for p in points if p.converged), key=lambda p: abs(p.omega - omega))
-    beyond = (p for p in near if (p.omega > omega) != (near[0].omega > omega))
-    return [*near[:1], *islice(beyond, 1)]
+    good = [p for p in points if p.converged]
+    if not good:
+        return []
+    near = min(good, key=lambda p: abs(p.omega - omega))
+    beyond = [p for p in good if (p.omega > omega) != (near.omega > omega)]
+    return [near, *([min(beyond, key=lambda p: abs(p.omega - omega))] if beyond else [])]
 
 
 def walk_from(

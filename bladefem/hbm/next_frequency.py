@@ -14,11 +14,16 @@ from .linear_resonances import free_resonances, stuck_resonances
 from .model import ReducedModel
 from .solution import Solution, size
 
-# slope of the height with the circular frequency, at a solved one
+# height of the response at a solved circular frequency, and its slope with it
+Height = Callable[[float], float]
 Slope = Callable[[float], float]
 # the same for the first look at a model without damping, whose flexibility stuck is all rounding
 # there
 OFF_RESONANCE_UNDAMPED = 1e-5
+# shares of the band, over the accuracy of maxima and of the curve: where two points are nearer,
+# what is between them is a jump
+FINEST_PEAK_STEP = 1e-4
+FINEST_CORNER_STEP = 5e-4
 # intervals of the first look at a band
 FIRST_LOOK_INTERVALS = 12
 
@@ -51,9 +56,9 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
 
 def next_frequency(
     solved: dict[float, Solution],
+    height: Height,
     slope: Slope,
     accuracy: tuple[float, float],
-    probe: int,
 ) -> float | None:
     """The next frequency to solve: a maximum that is not closed in yet, else the worst corner; None
     when done.
@@ -63,8 +68,8 @@ def next_frequency(
     omegas = np.array([w for w in tried if solved[w].converged])
     if len(omegas) < 3:
         return None
-    finest = 1e-7 * (tried[-1] - tried[0])
-    heights = np.array([size(solved[w], probe) for w in omegas])
+    finest = FINEST_PEAK_STEP * accuracy[0] * (tried[-1] - tried[0])
+    heights = np.array([height(w) for w in omegas.tolist()])
     for target in chain(
         _peak_targets(omegas, heights, slope, accuracy), _corner_targets(omegas, heights, curve)
     ):
@@ -111,7 +116,13 @@ def _next_to_peak(
         # not negative; the flatter parabola promises the larger gain
         uphill = bends[int(tilt < 0)]
         if uphill > 0 and tilt**2 / 4 >= tolerance * min(b for b in bends if b > 0):
-            return float(np.sqrt(omegas[1] ** 2 - tilt / (2 * uphill)))
+            if tilt**2 / 4 >= tolerance * uphill:
+                return float(np.sqrt(omegas[1] ** 2 - tilt / (2 * uphill)))
+            # a jump down next to the maximum, whose parabola leads there in hundreds of steps: the
+            # gap is halved, as long as the slope may gain enough in it
+            side, gap = (2, right) if tilt < 0 else (0, left)
+            if abs(tilt) * gap / 2 >= tolerance:
+                return float((omegas[1] + omegas[side]) / 2)
     return None
 
 
@@ -132,5 +143,5 @@ def _corner_targets(
             return
         left = omegas[i + 1] - omegas[i]
         right = omegas[i + 2] - omegas[i + 1]
-        if max(left, right) > 1e-5 * (omegas[-1] - omegas[0]):
+        if max(left, right) > FINEST_CORNER_STEP * curve * (omegas[-1] - omegas[0]):
             yield omegas[i + 1] + (right / 2 if right > left else -left / 2)

@@ -121,8 +121,13 @@ def _close_in_maxima(
         True where one motion a frequency is too few, so that the response has to be followed.
     """
     slope = _slope_of(model, solved, options.probe)
+
+    @cache
+    def height(omega: float) -> float:
+        return size(solved[omega], options.probe)
+
     while not (paths and _needs_continuation(model, solved, H, options.probe)):
-        wanted = next_frequency(solved, slope, accuracy, options.probe)
+        wanted = next_frequency(solved, height, slope, accuracy)
         if wanted is None:
             return False
         if len(solved) >= BAND_LIMIT:

@@ -286,6 +286,11 @@ def test_the_way_over_ripples_ends_at_another_peak():
     assert found.height == pytest.approx(1.0473e-4, rel=1e-3)
 
 
+def look(omega, height, slope):
+    """A reading of a response without its solution."""
+    return peak_module._Look(SimpleNamespace(omega=omega), height, slope, np.zeros(0))
+
+
 def test_a_point_below_a_jump_is_no_corner():
     """Readings on the shipped mistuned wheel under 50 N: 54 um where dampers stick, 198 um on the
     falling side of a peak of 263 um between them. The tangent at the lower one ends just above the
@@ -293,9 +298,26 @@ def test_a_point_below_a_jump_is_no_corner():
     """
     heights, slopes = np.array([53.979, 198.161]), np.array([0.0411, -0.0749])
     low, high = (
-        peak_module._Look(SimpleNamespace(omega=HZ * at), size, slope * size / HZ)
+        look(HZ * at, size, slope * size / HZ)
         for at, size, slope in zip((370.9535, 381.9926), heights, slopes, strict=True)
     )
     target, gain = peak_module._vertex_between(low, high, corner=True)
     # the search goes on, on the rising side of the higher one
     assert gain > 0.01 and HZ * 372 < target < HZ * 381.9
+
+
+def test_the_foot_of_a_jump_does_not_close_a_peak_in():
+    """A bouncing mass (seed 43 of benchmarks/choice_random.py): the next point is that of another
+    motion, a ninth as high. The cubic through both ended the search, at a slope by which the peak
+    was 13 % higher.
+    """
+    high, foot = look(320.21, 107.7, 1.43), look(320.63, 25.9, -3.30)
+    assert peak_module._jumps_between(high, foot)
+    target, gain = peak_module._vertex_between(high, foot, corner=False)
+    assert target == pytest.approx(320.42) and gain == pytest.approx(1.43 * 0.42 / 107.7)
+    # one mode, however far the other point is down
+    omegas = np.array([320.0, 330.0])
+    squares = 1 + (omegas - 321.0) ** 2
+    heights, slopes = squares**-0.5, -(omegas - 321.0) * squares**-1.5
+    resonance = [look(*reading) for reading in zip(omegas, heights, slopes, strict=True)]
+    assert not peak_module._jumps_between(*resonance)

@@ -109,3 +109,16 @@ def test_an_elastic_damper_of_another_load_gives_way_to_a_rigid_one(slipping, st
     rich = find_peak(flexible, enough[1].omega, 15, 1024, near=enough[1])
     assert peak.height == pytest.approx(rich.height, rel=ACCURACY)
     assert family_member(family, settings).model is (flexible if kept == "elastic" else model)
+
+
+def test_fewer_harmonics_have_to_save_enough_to_risk_a_second_curve(slipping):
+    """A flank of a small model with lift-off asked for the harmonics again, and the curve that was
+    swept twice took longer than the richest one (seed 59 of benchmarks/choice_random.py).
+    """
+    model, _ = slipping
+    family = family_of(model)
+    seven = replace(RICH, harmonics=7, samples=128)
+    assert cheaper_module._saves(family, RICH, replace(seven, samples=1024))
+    assert not cheaper_module._saves(family, seven, replace(seven, harmonics=3))
+    # samples are not asked for by flanks
+    assert cheaper_module._saves(family, seven, replace(seven, samples=64))

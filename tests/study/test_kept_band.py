@@ -9,13 +9,17 @@ import numpy as np
 import pytest
 from models import rebounding
 
+from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.ring_march import PERIODS_AT_ONCE
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
+from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
 from bladefem.hbm.time_model import time_system
+from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline import judged_resonance
+from bladefem.study.pipeline import finer_contacts, judged_resonance
 from bladefem.study.pipeline import kept_band as module
+from bladefem.study.pipeline.finer_contacts import FinerMotion, unstable_with_more_points
 from bladefem.study.pipeline.kept_band import kept_band
 from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import Stability, in_one_body
@@ -282,3 +286,62 @@ def test_fewer_points_are_marched_where_all_take_too_long(monkeypatch):
     settings = replace(first_for(3), points=32)
     assert module.kept_of_family(None, settings, None).points == 8
     assert tried == [32, 16, 8]
+
+
+def test_a_motion_that_more_contact_points_leave_is_marched_with_them(monkeypatch):
+    """Plane blades under 8 N: stable with four points a seat, with eight and more a torus, of which
+    the blade keeps between 0.9 and 1.15 of the amplitude. The verdicts on the curve, the march and
+    the point that is given say so.
+    """
+    points = [
+        SimpleNamespace(omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]))
+        for k, a in enumerate((0.5, 1.2, 0.9))
+    ]
+    for point in points:
+        point.converged = True
+    marks = Stability(np.full(3, "stable"), np.ones(3), bifurcation=np.full(3, "", dtype="<U15"))
+    models = {"model_in_time": None, "richer_models": [], "stability_of": marks}
+    for name, value in models.items():
+        monkeypatch.setattr(judged_resonance, name, lambda *_, value=value: value)
+    monkeypatch.setattr(judged_resonance, "judged_above", lambda *args: args[3])
+    finer = FinerMotion(
+        SimpleNamespace(points=8),
+        SimpleNamespace(probe=np.array([[0.0], [1.0]])),
+        Verdict(UNSTABLE, 1.03, "torus"),
+    )
+    monkeypatch.setattr(judged_resonance, "unstable_with_more_points", lambda *_: finer)
+    curve = SimpleNamespace(points=points, settings=None)
+    scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.02)
+    marches = SimpleNamespace(models=None, band=lambda *_: module.KeptBand(1.0, 0.9, 1.15, 400))
+    found = judged_resonance.judged_resonance(marches, curve, scene)
+    assert size(found.point) == pytest.approx(1.2) and not found.contradicted
+    assert found.kept.lowest == pytest.approx(1.08) and found.kept.highest == pytest.approx(1.38)
+    assert found.kept.points == 8
+    assert list(found.marks.verdict) == ["stable", UNSTABLE, "stable"]
+    assert found.marks.multiplier[1] == 1.03 and found.marks.bifurcation[1] == "torus"
+
+
+def test_stability_is_asked_of_all_contact_points_and_of_the_fewest_that_tell(monkeypatch):
+    model = reference_model(points=16, load=1.4, phase=0.0, modes=10, harmonics=31)
+    models = family_of(model)
+    settings = replace(first_for(10), points=2, harmonics=3, samples=64)
+    own = family_member(models, settings).model
+    point = solve(own, 2 * np.pi * 1200.0, 3, 64)
+    point = replace(point, states=point.states | {"slip": 1})
+    asked = []
+
+    def judged(needed):
+        def told(_models, _settings, _point, some):
+            asked.append(some.points)
+            verdict = UNSTABLE if some.points is None or some.points >= needed else STABLE
+            return FinerMotion(some, point, Verdict(verdict, 1.1))
+
+        return told
+
+    monkeypatch.setattr(finer_contacts, "_judged", judged(8))
+    found = unstable_with_more_points(models, settings, point, STABLE)
+    assert found.settings.points == 8 and found.settings.harmonics == 7
+    assert asked == [None, 4, 8]
+    monkeypatch.setattr(finer_contacts, "_judged", lambda *_: None)
+    assert unstable_with_more_points(models, settings, point, STABLE) is None
+    assert unstable_with_more_points(models, replace(settings, points=None), point, STABLE) is None

@@ -16,7 +16,11 @@ import pytest
 from bladefem.errors import NotSolvedError
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.solution import size
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver import newton as newton_module
+from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
+from bladefem.hbm.sweep import sweep
 from bladefem.study.adaptive import check_points
 from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive.check_points import peak_of
@@ -28,6 +32,9 @@ from bladefem.study.adaptive.settings import first_for
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 
 from branch_models import random_case
+
+# what a rough look solves its points with
+ROUGH = Options(tolerance=1e-6, fallbacks=False, frugal=True)
 
 
 def curve_of_seed(seed):
@@ -145,3 +152,47 @@ def _refusing(peak_from):
         return peak_from(family, old, point, new, *args, **given)
 
     return search
+
+
+def test_a_peak_search_goes_on_along_the_tangent_of_its_last_point():
+    """From the last displacements themselves Newton left the motion of a bouncing mass in steps of
+    0.13 %, 13 % below its peak, which is a fold at 328.6 rad/s, 1.218e-4 m.
+    """
+    case = random_case(43)
+    below = max(
+        (p for p in sweep(case.model, case.band, 15, 256) if p.omega < 321 and size(p) > 9e-5),
+        key=lambda p: p.omega,
+    )
+    options = Options(tolerance=1e-6)
+    found = find_peak(case.model, below.omega, 15, 256, near=below, tolerance=1e-3, options=options)
+    assert found.height > 1.16e-4 > 1.07 * size(below)
+
+
+def test_a_sweep_of_one_motion_is_not_lost_next_to_a_jump():
+    """The parabola between a maximum and the foot of a jump led uphill in steps of a hundred
+    thousandth of the band: 400 points for a rough look.
+    """
+    case = random_case(57)
+    points = list(
+        sweep(case.model, case.band, 1, 64, peak=1e-2, curve=0.2, paths=False, options=ROUGH)
+    )
+    # measured 54; with 1e-3 and 2 % of the curve 100
+    assert len(points) < 80
+    assert size(peak_of(points)) > 2.85e-5
+
+
+def test_a_damper_that_may_walk_is_looked_for_by_the_residual():
+    """Lowering the step leads to no walk and takes all its iterations each time: 270 ms a point."""
+    case = random_case(34)
+    taken = []
+
+    def counted(balance, w, options=ROUGH, merit="step"):
+        taken.append((balance.walk is not None, merit))
+        return newton_module_run(balance, w, options, merit)
+
+    newton_module_run = newton_module.newton_as_given
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(newton_module, "newton_as_given", counted)
+        point = solve(case.model, 362.5, 1, 64, options=ROUGH)
+    assert point.converged
+    assert (True, "residual") in taken and (True, "step") not in taken

@@ -124,7 +124,12 @@ def test_an_error_that_another_respect_brings_out_is_refined_as_well(monkeypatch
     """
     model = reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31)
     one = family_of(model)
-    family = replace(one, dampers=("rigid", "elastic"))
+
+    def with_own_damper(settings):
+        member = one.build(settings)
+        return replace(member, model=replace(member.model))
+
+    family = replace(one, build=with_own_damper, dampers=("rigid", "elastic"))
     settings = replace(first_for(family.modes, dampers=True), harmonics=3, samples=128)
 
     def found(family, old, point, new, accuracy, fallbacks=True):
@@ -182,10 +187,67 @@ def test_more_harmonics_start_from_the_peak_that_judged_them():
 
 def test_a_damper_that_comes_off_is_tried_with_several_points_and_harmonics():
     first = first_for(10)
-    start = resonance_choice.settings_of_lift_off(first)
+    top = SimpleNamespace(w=np.zeros((8, 3, 3)))
+    start = resonance_choice.settings_of_lift_off(first, top)
     assert start.harmonics == 3 and start.points == resonance_choice.LIFTING_POINTS
     given = replace(first, chosen=("harmonics", "samples"))
-    assert resonance_choice.settings_of_lift_off(given).points == first.points
+    start = resonance_choice.settings_of_lift_off(given, top)
+    assert start.points == first.points and start.harmonics == 3
+    # a small balance is tried with more at once: a second curve would take longer
+    small = SimpleNamespace(w=np.zeros((2, 2, 3)))
+    start = resonance_choice.settings_of_lift_off(given, small)
+    assert (start.harmonics, start.samples) == (7, 256)
+    few = replace(given, most=5)
+    assert resonance_choice.settings_of_lift_off(few, small).harmonics == 5
+
+
+def test_a_richer_model_of_the_same_equations_tells_no_error(monkeypatch):
+    """Modes that a family does not know differed by what a search for a peak had left: 9 % on a
+    bouncing mass.
+    """
+    model = reference_model(points=1, load=1.4, phase=0.7, modes=10, harmonics=31)
+    family = Family(lambda _: Member(model, np.arange(2)), 10)
+    asked = []
+
+    def known(family, old, point, new, accuracy, fallbacks=True):
+        asked.append(new)
+        return peak_of_settings(replace(new, points=1))
+
+    monkeypatch.setattr(resonance_choice, "peak_from", known)
+    settings = replace(first_for(10), points=1)
+    errors = resonance_choice.peak_errors(family, settings, peak_of_settings(settings), 0.05)
+    assert errors.height["modes"] == 0 < errors.height["harmonics"]
+    assert all(s.modes == settings.modes for s in asked)
+
+
+def test_harmonics_that_lift_off_has_changed_are_judged_again(monkeypatch):
+    """An error that could not be told with one harmonic is none of the seven that most contacts in
+    the air asked for (seed 57 of benchmarks/choice_random.py).
+    """
+    model = reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31)
+    family = family_of(model)
+    judged = []
+
+    def told(family, settings, peak, accuracy, known):
+        judged.append((settings.harmonics, dict(known)))
+        far = {"harmonics": np.inf, "samples": 1.0} if len(judged) == 1 else {"samples": 0.0}
+        changes = dict.fromkeys(resonance_choice.DIRECTIONS, 0.0) | far
+        return resonance_choice.PeakErrors(changes, changes)
+
+    closed = {"stick": 8, "slip": 6, "lift": 2, "open": 0}
+    lifted = {"stick": 0, "slip": 0, "lift": 16, "open": 0}
+    shape = SimpleNamespace(w=np.zeros((16, 1, 3)), states=closed)
+    top = KnownPeak(1.0, 100.0, shape)
+    monkeypatch.setattr(resonance_choice, "peak_errors", told)
+    monkeypatch.setattr(
+        resonance_choice,
+        "peak_from",
+        lambda *given, **options: replace(top, solution=SimpleNamespace(w=shape.w, states=lifted)),
+    )
+    settings = replace(first_for(family.modes), points=8)
+    resonance_choice.choose_at_peak(family, settings, top, 0.02)
+    assert judged[0] == (1, {})
+    assert judged[1][0] == 7 and "harmonics" not in judged[1][1]
 
 
 def test_an_error_stays_known_where_the_richer_model_is_not_solved_any_more(judged):
@@ -258,3 +320,32 @@ def test_few_contacts_that_lift_leave_the_judge_four_times_the_harmonics(monkeyp
     peak = KnownPeak(1.0, 100.0, point)
     errors = resonance_choice.peak_errors(family, settings, peak, 0.05)
     assert errors.height["harmonics"] == pytest.approx(1 / (1 - height) - 1)
+
+
+def test_a_choice_for_a_fine_accuracy_begins_with_what_it_mostly_ends_at(monkeypatch):
+    """Climbing there took three quarters of the time of small models; where contacts stick, and
+    where settings hold already, nothing is taken.
+    """
+    model = reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31)
+    family = family_of(model)
+    begun = []
+
+    def told(family, settings, peak, accuracy, known):
+        begun.append(settings)
+        return resonance_choice.PeakErrors(*[dict.fromkeys(resonance_choice.DIRECTIONS, 0.0)] * 2)
+
+    monkeypatch.setattr(resonance_choice, "peak_errors", told)
+    monkeypatch.setattr(resonance_choice, "peak_from", lambda *given, **options: peak_with(1, 1.0))
+    monkeypatch.setattr(resonance_choice, "sticks_safely", lambda model, point: False)
+    first = first_for(family.modes)
+    for settings, accuracy in (
+        (first, 1e-3),
+        (first, 0.02),
+        (replace(first, error=1e-4), 1e-3),
+        (replace(first, chosen=("samples",)), 1e-3),
+    ):
+        resonance_choice.choose_at_peak(family, settings, peak_with(1, 1.0), accuracy)
+    assert [(s.harmonics, s.samples) for s in begun] == [(7, 256), (1, 64), (1, 64), (1, 256)]
+    monkeypatch.setattr(resonance_choice, "sticks_safely", lambda model, point: True)
+    resonance_choice.choose_at_peak(family, first, peak_with(1, 1.0), 1e-3)
+    assert begun[-1].harmonics == 1

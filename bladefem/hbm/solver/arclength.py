@@ -109,8 +109,8 @@ class Spot:
 
 def _product(one: np.ndarray, other: np.ndarray) -> float:
     """Scalar product of two displacements (n, d, K) by which lengths and angles are measured."""
-    whole = np.sum(one * other)
-    return float(whole - (1 - MEAN_WEIGHT) * np.sum(one[:, :, 0] * other[:, :, 0]))
+    means = np.vdot(one[:, :, 0], other[:, :, 0])
+    return float(np.vdot(one, other) - (1 - MEAN_WEIGHT) * means)
 
 
 def path_distance(one: np.ndarray, other: np.ndarray) -> float:

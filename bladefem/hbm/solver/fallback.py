@@ -97,7 +97,8 @@ def _newton_attempts(
     merits = NEWTON_MERITS if compiled else NEWTON_MERITS[::-1]
     by_start = compiled or balance.model.series is not None
     for w, (method, merit) in _runs_in_order(starts, merits, by_start, options.fallbacks):
-        yield Attempt(method, newton(balance, w, options, merit))
+        walks = merit == merits[0][1]
+        yield Attempt(method, newton(balance, w, options, merit, walks or not compiled))
 
 
 def _runs_in_order(

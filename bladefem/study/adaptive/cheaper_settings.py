@@ -26,6 +26,10 @@ from .settings import DAMPER_MODELS, FIRST_SETTINGS, Settings
 CURVE_POINTS = 40
 # points that the peak of a poorer model takes
 PEAK_POINTS = 5
+# of the time of a curve: what fewer harmonics have to save
+LEAST_SAVED_SHARE = 0.25
+# operations in the time that Python takes for a Newton step: 0.2 ms, where an operation takes 1 ns
+PYTHON_OPERATIONS = 2e5
 # how many times larger the error of a respect becomes by one step back, roughly: by half the
 # harmonics, or half the samples or points, whose errors are of second order
 ERROR_GROWTH = {"harmonics": 8.0, "samples": 4.0, "points": 4.0, "damper": 1.0}
@@ -93,10 +97,15 @@ def _one_step_back(family: Family, settings: Settings, name: str) -> Settings | 
 
 
 def _saves(family: Family, settings: Settings, poorer: Settings) -> bool:
-    """The curve saves more with poorer settings than their peak takes."""
+    """The curve saves more with poorer settings than their peak takes; with fewer harmonics enough
+    to risk that a flank asks for more, with which it is swept again.
+    """
     before = _point_cost(family, settings)
     after = _point_cost(family, poorer)
-    return CURVE_POINTS * (before - after) > PEAK_POINTS * after
+    saved = CURVE_POINTS * (before - after)
+    risked = LEAST_SAVED_SHARE * CURVE_POINTS * (before + PYTHON_OPERATIONS)
+    fewer = poorer.harmonics < settings.harmonics
+    return saved > max(PEAK_POINTS * after, risked if fewer else 0.0)
 
 
 def _point_cost(family: Family, settings: Settings) -> float:

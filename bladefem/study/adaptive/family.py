@@ -60,6 +60,15 @@ def family_member(family: Family, settings: Settings) -> Member:
     return replace(member, model=softened_layer(member.model))
 
 
+def same_equations(family: Family, one: Settings, other: Settings) -> bool:
+    """Two settings give the same model, harmonics and samples: what differs, this family lacks."""
+    return (
+        one.harmonics == other.harmonics
+        and one.samples == other.samples
+        and family_member(family, one).model is family_member(family, other).model
+    )
+
+
 def lowest_harmonics(family: Family, settings: Settings) -> int:
     """Highest harmonic of the excitation and of prescribed normal loads: no balance has fewer."""
     model = family_member(family, settings).model

@@ -155,7 +155,7 @@ def _parts(errors: PeakErrors | None) -> Mapping[str, float]:
 def _suited_to_lift_off(family: Family, settings: Settings, top: Solution) -> Settings:
     """Settings for contacts that lift off at the resonance, where they do."""
     softer = softened_where_lifting(family, settings, top)
-    return settings_of_lift_off(softer) if lifts_off_widely(settings, top) else softer
+    return settings_of_lift_off(softer, top) if lifts_off_widely(settings, top) else softer
 
 
 def _swept(

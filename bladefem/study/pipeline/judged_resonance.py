@@ -9,13 +9,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...hbm.solution import Solution, size
-from ...hbm.stability import UNSTABLE
+from ...hbm.stability import UNSTABLE, Verdict
 from ...scene.tables import Scene
 from ...util.arrays import RealArray
 from ..adaptive.check_points import heights_of
 from ..adaptive.choice import Checked, estimated_errors
 from ..adaptive.choice_in_time import MarchedBand
+from ..adaptive.settings import Settings
 from .error_in_time import Marches, error_in_time
+from .finer_contacts import FinerMotion, unstable_with_more_points
 from .highest_stable import highest_lasting
 from .kept_band import KeptBand, kept_of_family
 from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
@@ -37,7 +39,8 @@ class JudgedResonance:
 def judged_resonance(
     marches: Marches, curve: Checked, scene: Scene, sought: bool = False
 ) -> JudgedResonance:
-    """Judge a curve, and march from its highest point where that is unstable.
+    """Judge a curve, and march from its highest point where that is unstable, be it with more
+    contact points than the curve has.
 
     That one gives way to the highest that was judged and is not, where the blade is known to keep
     to less than that: else the blade moves most next to the unstable one.
@@ -56,11 +59,16 @@ def judged_resonance(
     model = model_in_time(models, settings)
     richer = richer_models(models, settings)
     marks = stability_of(model, curve.points, richer)
-    if marks.verdict[place] != UNSTABLE or sought:
+    if sought:
         return JudgedResonance(highest, marks)
-    kept = marches.band(settings, highest)
-    if kept is None or kept.too_long:
-        kept = kept_of_family(models, settings, highest)
+    if marks.verdict[place] == UNSTABLE:
+        kept = _marched(marches, settings, highest)
+    else:
+        finer = unstable_with_more_points(models, settings, highest, marks.verdict[place])
+        if finer is None:
+            return JudgedResonance(highest, marks)
+        marks = _with_verdict(marks, place, finer.verdict)
+        kept = _scaled(_marched(marches, finer.settings, finer.motion), finer, highest)
     if kept.reason or kept.holds(size(highest), scene.accuracy):
         return JudgedResonance(highest, marks, kept, _contradicts(kept, highest, scene.accuracy))
     marks = judged_above(model, curve.points, richer, marks, kept.highest)
@@ -68,6 +76,30 @@ def judged_resonance(
     if lower is None or heights[lower] <= kept.highest:
         return JudgedResonance(highest, marks, kept, _contradicts(kept, highest, scene.accuracy))
     return JudgedResonance(curve.points[lower], marks, kept)
+
+
+def _marched(marches: Marches, settings: Settings, point: Solution) -> KeptBand:
+    """What the blade keeps to after an unstable motion."""
+    kept = marches.band(settings, point)
+    if kept is None or kept.too_long:
+        kept = kept_of_family(marches.models, settings, point)
+    return kept
+
+
+def _scaled(kept: KeptBand, finer: FinerMotion, point: Solution) -> KeptBand:
+    """A band marched with more contact points, over the amplitude with the fewer ones."""
+    ratio = size(point) / size(finer.motion)
+    points = finer.settings.points if kept.points is None else kept.points
+    return replace(kept, lowest=ratio * kept.lowest, highest=ratio * kept.highest, points=points)
+
+
+def _with_verdict(marks: Stability, place: int, told: Verdict) -> Stability:
+    """The verdicts on a curve with another one at a point."""
+    verdict, multiplier = marks.verdict.astype("<U15"), marks.multiplier.copy()
+    bifurcation = marks.bifurcation.copy()
+    verdict[place], multiplier[place] = told.verdict, told.multiplier
+    bifurcation[place] = told.bifurcation
+    return replace(marks, verdict=verdict, multiplier=multiplier, bifurcation=bifurcation)
 
 
 def _contradicts(kept: KeptBand, top: Solution, accuracy: float) -> bool:
