@@ -112,34 +112,35 @@ def _stresses(
     cases: Sequence[LoadCase],
 ) -> dict[int, DampedStress]:
     """The stress at the lowest resonance and at that of the damper's own load, by number of the
-    curve; on rank 0, whose bodies share one factorisation over the nodal diameters.
+    curve: one on each rank where a rank has the bodies for itself, which share one factorisation
+    over the nodal diameters; else both on rank 0.
     """
     own = before.contact.own
     wanted = {min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)}
     if own is not None:
         wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
 
-    def compute() -> dict[int, DampedStress]:
+    def stress(k: int) -> DampedStress:
         alone = bodies.alone
-        factorised = lru_cache(maxsize=None)(alone.factorised)
-        found = {}
-        for k in sorted(wanted):
-            settings = curves[k].settings
-            reduced = with_damper_mass(before.reduced, cases[k].mass)
-            damper = rigid_body(before.scene, before.mesh, reduced, patches, settings.damper)
-            found[k] = damped_stress(
-                alone,
-                patches,
-                before.modes,
-                cases[k],
-                curves[k].peak,
-                settings.points,
-                factorised,
-                damper,
-            )
-        return found
+        settings = curves[k].settings
+        reduced = with_damper_mass(before.reduced, cases[k].mass)
+        return damped_stress(
+            alone,
+            patches,
+            before.modes,
+            cases[k],
+            curves[k].peak,
+            settings.points,
+            lru_cache(maxsize=None)(alone.factorised),
+            rigid_body(before.scene, before.mesh, reduced, patches, settings.damper),
+        )
 
-    return on_root(bodies.comm, compute)
+    numbers = sorted(wanted)
+    if bodies.ranks_of_sector == 1:
+        found = share_work(stress, numbers, bodies.comm)
+    else:
+        found = on_root(bodies.comm, lambda: [stress(k) for k in numbers])
+    return dict(zip(numbers, found, strict=True))
 
 
 def _load_responses(
