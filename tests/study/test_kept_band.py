@@ -193,6 +193,8 @@ PERIODS = np.arange(200)
         (0.9 + 0.1 * np.exp(-PERIODS / 12), 100),
         # leaves the unstable motion slowly: a hundred thousandth first, more with each period
         (1.0 - 1e-5 * np.exp(PERIODS / 23), 200),
+        # a slow ripple that widens, as seen by chance at the same phase of it
+        (1.0 + 1e-4 * np.exp(0.02 * PERIODS) * np.cos(2 * np.pi * PERIODS / 25.5), 200),
         # goes on falling by a thousandth a period
         (1.0 - 1e-3 * PERIODS, 200),
     ],
