@@ -225,12 +225,16 @@ def _split_bodies(
         for name, some in rows.items()
         if some.size and not np.isin(some, damper).any()
     }
+    whole = {}
+    if solids.whole is not None:
+        whole = {"blade": solids.whole[blade], "damper": solids.whole[damper]}
     return Mesh(
         solids.points,
         solids.cell_type,
         {n: _positive_cells(solids.points, c, solids.cell_type, source) for n, c in bodies.items()},
         parts=parts,
         numbers=padded_numbers(raw.numbers, len(solids.points)),
+        whole={name: whole[name] for name in bodies if name in whole},
     )
 
 
@@ -297,6 +301,7 @@ def _with_faces(
         mesh,
         points=points,
         bodies={n: number[c] for n, c in mesh.bodies.items()},
+        whole={n: np.where(c < 0, -1, number[c]) for n, c in mesh.whole.items()},
         nodes=sets,
         faces={n: outward_faces(points, cells, mesh.cell_type, f) for n, f in faces.items()},
     )

@@ -78,6 +78,10 @@ class Mesh:
     parts: dict[str, IntegerArray] = field(default_factory=dict)
     # (n,) numbers of the nodes in the user's file, NO_NUMBER of added ones; None without such
     numbers: IntegerArray | None = None
+    # name of a body -> (nc, 27) nodes of the cell of another shape that each of its tetrahedra is a
+    # piece of, second order in gmsh's order, -1 beyond its own (10, 14, 18 or 27). Such a body is
+    # solved with the cells themselves; its tetrahedra serve for all that is done to results.
+    whole: dict[str, IntegerArray] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         bodies = ", ".join(f"{name} {len(cells)} cells" for name, cells in self.bodies.items())
@@ -90,6 +94,17 @@ class Mesh:
     def dimension(self) -> int:
         """2 for plane meshes, 3 for solids."""
         return 2 if self.cell_type.startswith(("triangle", "quad")) else 3
+
+
+def chosen_whole(mesh: Mesh, rows: dict[str, tuple[str, IntegerArray]]) -> dict[str, IntegerArray]:
+    """What `Mesh.whole` is of bodies made of rows of others.
+
+    Args:
+        rows: name of a new body -> name of the old one, and which of its cells (numbers, or true).
+    """
+    return {
+        name: mesh.whole[old][chosen] for name, (old, chosen) in rows.items() if old in mesh.whole
+    }
 
 
 def padded_numbers(numbers: IntegerArray | None, count: int) -> IntegerArray | None:

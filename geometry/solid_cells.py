@@ -2,7 +2,7 @@
 
 Second order is the rule here: linear solids are far too stiff in bending (a blade of linear
 tetrahedra vibrates at more than twice its frequency). Serendipity cells get the nodes in the middle
-of their faces, mixed shapes become tetrahedra.
+of their faces. Mixed shapes become tetrahedra, of which each knows the cell that it is a piece of.
 """
 
 from __future__ import annotations
@@ -37,6 +37,9 @@ class SolidCells:
     row: IntegerArray
     # what was done to the cells, one sentence each
     notes: tuple[str, ...]
+    # (nc, 27) nodes of the second-order cell that each one is a piece of, -1 beyond its own; None
+    # where cells are what they were
+    whole: IntegerArray | None = None
 
 
 def solid_cells(
@@ -68,6 +71,7 @@ def solid_cells(
         )
     points, blocks, notes = _of_wanted_order(raw.points, blocks, linear, source)
     words = {word for word, _ in blocks}
+    whole: IntegerArray | None = None
     owner = [np.repeat(b, len(cells)) for b, (_, cells) in zip(chosen, blocks, strict=True)]
     row = [np.arange(len(cells)) for _, cells in blocks]
     if len(words) > 1 or (top == 3 and not words <= {"tetra", "tetra10", *_HEXAHEDRA}):
@@ -76,10 +80,17 @@ def solid_cells(
                 f"imported.file = '{source}': cells are {' and '.join(sorted(words))}, expected "
                 "triangles or quadrilaterals, not both"
             )
-        notes += (f"{_count_text(blocks)} were split into tetrahedra: shapes are mixed",)
         rank = vertex_order(points, axis)
         parts = [split_cells(word, cells, rank, points) for word, cells in blocks]
         quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word in words)
+        if quadratic:
+            whole = _padded_cells(blocks, [rows for _, rows in parts])
+            notes += (
+                f"{_count_text(blocks)} are solved as they are; contacts, stresses and pictures "
+                "see them split into tetrahedra",
+            )
+        else:
+            notes += (f"{_count_text(blocks)} were split into tetrahedra: shapes are mixed",)
         words = {"tetra10" if quadratic else "tetra"}
         blocks = [("tetra", cells) for cells, _ in parts]
         owner = [some[rows] for some, (_, rows) in zip(owner, parts, strict=True)]
@@ -94,7 +105,21 @@ def solid_cells(
         np.concatenate(owner),
         np.concatenate(row),
         notes,
+        whole,
     )
+
+
+def _padded_cells(
+    blocks: list[tuple[str, np.ndarray]],
+    rows: list[np.ndarray],
+) -> IntegerArray:
+    """(sum of all rows, 27) chosen rows of each block, -1 beyond a cell's nodes."""
+    width = NODES["hexahedron27"]
+    padded = [
+        np.pad(cells, [(0, 0), (0, width - cells.shape[1])], constant_values=-1)[some]
+        for (_, cells), some in zip(blocks, rows, strict=True)
+    ]
+    return np.vstack(padded)
 
 
 _HEXAHEDRA = ("hexahedron", "hexahedron27")

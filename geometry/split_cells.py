@@ -1,6 +1,7 @@
 """Hexahedra, wedges and pyramids split into tetrahedra that conform across all faces.
 
-dolfinx 0.5 to 0.11 assembles meshes of one cell shape; a mixed mesh becomes tetrahedra. Each cell
+Contacts, stresses and pictures know meshes of one cell shape; for them a mixed mesh is one of
+tetrahedra, and one of first order is solved so, too. Each cell
 is a cone from its first vertex in a global order over the faces that do not touch that vertex, and
 each quadrilateral is split through its own first vertex (Dompierre et al., How to subdivide
 pyramids, prisms and hexahedra into tetrahedra, 8th Int. Meshing Roundtable 1999). The order is by

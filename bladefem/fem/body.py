@@ -4,10 +4,12 @@ mesh's numbers.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 
 from geometry.mesh import Mesh
 
@@ -29,6 +31,7 @@ from .compat import (
 )
 from .elasticity import Law, elastic_law
 from .memory import MemoryPlan, check_memory
+from .mixed_cells import pieces_of_one_shape, spread_matrix
 from .temperature import (
     Temperatures,
     cell_temperatures,
@@ -75,12 +78,32 @@ class Body:
     heat: Temperatures | None = None
     # where factors are kept
     plan: MemoryPlan = IN_MEMORY
+    # of a mesh of mixed shapes: what its integrals are over; none where ``space`` has the cells
+    pieces: tuple[Piece, ...] = ()
 
     @property
     def scalar_rows(self) -> np.ndarray:
         """(n_points*dim,) PETSc row of each displacement in mesh numbering, -1 outside the body."""
         rows = self.dim * self.rows[:, None] + np.arange(self.dim)
         return np.where(self.rows[:, None] < 0, -1, rows).ravel()
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Cells of one shape of a body of mixed shapes."""
+
+    # each cell on nodes of its own; its matrices are given back, their sum is in the whole body's
+    body: Body
+    # (points of its mesh, points of the whole mesh) interpolates fields onto its nodes
+    spread: sp.csr_matrix
+
+    def onto(self, u: np.ndarray) -> np.ndarray:
+        """(points of its mesh, dim) of a field (n_points, dim)."""
+        return np.asarray(self.spread @ u)
+
+    def back(self, force: np.ndarray) -> np.ndarray:
+        """(n_points*dim,) of nodal forces (points of its mesh * dim,)."""
+        return np.asarray(self.spread.T @ force.reshape(-1, self.body.dim)).ravel()
 
 
 def assemble(
@@ -110,28 +133,45 @@ def assemble(
     """
     names = (name,) if isinstance(name, str) else tuple(name)
     materials = material if isinstance(material, dict) else dict.fromkeys(names, material)
-    cells, used, local = _check_cells(mesh, names, materials)
     comm = comm or MPI.COMM_WORLD
-    dim = mesh.dimension
+    own = _check_materials(mesh, names, materials)
     if heat is not None and plane == "strain":
         raise InputError("temperature: not known in plane strain, expected plane stress or a solid")
-    plan = check_memory(dim * len(used), comm)
-    domain, origin = build_mesh(comm, mesh.cell_type, local, mesh.points[used, :dim])
+    _check_cell_type(mesh)
+    nodes = np.unique(np.concatenate([mesh.bodies[n] for n in names]))
+    plan = check_memory(mesh.dimension * len(nodes), comm)
+    return replace(_assemble_bodies(mesh, own, comm, plane, quadrature, heat), plan=plan)
+
+
+def _assemble_bodies(
+    mesh: Mesh,
+    materials: dict[str, Material],
+    comm: MPI.Comm,
+    plane: str,
+    quadrature: str,
+    heat: Temperatures | None,
+    piece: bool = False,
+) -> Body:
+    """The bodies that have materials.
+
+    Args:
+        piece: the mesh is a piece of one of mixed shapes, whose cells share no nodes.
+    """
+    cells, used, local = _check_cells(mesh, tuple(materials))
+    places = mesh.points[used, : mesh.dimension]
+    domain, origin = build_mesh(comm, mesh.cell_type, local, places, cut=not piece)
     space = vector_space(domain, CELLS[mesh.cell_type][1])
-    own = {n: materials[n] for n in names}
-    stiff, mass = degrees(mesh, cells, quadrature, heat)
-    law, rho, depth = properties(mesh, own, domain, plane, heat, (stiff, mass))
-    u = ufl.TrialFunction(space)
-    v = ufl.TestFunction(space)
-    energy = depth * ufl.inner(law(ufl.sym(ufl.grad(u))), ufl.sym(ufl.grad(v)))
-    K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
-    M = _mass_matrix(space, CELLS[mesh.cell_type][1], depth * rho, mass)
     rows = _block_rows(mesh, space, used[local], origin, comm)
+    pieces: tuple[Piece, ...] = ()
+    if any(n in mesh.whole for n in materials):
+        K, M, pieces = _sum_of_pieces(mesh, materials, (space, rows), quadrature, heat)
+    else:
+        K, M = _matrices(mesh, materials, (space, cells), plane, quadrature, heat)
     return Body(
         mesh,
-        " + ".join(names),
-        own,
-        dim,
+        " + ".join(materials),
+        materials,
+        mesh.dimension,
         K,
         M,
         rows,
@@ -139,8 +179,91 @@ def assemble(
         plane,
         comm,
         heat=heat,
-        plan=plan,
+        pieces=pieces,
     )
+
+
+def _matrices(
+    mesh: Mesh,
+    materials: dict[str, Material],
+    where: tuple[Any, np.ndarray],
+    plane: str,
+    quadrature: str,
+    heat: Temperatures | None,
+) -> tuple[PETSc.Mat, PETSc.Mat]:
+    """Stiffness and mass of cells of one shape.
+
+    Args:
+        where: the space of the displacements, and all cells (nc, k).
+    """
+    space, cells = where
+    stiff, mass = degrees(mesh, cells, quadrature, heat)
+    law, rho, depth = properties(mesh, materials, space.mesh, plane, heat, (stiff, mass))
+    u = ufl.TrialFunction(space)
+    v = ufl.TestFunction(space)
+    energy = depth * ufl.inner(law(ufl.sym(ufl.grad(u))), ufl.sym(ufl.grad(v)))
+    K = assemble_matrix(energy * ufl.dx(metadata={"quadrature_degree": stiff}))
+    return K, _mass_matrix(space, CELLS[mesh.cell_type][1], depth * rho, mass)
+
+
+def _sum_of_pieces(
+    mesh: Mesh,
+    materials: dict[str, Material],
+    layout: tuple[Any, np.ndarray],
+    quadrature: str,
+    heat: Temperatures | None,
+) -> tuple[PETSc.Mat, PETSc.Mat, tuple[Piece, ...]]:
+    """Stiffness and mass of a body of mixed shapes, and what they were summed from.
+
+    Args:
+        layout: the space whose rows the matrices have, and the row of each point.
+    """
+    space, _ = layout
+    pieces = []
+    total: list[PETSc.Mat] = []
+    for part, spread in pieces_of_one_shape(mesh, tuple(materials)):
+        own = {name: materials[name] for name in part.bodies}
+        warm = None if heat is None else replace(heat, nodal=np.asarray(spread @ heat.nodal))
+        comm = space.mesh.comm
+        body = _assemble_bodies(part, own, comm, "stress", quadrature, warm, piece=True)
+        piece = Piece(body, spread)
+        gathered = [_gathered(piece, layout, matrix) for matrix in (body.K, body.M)]
+        total = (
+            gathered if not total else [_added(*both) for both in zip(total, gathered, strict=True)]
+        )
+        pieces.append(piece)
+    K, M = total
+    return K, M, tuple(pieces)
+
+
+def sum_matrices(body: Body, matrices: Iterable[PETSc.Mat]) -> PETSc.Mat:
+    """The matrix of a body of mixed shapes from those of its pieces, which are destroyed."""
+    total = None
+    for piece, matrix in zip(body.pieces, matrices, strict=True):
+        part = _gathered(piece, (body.space, body.rows), matrix)
+        total = part if total is None else _added(total, part)
+    return total
+
+
+def _gathered(piece: Piece, layout: tuple[Any, np.ndarray], matrix: PETSc.Mat) -> PETSc.Mat:
+    """A piece's matrix on the rows of the whole body; the given one is destroyed."""
+    space, rows = layout
+    index_map = space.dofmap.index_map
+    dim = piece.body.dim
+    size = (dim * index_map.size_local, dim * index_map.size_global)
+    spread = spread_matrix(piece.spread, rows, piece.body.rows, matrix, size)
+    out = matrix.ptap(spread)
+    out.setBlockSize(dim)
+    spread.destroy()
+    matrix.destroy()
+    return out
+
+
+def _added(total: PETSc.Mat, more: PETSc.Mat) -> PETSc.Mat:
+    """The sum, in the place of both."""
+    total.axpy(1.0, more, structure=PETSc.Mat.Structure.DIFFERENT_NONZERO_PATTERN)
+    more.destroy()
+    return total
 
 
 def _mass_matrix(
@@ -208,24 +331,35 @@ def rigid_modes(body: Body) -> np.ndarray:
     return np.stack(moves, axis=2)
 
 
-def _check_cells(
+def _check_materials(
     mesh: Mesh,
     names: tuple[str, ...],
     materials: dict[str, Material],
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells, their node numbers without gaps, and the cells in these; everything that can be wrong
-    is found here.
-    """
+) -> dict[str, Material]:
+    """The material of each body named."""
     for n in names:
         if n not in mesh.bodies:
             raise InputError(f"the mesh has no body '{n}'{suggestion(n, mesh.bodies)}")
         if n not in materials:
             raise InputError(f"body '{n}' has no material{suggestion(n, materials)}")
+    return {n: materials[n] for n in names}
+
+
+def _check_cell_type(mesh: Mesh) -> None:
     if mesh.cell_type not in CELLS:
         raise InputError(
             f"elements of type '{mesh.cell_type}' are not "
             f"supported{suggestion(mesh.cell_type, CELLS)}"
         )
+
+
+def _check_cells(
+    mesh: Mesh,
+    names: tuple[str, ...],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells, their node numbers without gaps, and the cells in these; everything that can be wrong
+    with them is found here.
+    """
     cells = np.concatenate([mesh.bodies[n] for n in names])
     if not np.isfinite(mesh.points[cells]).all():
         raise InputError("the mesh has nodes whose coordinates are not finite numbers")

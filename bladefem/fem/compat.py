@@ -106,6 +106,7 @@ def build_mesh(
     cell_type: str,
     cells: np.ndarray,
     points: np.ndarray,
+    cut: bool = True,
 ) -> tuple[Any, np.ndarray]:
     """A distributed dolfinx mesh, and for each cell of this rank the row of ``cells`` that it came
     from.
@@ -113,23 +114,39 @@ def build_mesh(
     Args:
         cells: (nc, k) numbers into points, gmsh's order in the element, the same on every rank.
         points: (n, gdim) [m], the same on every rank.
+        cut: cells go to ranks so that few nodes are shared; else in their order, as cells without
+            common faces must: the partitioner of dolfinx 0.5 does not end on these.
     """
     shape, degree = CELLS[cell_type]
     permutation = dolfinx.cpp.io.perm_gmsh(dolfinx.cpp.mesh.to_type(shape), cells.shape[1])
     mine = np.array_split(cells[:, permutation], comm.size)[comm.rank].astype(np.int64)
     x = np.array_split(points, comm.size)[comm.rank]
     gdim = points.shape[1]
+    how = {} if cut or comm.size == 1 else {"partitioner": _stay(len(mine), comm.rank)}
     if hasattr(ufl, "VectorElement"):
         domain = ufl.Mesh(
             ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=gdim), degree)
         )
-        mesh = dolfinx.mesh.create_mesh(comm, mine, x, domain)
+        mesh = dolfinx.mesh.create_mesh(comm, mine, x, domain, **how)
     else:
         import basix.ufl
 
         domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, degree, shape=(gdim,)))
-        mesh = dolfinx.mesh.create_mesh(comm, cells=mine, x=np.ascontiguousarray(x), e=domain)
+        x = np.ascontiguousarray(x)
+        mesh = dolfinx.mesh.create_mesh(comm, cells=mine, x=x, e=domain, **how)
     return mesh, np.asarray(mesh.topology.original_cell_index)
+
+
+def _stay(count: int, rank: int) -> Callable[..., Any]:
+    """A partitioner that leaves this rank's cells where they are."""
+    where = np.full((count, 1), rank, np.int32)
+
+    def destinations(*_: Any) -> Any:
+        make = getattr(dolfinx.graph, "adjacencylist", None) or dolfinx.graph.create_adjacencylist
+        made = make(where)
+        return getattr(made, "_cpp_object", made)
+
+    return destinations
 
 
 def vector_space(mesh: Any, degree: int) -> Any:

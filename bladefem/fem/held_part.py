@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, chosen_whole
 
 from ..errors import InputError
 from .body import Body
@@ -70,7 +70,9 @@ def part_above(mesh: Mesh, root: float, body: str = "blade") -> tuple[Mesh, np.n
     """
     tolerance = 1e-9
     cells = mesh.bodies[body]
-    above = (mesh.points[cells, 0] > root + tolerance).any(axis=1)
+    # of a cell that is there in pieces all of them or none
+    reach = mesh.whole.get(body, cells)
+    above = ((mesh.points[reach, 0] > root + tolerance) & (reach >= 0)).any(axis=1)
     part = cells[above]
     if not len(part):
         raise InputError(f"the mesh has no part above its root at x = {root:.6g} m")
@@ -78,7 +80,8 @@ def part_above(mesh: Mesh, root: float, body: str = "blade") -> tuple[Mesh, np.n
     held = nodes[mesh.points[nodes, 0] <= root + tolerance]
     row = np.cumsum(above) - 1
     volumes = {name: row[rows[above[rows]]] for name, rows in mesh.parts.items()}
-    return replace(mesh, bodies={body: part}, parts=volumes), held
+    whole = chosen_whole(mesh, {body: (body, above)})
+    return replace(mesh, bodies={body: part}, parts=volumes, whole=whole), held
 
 
 def held_part(

@@ -36,6 +36,8 @@ def body_volume(mesh: Mesh, name: str) -> float:
 
 def body_mass(body: Body) -> float:
     """Mass of a body [kg]."""
+    if body.pieces:
+        return sum(body_mass(piece.body) for piece in body.pieces)
     total = 0.0
     for name, material in body.material.items():
         cells = body.mesh.bodies[name]
@@ -57,6 +59,9 @@ def centrifugal(
         speed: [rad/s].
         axis, centre: direction of the axis and a point on it [m].
     """
+    if body.pieces:
+        parts = [piece.back(centrifugal(piece.body, speed, axis, centre)) for piece in body.pieces]
+        return np.asarray(sum(parts))
     unit = np.asarray(axis, float) / np.linalg.norm(axis)
     across = np.eye(3) - np.outer(unit, unit)
     force = np.zeros((len(body.mesh.points), body.dim))

@@ -47,7 +47,8 @@ MATCH_TOLERANCE = 1e-6
 def refine_uniformly(mesh: Mesh) -> Mesh:
     """The mesh with all cells halved; named faces, node sets, volumes and pairs go along.
 
-    A node set takes the new nodes of the outer facets whose nodes it holds.
+    A node set takes the new nodes of the outer facets whose nodes it holds. Of cells of mixed
+    shapes their tetrahedra are refined, and nothing but these is left.
     """
     cells = np.concatenate(list(mesh.bodies.values()))
     hashes = np.random.default_rng(0).integers(0, 2**64, len(mesh.points), dtype=np.uint64)
@@ -74,6 +75,7 @@ def refine_uniformly(mesh: Mesh) -> Mesh:
         points=points,
         # most nodes are new ones
         numbers=None,
+        whole={},
         bodies=dict(zip(mesh.bodies, np.split(new_cells, ends), strict=True)),
         faces={name: facets(some) for name, some in mesh.faces.items()},
         nodes={

@@ -18,6 +18,7 @@ balance knows nothing of, and is wrong by a factor on a twisted blade.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,7 +28,7 @@ from ..errors import InputError, NotSolvedError
 from ..scene.material_table import expands_by_axes
 from ..util.newton import Outcome, StepError, iterate_newton
 from . import shape_functions as shape
-from .body import Body, body_properties, cells_of, degrees
+from .body import Body, body_properties, cells_of, degrees, sum_matrices
 from .compat import PETSc, assemble_matrix, assemble_vector, compile_form, dolfinx, ufl
 from .constraint import Constrained, expand_to_mesh, in_step, restrict_load
 from .flexibility import Flexibility, compliance, flexible
@@ -68,9 +69,11 @@ class Preload:
 
 @dataclass(frozen=True)
 class _Forms:
-    """The potential's derivatives, compiled, with the displacement and the squared speed to be
-    set.
+    """The potential's derivatives on cells of one shape, compiled, with the displacement and the
+    squared speed to be set.
     """
+
+    body: Body
 
     u: Any
     speed2: Any
@@ -112,6 +115,9 @@ def thermal_force(body: Body, quadrature: str = "exact") -> np.ndarray:
     """
     if not has_thermal_strain(body):
         return np.zeros(body.dim * len(body.mesh.points))
+    if body.pieces:
+        parts = [piece.back(thermal_force(piece.body, quadrature)) for piece in body.pieces]
+        return np.asarray(sum(parts))
     degree = degrees(body.mesh, cells_of(body), quadrature, body.heat)
     stress, _, depth = body_properties(body, degree)
     v = ufl.TestFunction(body.space)
@@ -190,6 +196,12 @@ def linear_tangent(
             :func:`thermal_displacement`.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
     """
+    if body.pieces:
+        parts = (
+            linear_tangent(piece.body, piece.onto(u0), speed, axis, quadrature)
+            for piece in body.pieces
+        )
+        return _with_springs(body, sum_matrices(body, parts))
     v = ufl.TestFunction(body.space)
     w = ufl.TrialFunction(body.space)
     degree = _elastic_degrees(body, quadrature)
@@ -250,7 +262,7 @@ def preload(
 def _load_steps(
     con: Constrained,
     clamp: str | None,
-    forms: _Forms,
+    forms: Sequence[_Forms],
     speed: float,
     limit: float,
 ) -> tuple[np.ndarray, int, int, float]:
@@ -264,7 +276,7 @@ def _load_steps(
     misfit = 0.0
     while done < 1.0:
         target = min(done + part, 1.0)
-        forms.heating.value = target
+        _set_heating(forms, target)
         trial, used, error = _solve_newton(con, clamp, forms, u, target * speed**2, limit)
         iterations += used
         if isinstance(error, str):
@@ -292,7 +304,7 @@ def tangent(
 ) -> PETSc.Mat:
     """Stiffness of small vibrations about a nonlinear preload, spin softening included [N/m]."""
     forms = _potential_forms(body, axis, quadrature)
-    forms.heating.value = 1.0
+    _set_heating(forms, 1.0)
     return _tangent_matrix(body, forms, state.displacement, state.speed**2)
 
 
@@ -345,7 +357,7 @@ class _Trial:
 def _solve_newton(
     con: Constrained,
     clamp: str | None,
-    forms: _Forms,
+    forms: Sequence[_Forms],
     u: np.ndarray,
     speed2: float,
     limit: float,
@@ -385,6 +397,8 @@ def _solve_newton(
 
 def _turned_over(body: Body, u: np.ndarray) -> bool:
     """Whether a state that balances has gone through itself."""
+    if body.pieces:
+        return any(_turned_over(piece.body, piece.onto(u)) for piece in body.pieces)
     cells = cells_of(body)
     before, after = (
         np.linalg.det(shape.geometry(body.mesh.cell_type, x[cells], 2)[1])
@@ -425,8 +439,11 @@ def _potential_forms(
     body: Body,
     axis: tuple[float, float, float],
     quadrature: str,
-) -> _Forms:
-    """First and second derivative of the potential."""
+) -> list[_Forms]:
+    """First and second derivative of the potential, one of each piece of a body of mixed shapes."""
+    if body.pieces:
+        parts = [_potential_forms(piece.body, axis, quadrature) for piece in body.pieces]
+        return [forms for part in parts for forms in part]
     domain = body.space.mesh
     u = dolfinx.fem.Function(body.space)
     speed2 = dolfinx.fem.Constant(domain, 0.0)
@@ -447,7 +464,8 @@ def _potential_forms(
         - depth * rho * speed2 / 2 * ufl.inner(place, place) * inertial
     )
     force = ufl.derivative(potential, u, v)
-    return _Forms(
+    own = _Forms(
+        body,
         u,
         speed2,
         heating,
@@ -455,28 +473,47 @@ def _potential_forms(
         compile_form(ufl.derivative(force, u, w)),
         _block_nodes(body),
     )
+    return [own]
+
+
+def _set_heating(forms: Sequence[_Forms], share: float) -> None:
+    """How much of the thermal strain is there."""
+    for part in forms:
+        part.heating.value = share
 
 
 def _unbalanced_force(
     body: Body,
-    forms: _Forms,
+    forms: Sequence[_Forms],
     u: np.ndarray,
     speed2: float,
 ) -> np.ndarray:
     """(n_points*dim, 1) unbalanced force in mesh numbering [N]."""
-    _set_state(forms, u, speed2)
-    force = assemble_vector(forms.force).array
+    if body.pieces:
+        parts = [
+            piece.back(_elastic_force(own, piece.onto(u), speed2))
+            for piece, own in zip(body.pieces, forms, strict=True)
+        ]
+        force = np.asarray(sum(parts))
+    else:
+        force = _elastic_force(forms[0], u, speed2)
     if body.spring is not None:
-        force = force + _spring_force(body.spring, forms)
-    return _in_mesh_numbering(body, force).reshape(-1, 1)
+        force = force + _spring_force(body, body.spring, u)
+    return force.reshape(-1, 1)
 
 
-def _spring_force(spring: PETSc.Mat, forms: _Forms) -> np.ndarray:
-    """This rank's rows of the springs' forces [N] in the state that is set."""
+def _elastic_force(forms: _Forms, u: np.ndarray, speed2: float) -> np.ndarray:
+    """(n_points*dim,) unbalanced force of cells of one shape in mesh numbering [N]."""
+    _set_state(forms, u, speed2)
+    return _in_mesh_numbering(forms.body, assemble_vector(forms.force).array).ravel()
+
+
+def _spring_force(body: Body, spring: PETSc.Mat, u: np.ndarray) -> np.ndarray:
+    """(n_points*dim,) the springs' forces in mesh numbering [N]."""
     moved, force = spring.createVecs()
-    moved.array = forms.u.x.array[: moved.getLocalSize()]
+    moved.array = u[_block_nodes(body)].ravel()[: moved.getLocalSize()]
     spring.mult(moved, force)
-    return np.asarray(force.array)
+    return _in_mesh_numbering(body, force.array).ravel()
 
 
 def _in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
@@ -490,12 +527,23 @@ def _in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
 
 def _tangent_matrix(
     body: Body,
-    forms: _Forms,
+    forms: Sequence[_Forms],
     u: np.ndarray,
     speed2: float,
 ) -> PETSc.Mat:
+    if not body.pieces:
+        return _with_springs(body, _elastic_tangent(forms[0], u, speed2))
+    parts = (
+        _elastic_tangent(own, piece.onto(u), speed2)
+        for piece, own in zip(body.pieces, forms, strict=True)
+    )
+    return _with_springs(body, sum_matrices(body, parts))
+
+
+def _elastic_tangent(forms: _Forms, u: np.ndarray, speed2: float) -> PETSc.Mat:
+    """Second derivative of the potential on cells of one shape."""
     _set_state(forms, u, speed2)
-    return _with_springs(body, assemble_matrix(forms.stiffness))
+    return assemble_matrix(forms.stiffness)
 
 
 def _with_springs(body: Body, stiffness: PETSc.Mat) -> PETSc.Mat:

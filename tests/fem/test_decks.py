@@ -2,8 +2,8 @@
 ``python benchmarks/fem_decks.py``).
 
 Hexahedra of 20 nodes are solved with 27, which hold the displacements of the original cells and
-more: their frequencies lie at or below CalculiX's. Mixed shapes are solved as tetrahedra with the
-same nodes, which come near from either side as the mesh gets finer.
+more: their frequencies lie at or below CalculiX's. So do wedges of 18 nodes, but for the mass of
+CalculiX's, whose nine points leave it inexact (test_mixed_cells.py).
 """
 
 import json
@@ -62,8 +62,8 @@ def test_c3d20r_is_near(tmp_path):
 def test_wedges_and_hexahedra(tmp_path):
     deck = decks.flat_deck(decks.model("c3d15_c3d20"), {})
     (tmp_path / "a.inp").write_text("\n".join(deck))
-    mesh = agrees(tmp_path / "a.inp", "c3d15_c3d20", 6e-3, 1e-3)
-    assert mesh.cell_type == "tetra10" and "split into tetrahedra" in mesh.report["notes"][0]
+    mesh = agrees(tmp_path / "a.inp", "c3d15_c3d20", 3e-4, 1.2e-3)
+    assert mesh.cell_type == "tetra10" and "solved as they are" in mesh.report["notes"][0]
 
 
 def test_c3d10_with_element_surfaces_and_includes(tmp_path):
@@ -210,7 +210,7 @@ def cdb_lines(m, names):
 def test_ansys_hexahedra_and_wedges_with_node_components(tmp_path):
     m = decks.model("c3d15_c3d20")
     (tmp_path / "a.cdb").write_text("\n".join(cdb_lines(m, {"clamp": "N_BORE"})) + "\n")
-    agrees(tmp_path / "a.cdb", "c3d15_c3d20", 6e-3, 1e-3, names=["clamp = n_bore"])
+    agrees(tmp_path / "a.cdb", "c3d15_c3d20", 3e-4, 1.2e-3, names=["clamp = n_bore"])
 
 
 @pytest.mark.parametrize("suffix", ["bdf", "vtu"])

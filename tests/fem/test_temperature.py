@@ -269,7 +269,7 @@ def test_a_free_crystal_expands_along_its_axes(large, table):
 def unbalanced_force(body, u):
     """(n_points*dim,) of the whole heat, at rest."""
     forms = rotation._potential_forms(body, (0.0, 0.0, 1.0), "exact")
-    forms.heating.value = 1.0
+    rotation._set_heating(forms, 1.0)
     return rotation._unbalanced_force(body, forms, u, 0.0)
 
 

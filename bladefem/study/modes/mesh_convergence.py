@@ -125,10 +125,14 @@ def _halved_mesh_convergence(
     comm: Communicator | None,
     progress: Progress,
 ) -> Convergence:
-    """A given mesh, its half, and the half of that where this is small enough."""
+    """A given mesh, its half, and the half of that where this is small enough.
+
+    Cells of mixed shapes stand as the tetrahedra into which they are split: refined meshes know no
+    others, and differences of two kinds of elements would tell nothing of either.
+    """
     from ...fem.refinement import refine_uniformly
 
-    meshes = [build_mesh(scene, comm)]
+    meshes = [replace(build_mesh(scene, comm), whole={})]
     while len(meshes) < MAX_HALVED_MESHES and (
         len(meshes) == 1 or blade_dofs(meshes[-1]) <= MAX_DOFS_HALVED_AGAIN
     ):

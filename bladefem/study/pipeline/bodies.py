@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, chosen_whole
 
 from ...contact.seating import counting_sense, spin_axis
 from ...errors import InputError, suggestion
@@ -276,8 +276,10 @@ def blade_parts(scene: Scene, mesh: Mesh) -> tuple[Mesh, dict[str, Material]]:
         owner[mesh.parts[name]] = i
     names = [("blade", scene.material.blade), *given.items()]
     some = [(i, name) for i, (name, _) in enumerate(names) if (owner == i).any()]
-    bodies = {f"blade, {name}": cells[owner == i] for i, name in some}
-    return replace(mesh, bodies={**mesh.bodies, **bodies}), {
+    rows = {f"blade, {name}": ("blade", owner == i) for i, name in some}
+    bodies = {name: cells[chosen] for name, (_, chosen) in rows.items()}
+    whole = {**mesh.whole, **chosen_whole(mesh, rows)}
+    return replace(mesh, bodies={**mesh.bodies, **bodies}, whole=whole), {
         f"blade, {name}": names[i][1] for i, name in some
     }
 
