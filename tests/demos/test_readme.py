@@ -24,11 +24,11 @@ CHAIN, OPENED, MATRICES, _VARIED = code_of(ROOT / "docs" / "python.md")
 
 
 def test_matrices_of_your_own(capsys):
-    """One peak of the band; the element slips there."""
+    """One peak of the band, flat: within 0.02 % over 0.1 Hz; the element slips there."""
     exec(compile(MATRICES, "python.md", "exec"), {})
     assert (
         capsys.readouterr().out
-        == "178.90 Hz 5.443 um, {'stick': 0, 'slip': 1, 'lift': 0, 'open': 0}\n"
+        == "178.94 Hz 5.443 um, {'stick': 0, 'slip': 1, 'lift': 0, 'open': 0}\n"
     )
     assert MATRICES.count("\n") <= 12
 
