@@ -96,6 +96,18 @@ class Mesh:
         return 2 if self.cell_type.startswith(("triangle", "quad")) else 3
 
 
+def cut_face_nodes(mesh: Mesh, cells: IntegerArray | None = None) -> int:
+    """Number of nodes on both cut faces of a sector together; 0 without them.
+
+    Args:
+        cells: whose nodes count; those of all bodies when None.
+    """
+    if "cyclic" not in mesh.pairs:
+        return 0
+    nodes = np.unique(mesh.pairs["cyclic"].nodes)
+    return len(nodes) if cells is None else int(np.isin(nodes, cells).sum())
+
+
 def chosen_whole(mesh: Mesh, rows: dict[str, tuple[str, IntegerArray]]) -> dict[str, IntegerArray]:
     """What `Mesh.whole` is of bodies made of rows of others.
 

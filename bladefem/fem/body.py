@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, cut_face_nodes
 
 from ..errors import InputError, suggestion
 from ..scene.tables import Material
@@ -139,7 +139,8 @@ def assemble(
         raise InputError("temperature: not known in plane strain, expected plane stress or a solid")
     _check_cell_type(mesh)
     nodes = np.unique(np.concatenate([mesh.bodies[n] for n in names]))
-    plan = check_memory(mesh.dimension * len(nodes), comm)
+    cut = cut_face_nodes(mesh, nodes)
+    plan = check_memory(mesh.dimension * len(nodes), comm, cut=mesh.dimension * cut)
     return replace(_assemble_bodies(mesh, own, comm, plane, quadrature, heat), plan=plan)
 
 

@@ -29,12 +29,14 @@ def group_size(
     comm: MPI.Comm,
     dofs: int,
     free: float | None = None,
+    cut: int = 0,
 ) -> int:
     """Ranks in a group: as many as share a sector well, and as many more as memory asks for; a
     divisor of all ranks.
 
     Args:
         dofs: degrees of freedom of one sector.
+        cut: of both of its cut faces together.
         free: memory of a machine [bytes]; what is available when left out.
     """
     here = comm.Split_type(MPI.COMM_TYPE_SHARED)
@@ -45,16 +47,18 @@ def group_size(
     useful = min(MAX_RANKS_PER_SECTOR, max(dofs // MIN_DOFS_PER_RANK, 1))
     least = max(size for size in sizes if size <= useful)
     for size in sizes:
-        memory = modal_solve_memory(dofs, size) * max(together // size, 1)
+        memory = modal_solve_memory(dofs, size, cut=cut) * max(together // size, 1)
         if size >= least and memory < USABLE_MEMORY_SHARE * free:
             return size
     return comm.size
 
 
-def fits_one_rank(comm: MPI.Comm, dofs: int) -> bool:
-    """One rank has memory for a body of so many degrees of freedom (collective)."""
+def fits_one_rank(comm: MPI.Comm, dofs: int, cut: int = 0) -> bool:
+    """One rank has memory for a body of so many degrees of freedom, some of them on cut faces
+    (collective).
+    """
     free = comm.allreduce(available_memory(), MPI.MIN)
-    return comm.size == 1 or modal_solve_memory(dofs) < USABLE_MEMORY_SHARE * free
+    return comm.size == 1 or modal_solve_memory(dofs, cut=cut) < USABLE_MEMORY_SHARE * free
 
 
 def shared_out(

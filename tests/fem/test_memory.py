@@ -25,6 +25,7 @@ from bladefem.fem.memory import (
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material, Scene
 from bladefem.study.pipeline.bodies import Bodies
+from geometry.mesh import cut_face_nodes
 
 
 @pytest.mark.parametrize(
@@ -45,6 +46,26 @@ def test_model_follows_the_measured_peaks(dofs, ranks, on_disk, measured):
     assert modal_solve_memory(dofs, ranks, on_disk) == pytest.approx(measured, rel=0.07)
 
 
+@pytest.mark.parametrize("dofs, cut, measured", [(47_175, 3672, 1.19e9), (87_885, 5544, 2.48e9)])
+def test_wide_cut_faces_are_part_of_the_model(dofs, cut, measured):
+    """A sector like a block; a bladed one's are in the peaks above."""
+    assert modal_solve_memory(dofs, cut=cut) == pytest.approx(measured, rel=0.07)
+    assert modal_solve_memory(73_707, cut=1428) == modal_solve_memory(73_707)
+
+
+def test_a_sector_is_refused_for_its_cut_faces():
+    """354 123 degrees of freedom fit into 8 GB, 14 256 of them on cut faces do not."""
+    assert not check_memory(354_123, MPI.COMM_SELF, free=8e9).on_disk
+    with pytest.raises(InputError, match=r"354123 degrees of freedom"):
+        check_memory(354_123, MPI.COMM_SELF, free=8e9, cut=14_256)
+
+
+def test_assembly_asks_for_the_memory_of_its_cut_faces():
+    mesh = sector(12, (9, 6, 4), "tetra10")
+    plan = assemble(mesh, "blade", Material(2e11, 0.3, 7800.0)).plan
+    assert plan.memory > modal_solve_memory(3 * len(mesh.points))
+
+
 def test_a_million_is_predicted_to_fit_into_20_gib():
     assert modal_solve_memory(1_000_000, on_disk=True) < modal_solve_memory(1_000_000) < 20 * 2**30
 
@@ -61,9 +82,10 @@ def test_small_fits():
     assert 0 < plan.memory < available_memory() and not plan.on_disk
 
 
-def between_the_ways(dofs):
+def between_the_ways(dofs, cut=0):
     """Free memory in which a solve fits with the factors on disk only."""
-    return (modal_solve_memory(dofs) + modal_solve_memory(dofs, on_disk=True)) / 2
+    ways = (modal_solve_memory(dofs, on_disk=on_disk, cut=cut) for on_disk in (False, True))
+    return sum(ways) / 2
 
 
 def test_short_memory_puts_factors_on_disk(monkeypatch, tmp_path):
@@ -72,8 +94,8 @@ def test_short_memory_puts_factors_on_disk(monkeypatch, tmp_path):
     mesh = sector(8, (5, 3, 2), bump=0.2)
     body = assemble(mesh, "blade", Material(), MPI.COMM_SELF)
     expected = all_diameters(body, 6)
-    dofs = 3 * int((body.rows >= 0).sum())
-    monkeypatch.setattr(memory, "available_memory", lambda: between_the_ways(dofs))
+    free = between_the_ways(3 * int((body.rows >= 0).sum()), 3 * cut_face_nodes(mesh))
+    monkeypatch.setattr(memory, "available_memory", lambda: free)
     small = assemble(mesh, "blade", Material(), MPI.COMM_SELF)
     assert small.plan.on_disk and str(tmp_path) in storage_remark(small.plan)[0]
     flex = flexible(constrain(small, "clamp", 1))
@@ -106,9 +128,9 @@ def test_a_run_says_that_factors_are_on_disk(monkeypatch, tmp_path):
     """Of bodies that were assembled; without, there is nothing to say."""
     monkeypatch.setenv("MUMPS_OOC_TMPDIR", str(tmp_path))
     mesh = sector(8, (5, 3, 2), bump=0.2)
-    dofs = 3 * len(np.unique(mesh.bodies["blade"]))
+    free = between_the_ways(3 * len(np.unique(mesh.bodies["blade"])), 3 * cut_face_nodes(mesh))
     bodies = Bodies(Scene(), mesh, MPI.COMM_SELF)
-    monkeypatch.setattr(memory, "available_memory", lambda: between_the_ways(dofs))
+    monkeypatch.setattr(memory, "available_memory", lambda: free)
     assert not bodies.storage_remarks
     assert bodies.still_blade.plan.on_disk
     assert str(tmp_path) in bodies.storage_remarks[0]

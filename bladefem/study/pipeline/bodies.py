@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from geometry.mesh import Mesh, chosen_whole
+from geometry.mesh import Mesh, chosen_whole, cut_face_nodes
 
 from ...contact.seating import counting_sense, spin_axis
 from ...errors import InputError, suggestion
@@ -64,7 +64,8 @@ class Bodies:
         from ...fem.compat import MPI
         from ...fem.groups import fits_one_rank
 
-        return fits_one_rank(self.comm or MPI.COMM_WORLD, blade_dofs(self.mesh))
+        dofs = blade_dofs(self.mesh)
+        return fits_one_rank(self.comm or MPI.COMM_WORLD, dofs, cut_dofs(self.mesh))
 
     @cached_property
     def ranks_of_sector(self) -> int:
@@ -72,7 +73,8 @@ class Bodies:
         from ...fem.compat import MPI
         from ...fem.groups import group_size
 
-        return group_size(self.comm or MPI.COMM_WORLD, blade_dofs(self.mesh))
+        dofs = blade_dofs(self.mesh)
+        return group_size(self.comm or MPI.COMM_WORLD, dofs, cut=cut_dofs(self.mesh))
 
     @cached_property
     def alone(self) -> Bodies:
@@ -233,6 +235,11 @@ def on_one_rank(bodies: Bodies, compute: Callable[[Bodies], Result]) -> Result:
 def blade_dofs(mesh: Mesh) -> int:
     """Displacements of the blade's nodes."""
     return mesh.dimension * len(np.unique(mesh.bodies["blade"]))
+
+
+def cut_dofs(mesh: Mesh) -> int:
+    """Displacements of the nodes of both cut faces."""
+    return mesh.dimension * cut_face_nodes(mesh)
 
 
 def rotation_of(bodies: Bodies) -> Spin:
