@@ -59,15 +59,22 @@ def way_to_limit(amplitudes: Sequence[complex]) -> complex:
     """From the last of the mean amplitudes of equal parts to their limit; 0 where there are fewer
     than three.
     """
-    if len(amplitudes) < 3:
-        return 0.0
-    before, last = np.diff(amplitudes[-3:])
+    last, ratio = _last_change(amplitudes)
     if last == 0:
         return 0.0
-    ratio = last / before if before != 0 else np.inf
     # changes that grow have no limit, but lead on
     to_come = ratio / (1 - ratio) if abs(ratio) < 1 else MOST_TO_COME
     return complex(last * to_come * min(1.0, MOST_TO_COME / abs(to_come)))
+
+
+def _last_change(amplitudes: Sequence[complex]) -> tuple[complex, complex]:
+    """The last change of the mean amplitudes, and its ratio to the one before; 0 where there are
+    too few.
+    """
+    if len(amplitudes) < 3:
+        return 0.0, 0.0
+    before, last = np.diff(amplitudes[-3:])
+    return complex(last), complex(last / before if before != 0 else np.inf)
 
 
 def leap_from_end(amplitudes: Sequence[complex], noise: float) -> complex:
@@ -80,10 +87,9 @@ def leap_from_end(amplitudes: Sequence[complex], noise: float) -> complex:
     way = way_to_limit(amplitudes)
     if abs(way) < WORTHWHILE * abs(amplitudes[-1]):
         return 0.0
-    before, last = np.diff(amplitudes[-3:])
+    last, ratio = _last_change(amplitudes)
     if abs(last) < OVER_SCATTER * noise:
         return 0.0
-    ratio = last / before if before != 0 else np.inf
     low, high = LEAPING_RATIOS
     if not low < ratio.real < high or abs(ratio.imag) > LEAPING_TURN * abs(ratio):
         return 0.0

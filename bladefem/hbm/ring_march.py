@@ -121,7 +121,6 @@ def march_ring(
     S = r * -(-instants // r)
     y, forces = start.modal.copy(), start.forces.copy()
     resolved, prepared = _prepared(model, start, S)
-    w, probe, contact = prepared[0], prepared[-1][0], _system(model).contact
     motion = np.empty((periods, S, r))
     work = np.zeros(1)
     m, M = _system(model).contact.shape
@@ -141,23 +140,29 @@ def march_ring(
         whole = done % at_once == 0 or done == periods
         if whole and enough(motion[leapt:done].transpose(0, 2, 1)):
             break
-        if not (whole and leaps):
-            continue
-        part = first_amplitudes(motion[done - at_once : done].transpose(0, 2, 1))
-        envelope.append(part.mean())
-        # what follows has to tell where it led
-        left = periods - done >= 3 * at_once
-        leap = leap_from_end(envelope, scatter(part)) if left else 0.0
-        if leap:
-            moved = moved_envelope(_system(model), probe, y, start.drive.omega, leap)
-            # contacts move along, so that no step of theirs is a large one
-            w += contact @ (moved - y)[:M]
-            y[:] = moved
-            envelope, leapt = [], done
+        # what follows a leap has to tell where it led
+        if whole and leaps and periods - done >= 3 * at_once:
+            part = first_amplitudes(motion[done - at_once : done].transpose(0, 2, 1))
+            envelope.append(part.mean())
+            leap = leap_from_end(envelope, scatter(part))
+            if leap:
+                _leap(_system(model), start.drive.omega, leap, y, prepared)
+                envelope, leapt = [], done
+    marched = motion[leapt:done].transpose(0, 2, 1)
     end = RingState(start.drive, y, forces)
-    return RingMarch(
-        motion[leapt:done].transpose(0, 2, 1), done, settled, resolved, operations, end
-    )
+    return RingMarch(marched, done, settled, resolved, operations, end)
+
+
+def _leap(
+    system: SectorModes, omega: float, leap: complex, y: np.ndarray, prepared: tuple[Any, ...]
+) -> None:
+    """Move the modal state y along the envelope, and the contacts with it, so that no step of
+    theirs is a large one.
+    """
+    w, probe = prepared[0], prepared[-1][0]
+    moved = moved_envelope(system, probe, y, omega, leap)
+    w += system.contact @ (moved - y)[: len(system.stiffness)]
+    y[:] = moved
 
 
 def state_of_solution(

@@ -11,16 +11,7 @@ from geometry.raw_mesh import RawMesh
 from geometry.solid_cells import solid_cells
 from geometry.topology import EDGES
 
-HEXAHEDRON = [
-    (0, 0, 0),
-    (1, 0, 0),
-    (1, 1, 0),
-    (0, 1, 0),
-    (0, 0, 1),
-    (1, 0, 1),
-    (1, 1, 1),
-    (0, 1, 1),
-]
+HEXAHEDRON = shape.reference_nodes("hexahedron").astype(int)
 
 
 def row(size=(0.5, 0.1, 0.1), map=None):

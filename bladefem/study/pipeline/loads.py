@@ -260,7 +260,7 @@ def longest_first(loads: Sequence[float], best: float = 0.0) -> list[int]:
     """Numbers of the loads [N] in the order in which they are solved: those below the best one,
     whose contacts slip and lift most, from there down, then the others upwards.
 
-    Of the shipped wedge 36 N, half of the best load, take 11 s of CPU, 18 and 9 N 9 and 20 s, all
+    Of the shipped wedge 36 N, half of the best load, take 7 s of CPU, 18 and 9 N 12 and 6 s, all
     heavier ones together 17 s.
     """
     below = sorted((i for i, load in enumerate(loads) if load < best), key=lambda i: -loads[i])

@@ -119,19 +119,19 @@ def _stresses(
     wanted = {min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)}
     if own is not None:
         wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
+    factorised = lru_cache(maxsize=None)(lambda n: bodies.alone.factorised(n))
 
     def stress(k: int) -> DampedStress:
-        alone = bodies.alone
         settings = curves[k].settings
         reduced = with_damper_mass(before.reduced, cases[k].mass)
         return damped_stress(
-            alone,
+            bodies.alone,
             patches,
             before.modes,
             cases[k],
             curves[k].peak,
             settings.points,
-            lru_cache(maxsize=None)(alone.factorised),
+            factorised,
             rigid_body(before.scene, before.mesh, reduced, patches, settings.damper),
         )
 
