@@ -12,6 +12,7 @@ import ctypes
 import logging
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -239,7 +240,9 @@ def _quiet_logger() -> Iterator[None]:
     handlers = list(root.handlers)
     logging.disable(logging.WARNING)
     try:
-        yield
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Number of integration points")
+            yield
     finally:
         logging.disable(logging.NOTSET)
         root.setLevel(level)
