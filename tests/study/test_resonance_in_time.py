@@ -17,6 +17,7 @@ from bladefem.report.response_points import MARCHED, points_of
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
+from bladefem.study.pipeline import resonance_in_time as module
 from bladefem.study.pipeline.resonance_in_time import ResonanceInTime, resonance_in_time
 
 BAND = (249.0, 431.0)
@@ -60,6 +61,27 @@ def test_a_response_that_falls_smoothly_has_its_linear_peak():
     assert found.highest == pytest.approx(1 / 0.04, rel=1e-2)
     assert 2 * np.pi * found.frequency == pytest.approx(1.0, rel=5e-3)
     assert found.error < 0.05
+
+
+@pytest.mark.parametrize(
+    ("heights", "settled"),
+    [
+        (np.ones(36), True),
+        # too short
+        (np.ones(24), False),
+        # a thousandth in twelve periods, which goes on
+        (1 + 1e-3 * np.arange(36) / 12, False),
+        # the same from one third to the next, and half of it back
+        (1 + 1e-3 * np.repeat([0.0, 1.0, 0.5], 12), True),
+        # comes to rest: nine tenths of the way are behind it
+        (1 + 1e-2 * np.exp(-np.arange(72) / 10), True),
+        # swells, its mean resting
+        (1 + 2e-2 * (np.arange(36) > 24) * (-1.0) ** np.arange(36), False),
+    ],
+)
+def test_a_march_has_settled_where_its_mean_and_its_band_have(heights, settled):
+    motion = heights[:, None, None] * np.cos(2 * np.pi * np.arange(64) / 64)
+    assert module._has_settled(motion) == settled
 
 
 def test_where_nothing_can_be_marched_there_is_no_resonance(folding):
