@@ -11,16 +11,17 @@ as they are.
 Seeds 0 to 66 at 2 %, 0 to 32 at 0.1 %; of CPU time, that of the rich model is 1:
 
     accuracy    in the band    wrong    estimate too low    unknown    all     median    above 1.1
-    2 %         62             0        0                   2          0.20    0.65      6
-    0.1 %       30             0        0                   0          0.82    0.80      9
+    2 %         62             0        0                   2          0.20    0.64      7
+    0.1 %       30             0        0                   0          0.82    0.82      8
 
 Unknown are seeds 4 and 33 (true errors 0.7 and 2.3 %), whose damper walks: their richer models were
-not solved. Where a point of the rich model takes over 1 ms the median is 0.54 and 0.78; a third is
+not solved. Where a point of the rich model takes over 1 ms the median is 0.53 and 0.76; a third is
 reached by 12 of 39 and 2 of 17.
 
 Above 1.1 at 2 %:
     seed    ratio
     13      1.8     the choice follows its curve round folds, the rich model is too large for that
+    20      1.2     10 ms, below 1.1 in other runs
     34      1.5     the damper may walk, and one point of the band with one harmonic has no solution
     41      1.2     lifts off at a flank: its harmonics are swept twice
     43      1.1     a bouncing mass, on a fold that every richer model moves

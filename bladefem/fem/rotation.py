@@ -74,7 +74,6 @@ class _Forms:
     """
 
     body: Body
-
     u: Any
     speed2: Any
     # share of the thermal strain
