@@ -90,6 +90,21 @@ def test_the_nearest_peak_is_kept_where_more_harmonics_fail_or_lead_away(heights
     assert errors.height["harmonics"] == pytest.approx(1 - 0.56 / 0.67)
 
 
+@pytest.mark.parametrize(
+    ("band", "asked_for"),
+    [(MarchedBand(1.043, 1.046), [7]), (MarchedBand(1.043, 1.068), [])],
+)
+def test_a_higher_motion_that_the_blade_keeps_is_not_left_for_another(band, asked_for, chosen):
+    """18 N on the shipped wedge: three harmonics have 921 um, marched 1043 to 1068 um, and seven
+    have 638 um, which the blade keeps as well; no harmonics are tried for a motion that is not
+    periodic.
+    """
+    (settings, peak, errors), asked = chosen({3: 0.921, 7: 0.638}, band)
+    assert settings.harmonics == 3 and peak.height == 0.921
+    assert [s.harmonics for s in asked if s.harmonics > 3] == asked_for
+    assert errors.height["harmonics"] == pytest.approx(1 - 0.921 / band.highest)
+
+
 @pytest.mark.parametrize(("change", "points"), [(0.04, 8), (0.06, 16)])
 def test_contact_points_are_added_beyond_the_accuracy(change, points, chosen):
     heights = {3: 0.66}
