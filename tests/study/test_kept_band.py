@@ -10,7 +10,7 @@ import pytest
 from models import rebounding
 
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.hbm.ring_march import PERIODS_AT_ONCE
+from bladefem.hbm.ring_march import PERIODS_AT_ONCE, never_enough
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
@@ -20,6 +20,7 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import finer_contacts, judged_resonance
 from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline.finer_contacts import FinerMotion, unstable_with_more_points
+from bladefem.study.pipeline.flank_motions import FlankMotions
 from bladefem.study.pipeline.kept_band import kept_band
 from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import Stability, in_one_body
@@ -144,7 +145,12 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
     band = module.KeptBand(2.0, kept_to, kept_to, 200, reason)
     curve = SimpleNamespace(points=points, settings=None)
     scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
-    models = {"model_in_time": None, "richer_models": [], "stability_of": marks}
+    models = {
+        "model_in_time": None,
+        "richer_models": [],
+        "stability_of": marks,
+        "flank_motions": FlankMotions(),
+    }
     for name, value in models.items():
         monkeypatch.setattr(judged_resonance, name, lambda *_, value=value: value)
     asked = []
@@ -173,45 +179,61 @@ def marches_that_grow(point, instants_that_hold):
     return march
 
 
-def marched(heights, instants, enough):
+def marched(heights, instants, enough=never_enough):
     """Periods of these heights [m], as far as a march with so many instants goes."""
     wave = np.cos(2 * np.pi * np.arange(instants) / instants)
     motion = heights[:, None, None] * wave
     for done in range(PERIODS_AT_ONCE, len(heights) + 1, PERIODS_AT_ONCE):
         if enough(motion[:done]):
             break
-    return SimpleNamespace(motion=motion[:done], settled=True, resolved=True, operations=1.0)
+    return SimpleNamespace(
+        motion=motion[:done], settled=True, resolved=True, operations=1.0, end=None
+    )
 
 
-PERIODS = np.arange(200)
+PERIODS = np.arange(800)
+
+
+def saturated(growing, most):
+    """What grows to a limit."""
+    return most * growing / (most + growing)
 
 
 @pytest.mark.parametrize(
-    ("heights", "periods"),
+    ("heights", "fewest", "most"),
     [
         # falls to another motion, and stays there
-        (0.9 + 0.1 * np.exp(-PERIODS / 12), 100),
+        (0.9 + 0.1 * np.exp(-PERIODS / 12), 100, 100),
         # leaves the unstable motion slowly: a hundred thousandth first, more with each period
-        (1.0 - 1e-5 * np.exp(PERIODS / 23), 200),
+        (1.0 - saturated(1e-5 * np.exp(PERIODS / 23), 0.2), 250, 400),
         # a slow ripple that widens, as seen by chance at the same phase of it
-        (1.0 + 1e-4 * np.exp(0.02 * PERIODS) * np.cos(2 * np.pi * PERIODS / 25.5), 200),
+        (
+            1.0 + saturated(1e-4 * np.exp(0.02 * PERIODS), 0.15) * np.cos(2 * np.pi * PERIODS / 9),
+            350,
+            650,
+        ),
         # goes on falling by a thousandth a period
-        (1.0 - 1e-3 * PERIODS, 200),
+        (1.0 - 1e-3 * PERIODS, 200, 200),
+        # goes on widening
+        (1.0 + 1e-5 * np.exp(0.012 * PERIODS) * np.cos(2 * np.pi * PERIODS / 9), 800, 800),
     ],
 )
-def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, periods):
+def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, fewest, most):
+    """It is longer while its band widens: plane blades under 4 N seemed to keep to 2.2 um of 3.6."""
     model = rebounding(10.0, 0.1, 0.04)
     point = solve(model, 3.0, 15, 1024)
-    monkeypatch.setattr(
-        module,
-        "march_ring",
-        lambda model, start, periods, instants, enough, most: marched(
-            size(point) * heights[:periods], instants, enough
-        ),
-    )
+    begun = []
+
+    def march(model, start, periods, instants, enough=never_enough, most=np.inf):
+        done = sum(begun)
+        found = marched(size(point) * heights[done : done + periods], instants, enough)
+        begun.append(len(found.motion))
+        return found
+
+    monkeypatch.setattr(module, "march_ring", march)
     found = module.band_by_steps(model, point)
-    assert found.periods == periods
-    kept = size(point) * heights[-module.KEPT_BY_STEPS :]
+    assert fewest <= found.periods <= most
+    kept = size(point) * heights[: found.periods][-module.KEPT_BY_STEPS :]
     assert found.highest == pytest.approx(kept.max(), rel=2e-3)
     assert found.lowest == pytest.approx(kept.min(), rel=2e-3)
 
@@ -302,7 +324,12 @@ def test_a_motion_that_more_contact_points_leave_is_marched_with_them(monkeypatc
     for point in points:
         point.converged = True
     marks = Stability(np.full(3, "stable"), np.ones(3), bifurcation=np.full(3, "", dtype="<U15"))
-    models = {"model_in_time": None, "richer_models": [], "stability_of": marks}
+    models = {
+        "model_in_time": None,
+        "richer_models": [],
+        "stability_of": marks,
+        "flank_motions": FlankMotions(),
+    }
     for name, value in models.items():
         monkeypatch.setattr(judged_resonance, name, lambda *_, value=value: value)
     monkeypatch.setattr(judged_resonance, "judged_above", lambda *args: args[3])

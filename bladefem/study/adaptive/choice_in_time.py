@@ -217,9 +217,7 @@ def _with_enough_harmonics(
     if band is None:
         return None
     best = settings, peak, band
-    while (
-        band.beyond(size(peak.solution)) > accuracy and band.width <= PERIODIC_SHARE * accuracy
-    ):
+    while band.beyond(size(peak.solution)) > accuracy and band.width <= PERIODIC_SHARE * accuracy:
         richer = _one_step_richer(family, settings, peak, "harmonics")
         if richer is None:
             break

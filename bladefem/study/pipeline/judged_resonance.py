@@ -18,6 +18,7 @@ from ..adaptive.choice_in_time import MarchedBand
 from ..adaptive.settings import Settings
 from .error_in_time import Marches, error_in_time
 from .finer_contacts import FinerMotion, unstable_with_more_points
+from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
 from .kept_band import KeptBand, kept_of_family
 from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
@@ -32,15 +33,32 @@ class JudgedResonance:
     marks: Stability
     # what the blade does at the highest point where that is unstable
     kept: KeptBand | None = None
-    # the highest point is given, and the amplitudes that the blade keeps to are others
+    # the amplitude given is the highest that the blade keeps to after the point
     contradicted: bool = False
+    # relative rise above it by marches from unstable motions beside it
+    beside: float = 0.0
+    # unstable motions beside it were not marched from, since that takes too long
+    unmarched: bool = False
+
+    @property
+    def amplitude(self) -> float:
+        """The one given [m]."""
+        if self.contradicted and self.kept is not None:
+            return self.kept.highest
+        return size(self.point)
+
+    def unstable_peak(self, curve: Checked) -> Solution | None:
+        """The highest point of the curve where it is unstable."""
+        place = int(heights_of(curve.points).argmax())
+        unstable = self.marks.verdict[place] == UNSTABLE and self.kept is not None
+        return curve.points[place] if unstable else None
 
 
 def judged_resonance(
     marches: Marches, curve: Checked, scene: Scene, sought: bool = False
 ) -> JudgedResonance:
     """Judge a curve, and march from its highest point where that is unstable, be it with more
-    contact points than the curve has.
+    contact points than the curve has, and from unstable motions beside the resonance.
 
     That one gives way to the highest that was judged and is not, where the blade is known to keep
     to less than that: else the blade moves most next to the unstable one.
@@ -61,6 +79,40 @@ def judged_resonance(
     marks = stability_of(model, curve.points, richer)
     if sought:
         return JudgedResonance(highest, marks)
+    judged = _at_the_highest(marches, curve, scene, marks, place)
+    return _with_flanks(marches, curve, judged, highest, scene.accuracy)
+
+
+def _with_flanks(
+    marches: Marches,
+    curve: Checked,
+    judged: JudgedResonance,
+    highest: Solution,
+    accuracy: float,
+) -> JudgedResonance:
+    """The highest amplitude that the blade keeps to beside the resonance in place of that, where it
+    is a march's as well, or lower by more than the accuracy.
+    """
+    given = judged.amplitude
+    known = None if judged.kept is None else highest
+    found = flank_motions(marches, curve, judged.marks, given, known)
+    if found.point is None or found.highest <= given:
+        return replace(judged, unmarched=found.too_long)
+    rise = found.highest / given - 1
+    if judged.contradicted or rise > accuracy:
+        return JudgedResonance(found.point, judged.marks, found.kept, contradicted=True)
+    return replace(judged, beside=rise)
+
+
+def _at_the_highest(
+    marches: Marches, curve: Checked, scene: Scene, marks: Stability, place: int
+) -> JudgedResonance:
+    """What the blade does at the highest point, or at the highest that lasts."""
+    heights = heights_of(curve.points)
+    highest = curve.points[place]
+    models, settings = marches.models, curve.settings
+    model = model_in_time(models, settings)
+    richer = richer_models(models, settings)
     if marks.verdict[place] == UNSTABLE:
         kept = _marched(marches, settings, highest)
     else:

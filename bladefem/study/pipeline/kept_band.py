@@ -70,10 +70,15 @@ AGREEING_SHARE = 0.02
 # imported wedge's first unstable resonances settle after 75 to 125 of 200 periods; with 1e-3 one at
 # 390 N, whose ends keep to 1.3e-3 from the hundredth on, took 175
 SETTLED_BAND = 2e-3
-# growth of the width of a band from one part to the next that leads on, twice in a row: a ripple
-# that grows by 3 % a period, plane blades under 8 N, had left the start by 1.4 % after 75 periods
-# and by 12 % after 400
-GROWING_RATIO = 1.2
+# growth of the width of a band in two parts that leads on: a ripple that grows by 3 % a period,
+# plane blades under 8 N, had left the start by 1.4 % after 75 periods and by 12 % after 400
+GROWING_RATIO = 1.1
+# of the amplitude: a width that is none, whatever it was before
+NO_WIDTH = 1e-6
+# periods at most that a march by steps goes on for while its band widens, over those that it has
+# otherwise: plane blades under 4 N, 2.1 um at 1016 Hz, keep between 1.87 and 2.28 um after 200
+# periods, between 1.15 and 3.6 um after 300 and 600
+LONGER_WHILE_WIDENING = 4
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
 
@@ -187,11 +192,16 @@ def kept_band(model: ReducedModel, point: Solution, counted: float = MAX_COUNTED
     start = state_of(point, system)
     state = State((1 + DISTURBANCE_SHARE) * start.q, start.v, start.z)
     left = integrate_periods(system, point.omega, state, SAMPLES_PER_PERIOD, LEFT_PERIODS)
-    kept = integrate_periods(system, point.omega, left.state, SAMPLES_PER_PERIOD, KEPT_PERIODS)
-    if kept.reason != "done":
-        return _unknown_band(point, kept.reason)
-    motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES_PER_PERIOD)
-    return _band_of(point, motion, periods)
+    state, marched, per_period = left.state, LEFT_PERIODS, steps / periods
+    while True:
+        kept = integrate_periods(system, point.omega, state, SAMPLES_PER_PERIOD, KEPT_PERIODS)
+        if kept.reason != "done":
+            return _unknown_band(point, kept.reason)
+        state, marched = kept.state, marched + KEPT_PERIODS
+        motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES_PER_PERIOD)
+        most = min(LONGER_WHILE_WIDENING * periods, MAX_STEPS / per_period)
+        if not _widens(motion[:, None], point) or marched + KEPT_PERIODS > most:
+            return _band_of(point, motion, marched)
 
 
 def band_by_steps(
@@ -255,30 +265,57 @@ def _band_with(
     if march.operations > counted:
         reason = f"a march takes {march.operations:.1g} operations, at most {counted:.2g}"
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
-    if not (march.settled and np.isfinite(march.motion).all()):
+    motion = march.motion
+    most = LONGER_WHILE_WIDENING * (left + kept)
+    ended = len(motion) < left + kept
+    while not ended and march.settled and _widens(motion, point) and len(motion) < most:
+        if _grown_too_far(motion, point, instants):
+            break
+        march = march_ring(model, march.end, kept, instants)
+        motion = np.concatenate([motion, march.motion])
+    if not (march.settled and np.isfinite(motion).all()):
         reason = "the contact forces of a step of the march were not found"
         return _unknown_band(point, reason), march.resolved
-    marched = len(march.motion)
-    known = left if marched == left + kept else marched - PERIODS_AT_ONCE
-    return _band_of(point, march.motion[known:], marched), march.resolved
+    known = len(motion) - (PERIODS_AT_ONCE if ended else kept)
+    return _band_of(point, motion[known:], len(motion)), march.resolved
 
 
 def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
     """A march by steps may end: its last parts keep to one band that they drift to no faster than
     before and that does not widen, or it has grown so far that it is repeated with more instants.
     """
-    amplitudes = amplitudes_of_periods(motion, point.harmonics)
-    again = instants < INSTANTS_BY_STEPS[-1] and bool(point.states["lift"])
-    if again and amplitudes.max() > GROWN_RATIO * size(point):
+    if _grown_too_far(motion, point, instants):
         return True
-    parts = amplitudes.reshape(-1, PERIODS_AT_ONCE * amplitudes.shape[-1])
-    if len(parts) < 3 or not np.isfinite(amplitudes).all():
+    ends = _ends_of_parts(motion, point)
+    if len(ends) < 3 or not np.isfinite(ends).all():
         return False
-    ends = np.column_stack([parts.min(axis=1), parts.max(axis=1)])[-3:]
     before, now = abs(np.diff(ends, axis=0)).max(axis=1)
+    return bool(now <= min(before, SETTLED_BAND * ends.max())) and not _widens(motion, point)
+
+
+def _grown_too_far(motion: np.ndarray, point: Solution, instants: int) -> bool:
+    """It is repeated with more instants."""
+    again = instants < INSTANTS_BY_STEPS[-1] and bool(point.states["lift"])
+    return again and bool(
+        amplitudes_of_periods(motion, point.harmonics).max() > GROWN_RATIO * size(point)
+    )
+
+
+def _widens(motion: np.ndarray, point: Solution) -> bool:
+    """The band of the last part of a march is wider than two parts before: a ripple that is seen at
+    different phases of it need not widen from each part to the next.
+    """
+    ends = _ends_of_parts(motion, point)
     widths = np.diff(ends, axis=1).ravel()
-    growing = bool((widths[1:] > GROWING_RATIO * widths[:-1]).all())
-    return bool(now <= min(before, SETTLED_BAND * ends.max())) and not growing
+    grows = widths[-1] > max(GROWING_RATIO * widths[0], NO_WIDTH * ends.max())
+    return len(ends) == 3 and bool(grows)
+
+
+def _ends_of_parts(motion: np.ndarray, point: Solution) -> np.ndarray:
+    """Lowest and highest amplitude [m] in each of the last parts of a march, three at most."""
+    amplitudes = amplitudes_of_periods(motion, point.harmonics)
+    parts = amplitudes.reshape(-1, PERIODS_AT_ONCE * amplitudes.shape[-1])[-3:]
+    return np.column_stack([parts.min(axis=1), parts.max(axis=1)])
 
 
 def amplitudes_of_periods(motion: np.ndarray, harmonics: int) -> np.ndarray:

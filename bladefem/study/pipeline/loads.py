@@ -101,11 +101,17 @@ class Curve:
     bifurcation: np.ndarray
     # the highest converged point where that one is unstable, else None
     unstable_peak: Solution | None = None
-    # what the blade does at that one in time; None where it is stable
+    # what the blade does in time at that one, or at the resonance where that is another unstable
+    # point; None where both are stable
     kept: KeptBand | None = None
     # the resonance given is unstable, and a march from it keeps to amplitudes farther off than the
-    # accuracy: the highest of these is given in place of that of the balance
+    # accuracy, or higher than at the resonance: the highest of these is given in place of that of
+    # the balance
     marched_instead: bool = False
+    # relative rise above the resonance by marches from unstable motions beside it
+    beside: float = 0.0
+    # such motions were not marched from, since that takes too long
+    unmarched: bool = False
     # a march from the resonance that its estimated error was taken from; None where richer balances
     # tell it
     in_time: KeptBand | None = None
@@ -136,7 +142,8 @@ class Curve:
         that stiffens; None where it was not asked for.
 
         A march from an unstable resonance tells the error of its balance as well; one that ends
-        above a resonance elsewhere adds to it, and so does the width of one that is given itself.
+        above a resonance elsewhere adds to it, and so does the width of one that is given itself,
+        and one beside the resonance that rises above it.
         A resonance sought in time has an error of its own in place of the balance's.
         """
         if self.settings.error is None:
@@ -149,7 +156,7 @@ class Curve:
             balance, contact_mesh = self.sought.error, 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
         layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
-        return balance + contact_mesh + body_mesh + layer_law
+        return balance + self.beside + contact_mesh + body_mesh + layer_law
 
     @property
     def marched(self) -> float:
@@ -315,9 +322,11 @@ def curve_of(
         multiplier=marks.multiplier,
         peak=top,
         bifurcation=marks.bifurcation,
-        unstable_peak=None if judged.kept is None else peak_of(curve.points),
+        unstable_peak=judged.unstable_peak(curve),
         kept=judged.kept,
         marched_instead=judged.contradicted,
+        beside=judged.beside,
+        unmarched=judged.unmarched,
         in_time=in_time,
         sought=sought,
         interval=interval,

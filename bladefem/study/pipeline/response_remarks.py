@@ -21,6 +21,7 @@ from .stability_remarks import (
     ripple_sentence,
     stability_sentence,
     unjudged_sentence,
+    unmarched_sentence,
     unstable_sentence,
 )
 
@@ -75,7 +76,8 @@ def response_remarks(
     remarks.extend(
         warning(f"load {load_of(c)}: {c.sought.sentence}") for c in curves if c.sought is not None
     )
-    remarks.extend(map(warning, filter(None, [unjudged_sentence(curves)])))
+    unknown = unjudged_sentence(curves), unmarched_sentence(curves)
+    remarks.extend(map(warning, filter(None, unknown)))
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
         remarks.append(interval_sentence([c.load for c in curves], intervals))

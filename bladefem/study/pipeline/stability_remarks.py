@@ -152,7 +152,9 @@ def folded_sentence(curves: Sequence[Curve]) -> str:
 def unstable_sentence(curve: Curve, accuracy: float) -> str:
     """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
     top = curve.unstable_peak
-    if top is None or _rippled(curve, accuracy):
+    if top is None:
+        return _from_a_flank(curve)
+    if _rippled(curve, accuracy):
         return ""
     at = _place(curve, top)
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
@@ -160,6 +162,8 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
         f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
+    if curve.marched_instead and not curve.keeps_unstable:
+        return f"{lost}; {_marched_from_flank(curve)}"
     if curve.marched_instead:
         lost += "; the amplitude given is that of a march from there"
     elif curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
@@ -172,6 +176,39 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
             f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
         )
     return lost if curve.kept is None else f"{lost}; {curve.kept.sentence}"
+
+
+def _from_a_flank(curve: Curve) -> str:
+    """That a march beside the highest motion, which lasts, gives the resonance, or ""."""
+    if not curve.marched_instead:
+        return ""
+    return (
+        f"load {curve.load:g} N: the highest motion, {1e6 * curve.amplitude.max():.4g} um, lasts, "
+        f"and motions beside it do not; {_marched_from_flank(curve)}"
+    )
+
+
+def _marched_from_flank(curve: Curve) -> str:
+    """What the resonance was marched from, and what was found."""
+    found = "" if curve.kept is None else f"; {curve.kept.sentence}"
+    ends = {curve.frequency.min(): "first", curve.frequency.max(): "last"}
+    end = ends.get(curve.peak_frequency)
+    beyond = f"; it is the {end} point of the band, beyond which it may be higher" if end else ""
+    return (
+        f"the amplitude given is that of a march from {1e6 * curve.balance_amplitude:.4g} um at "
+        f"{curve.peak_frequency:.5g} Hz{found}{beyond}"
+    )
+
+
+def unmarched_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances beside which unstable motions were not marched from, or ""."""
+    loads = ", ".join(f"{c.load:g} N" for c in curves if c.unmarched)
+    if not loads:
+        return ""
+    return (
+        f"under {loads} motions nearly as high as the resonance are unstable, and what the blade "
+        "keeps to there was not marched, since that takes too long: it may be higher"
+    )
 
 
 def unjudged_sentence(curves: Sequence[Curve]) -> str:

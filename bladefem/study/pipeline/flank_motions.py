@@ -1,0 +1,99 @@
+"""What the blade keeps to beside a resonance: marches from unstable motions nearly as high.
+
+A ripple that is weak at the resonance may grow far from a flank of it. Plane blades under 4 N are
+stable at 2.15 um and 1077 Hz; from 2.06 um at 1016 Hz, which is not, they come to bounce between
+1.15 and 3.6 um.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import InputError
+from ...hbm.solution import Solution
+from ...hbm.stability import UNSTABLE
+from ..adaptive.check_points import heights_of
+from ..adaptive.choice import Checked
+from .error_in_time import Marches
+from .kept_band import KeptBand, band_by_steps
+from .stability import Stability, model_in_time, settings_in_time
+
+# share of the resonance amplitude from which an unstable motion is marched from
+NEARLY_AS_HIGH = 0.9
+# operations that one march may need, some 2.5 s
+MAX_COUNTED = 1.5e10
+
+
+@dataclass(frozen=True)
+class FlankMotions:
+    """The highest band of amplitudes beside a resonance."""
+
+    # an unstable motion of the curve, and what the blade keeps to after it; None where nothing was
+    # marched
+    point: Solution | None = None
+    kept: KeptBand | None = None
+    # there are such motions, and marches from them take too long
+    too_long: bool = False
+
+    @property
+    def highest(self) -> float:
+        """Highest amplitude of a period [m]; 0 where nothing was marched."""
+        return 0.0 if self.kept is None else self.kept.highest
+
+
+def flank_motions(
+    marches: Marches,
+    curve: Checked,
+    marks: Stability,
+    given: float,
+    known: Solution | None = None,
+) -> FlankMotions:
+    """March from the highest of the unstable motions, from the one that is left fastest, and from
+    those at both ends of their range; from the neighbours of the best one where it is beyond the
+    resonance.
+
+    Args:
+        given: amplitude of the resonance [m].
+        known: a point of the curve that was marched from already.
+    """
+    heights = heights_of(curve.points)
+    high = (marks.verdict == UNSTABLE) & (heights >= NEARLY_AS_HIGH * given)
+    places = [i for i in np.flatnonzero(high) if curve.points[i] is not known]
+    if not places:
+        return FlankMotions()
+    try:
+        model = model_in_time(marches.models, settings_in_time(marches.models, curve.settings))
+    except InputError:
+        return FlankMotions()
+    first = [
+        max(places, key=lambda i: heights[i]),
+        max(places, key=lambda i: marks.multiplier[i]),
+        places[0],
+        places[-1],
+    ]
+    bands: dict[int, KeptBand] = {}
+
+    def march(numbers: list[int]) -> bool:
+        for i in dict.fromkeys(numbers):
+            bands[i] = band_by_steps(model, curve.points[i], MAX_COUNTED)
+            if bands[i].too_long:
+                return False
+        return True
+
+    if not march(first):
+        return FlankMotions(too_long=True)
+    best = _highest(bands)
+    if best is not None and bands[best].highest > given:
+        at = places.index(best)
+        beside = [i for i in places[max(0, at - 1) : at + 2] if i not in bands]
+        march(beside)
+        best = _highest(bands)
+    return FlankMotions() if best is None else FlankMotions(curve.points[best], bands[best])
+
+
+def _highest(bands: dict[int, KeptBand]) -> int | None:
+    """The number with the highest amplitude of those that are known."""
+    known = [i for i, band in bands.items() if not band.reason]
+    return max(known, key=lambda i: bands[i].highest) if known else None

@@ -1,0 +1,158 @@
+"""Marches from unstable motions beside a resonance."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from models import rebounding
+
+from bladefem.hbm.solution import size
+from bladefem.hbm.solve import solve
+from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
+from bladefem.study.adaptive.family import Family, Member
+from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline import flank_motions as module
+from bladefem.study.pipeline import judged_resonance
+from bladefem.study.pipeline.error_in_time import Marches
+from bladefem.study.pipeline.flank_motions import FlankMotions, flank_motions
+from bladefem.study.pipeline.kept_band import KeptBand
+from bladefem.study.pipeline.loads import Curve
+from bladefem.study.pipeline.stability import Stability
+from bladefem.study.pipeline.stability_remarks import unmarched_sentence, unstable_sentence
+
+HEIGHTS = (0.95, 0.96, 0.97, 0.98, 1.0, 0.95, 0.6)
+VERDICTS = (UNSTABLE,) * 4 + (STABLE, UNSTABLE, UNSTABLE)
+MULTIPLIERS = np.array([1.03, 1.04, 1.06, 1.05, 1.0, 1.01, 2.0])
+
+
+def point_at(omega, height):
+    probe = np.array([[0.0], [height]])
+    return SimpleNamespace(omega=omega, frequency=omega, probe=probe, converged=True)
+
+
+@pytest.fixture
+def curve():
+    points = [point_at(float(k), height) for k, height in enumerate(HEIGHTS)]
+    return SimpleNamespace(points=points, settings=None)
+
+
+@pytest.fixture
+def marks():
+    return Stability(np.array(VERDICTS), MULTIPLIERS, bifurcation=np.full(7, ""))
+
+
+@pytest.fixture
+def kept(monkeypatch):
+    """What the blade keeps to after each point, settable; and the points marched from."""
+    ends = {float(k): (0.9 * h, h) for k, h in enumerate(HEIGHTS)}
+    asked = []
+
+    def band(model, point, counted):
+        asked.append(point.omega)
+        lowest, highest = ends[point.omega]
+        reason = "" if np.isfinite(highest) else "a march takes too many operations"
+        return KeptBand(point.frequency, lowest, highest, 200, reason, too_long=bool(reason))
+
+    monkeypatch.setattr(module, "model_in_time", lambda *_: None)
+    monkeypatch.setattr(module, "settings_in_time", lambda *_: None)
+    monkeypatch.setattr(module, "band_by_steps", band)
+    return ends, asked
+
+
+MARCHES = SimpleNamespace(models=None)
+
+
+def test_the_highest_the_fastest_and_both_ends_are_marched_from(curve, marks, kept):
+    found = flank_motions(MARCHES, curve, marks, 1.0)
+    assert kept[1] == [3.0, 2.0, 0.0, 5.0]
+    assert found.point is curve.points[3] and not found.too_long
+
+
+def test_neighbours_of_a_motion_beyond_the_resonance_are_marched_too(curve, marks, kept):
+    kept[0].update({0.0: (0.5, 1.6), 1.0: (0.5, 1.7)})
+    found = flank_motions(MARCHES, curve, marks, 1.0)
+    assert kept[1] == [3.0, 2.0, 0.0, 5.0, 1.0]
+    assert found.point is curve.points[1] and found.highest == 1.7
+
+
+def test_only_motions_that_are_nearly_as_high_and_not_known_count(curve, marks, kept):
+    flank_motions(MARCHES, curve, marks, 1.07, known=curve.points[3])
+    assert kept[1] == [2.0]
+    assert flank_motions(MARCHES, curve, marks, 1.2) == FlankMotions()
+
+
+def test_marches_that_take_too_long_are_told(curve, marks, kept):
+    kept[0][2.0] = (np.nan, np.nan)
+    found = flank_motions(MARCHES, curve, marks, 1.0)
+    assert found.too_long and found.point is None and kept[1] == [3.0, 2.0]
+    assert "under 4 N" in unmarched_sentence([SimpleNamespace(load=4.0, unmarched=True)])
+    assert unmarched_sentence([SimpleNamespace(load=4.0, unmarched=False)]) == ""
+
+
+@pytest.mark.parametrize(
+    ("highest", "given", "beside"),
+    [(1.7, 1.7, 0.0), (1.03, 1.0, 0.03), (0.99, 1.0, 0.0)],
+)
+def test_a_motion_beside_the_resonance_is_given_or_counted(
+    highest, given, beside, curve, marks, monkeypatch
+):
+    """Beyond the accuracy it is the resonance; within it, part of the error."""
+    flank = FlankMotions(curve.points[0], KeptBand(0.0, 0.5, highest, 300))
+    models = {"model_in_time": None, "richer_models": [], "stability_of": marks}
+    for name, value in models.items():
+        monkeypatch.setattr(judged_resonance, name, lambda *_, value=value: value)
+    monkeypatch.setattr(judged_resonance, "unstable_with_more_points", lambda *_: None)
+    monkeypatch.setattr(judged_resonance, "flank_motions", lambda *_: flank)
+    scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
+    found = judged_resonance.judged_resonance(MARCHES, curve, scene)
+    assert found.amplitude == pytest.approx(given)
+    assert found.beside == pytest.approx(beside)
+    assert found.contradicted == (given == highest)
+    assert found.unstable_peak(curve) is None
+
+
+def test_a_higher_march_beside_a_marched_resonance_is_given(curve, marks, monkeypatch):
+    """On the shipped wedge under 73 N: 139.5 um at the highest motion, 145.6 um beside it."""
+    flank = FlankMotions(curve.points[2], KeptBand(2.0, 0.93, 0.94, 300))
+    monkeypatch.setattr(judged_resonance, "flank_motions", lambda *_: flank)
+    top = judged_resonance.JudgedResonance(
+        curve.points[4], marks, KeptBand(4.0, 0.9, 0.91, 200), contradicted=True
+    )
+    found = judged_resonance._with_flanks(MARCHES, curve, top, curve.points[4], 0.05)
+    assert found.contradicted and found.amplitude == 0.94
+
+
+def test_the_report_says_where_the_amplitude_was_marched_from():
+    curve = SimpleNamespace(
+        load=4.0,
+        unstable_peak=None,
+        marched_instead=True,
+        amplitude=np.array([2.05e-6, 2.149e-6]),
+        frequency=np.array([1014.2, 1077.3]),
+        balance_amplitude=2.05e-6,
+        peak_frequency=1014.2,
+        kept=KeptBand(1014.2, 1.15e-6, 3.6e-6, 350),
+    )
+    text = unstable_sentence(curve, 0.02)
+    assert "2.149 um, lasts" in text and "march from 2.05 um at 1014.2 Hz" in text
+    assert "between 1.15 and 3.6 um" in text
+    assert "first point of the band" in text
+    assert Curve.marched.fget(curve) == pytest.approx(1 - 1.15 / 3.6)
+
+
+def test_a_doubled_period_beside_a_resonance_is_found():
+    """A mass that rebounds: the motion at 3 rad/s doubles its period, and is four times as high."""
+    model = rebounding(10.0, 0.1, 0.04)
+    family = Family(lambda s: Member(model, np.arange(1)), 1)
+    settings = replace(first_for(1), harmonics=15, samples=1024, points=None)
+    lasting = point_at(2.0, 1.05 * size(solve(model, 3.0, 15, 1024)))
+    doubled = solve(model, 3.0, 15, 1024)
+    told = stability_verdict(model, doubled)
+    assert told.verdict == UNSTABLE
+    marks = Stability(np.array([STABLE, UNSTABLE]), np.array([1.0, told.multiplier]))
+    curve = SimpleNamespace(points=[lasting, doubled], settings=settings)
+    found = flank_motions(Marches(family), curve, marks, size(lasting))
+    assert found.point is doubled and found.highest > 3.5 * size(lasting)
