@@ -50,9 +50,9 @@ def flank_motions(
     given: float,
     known: Solution | None = None,
 ) -> FlankMotions:
-    """March from the highest of the unstable motions, from the one that is left fastest, and from
-    those at both ends of their range; from the neighbours of the best one where it is beyond the
-    resonance.
+    """March from the highest of the unstable motions, from the one that is left fastest, from those
+    at both ends of their range and beside one that was marched from already; from the neighbours of
+    the best one where it is beyond the resonance.
 
     Args:
         given: amplitude of the resonance [m].
@@ -60,7 +60,8 @@ def flank_motions(
     """
     heights = heights_of(curve.points)
     high = (marks.verdict == UNSTABLE) & (heights >= NEARLY_AS_HIGH * given)
-    places = [i for i in np.flatnonzero(high) if curve.points[i] is not known]
+    unstable = np.flatnonzero(high)
+    places = [int(i) for i in unstable if curve.points[i] is not known]
     if not places:
         return FlankMotions()
     try:
@@ -73,6 +74,9 @@ def flank_motions(
         places[0],
         places[-1],
     ]
+    if len(places) < len(unstable):
+        at = next(k for k, i in enumerate(unstable) if curve.points[i] is known)
+        first += places[max(0, at - 1) : at + 1]
     bands: dict[int, KeptBand] = {}
 
     def march(numbers: list[int]) -> bool:
