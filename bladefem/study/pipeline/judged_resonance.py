@@ -14,7 +14,6 @@ from ...scene.tables import Scene
 from ...util.arrays import RealArray
 from ..adaptive.check_points import heights_of
 from ..adaptive.choice import Checked, estimated_errors
-from ..adaptive.choice_in_time import MarchedBand
 from ..adaptive.settings import Settings
 from .error_in_time import Marches, error_in_time
 from .finer_contacts import FinerMotion, unstable_with_more_points
@@ -155,12 +154,10 @@ def _with_verdict(marks: Stability, place: int, told: Verdict) -> Stability:
 
 
 def _contradicts(kept: KeptBand, top: Solution, accuracy: float) -> bool:
-    """What the blade keeps to is known, and not the amplitude of the motion that it was marched
-    from.
+    """The highest amplitude that the blade keeps to is known, and not that of the motion that it
+    was marched from.
     """
-    if kept.reason:
-        return False
-    return MarchedBand(kept.lowest, kept.highest).beyond(size(top)) > accuracy
+    return not kept.reason and abs(kept.highest / size(top) - 1) > accuracy
 
 
 def judged_in_time(
