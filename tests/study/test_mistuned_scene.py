@@ -219,6 +219,30 @@ def test_blades_of_another_shape(tmp_path):
     assert any(text.startswith("other_blades: found") for text in again.messages)
 
 
+def test_blades_of_another_stiffness_and_mass(tmp_path):
+    """A file with a density a blade, and a stiffness a family."""
+    rng = np.random.default_rng(4)
+    values = 0.01 * rng.normal(size=(36, 4))
+    file = tmp_path / "pattern.csv"
+    rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(values)]
+    file.write_text("\n".join(["blade, mass, 1F stiffness, 2F stiffness, 1T stiffness", *rows]))
+    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, f"mistuning.pattern={file}"])
+    run = with_whole_wheel(pipeline.run(scene, tmp_path))
+    (found,) = run.wheel
+    alone = np.sqrt((1 + values[:, 1:]) / (1 + values[:, :1])) - 1
+    np.testing.assert_allclose(found.deviation, alone, atol=1e-12)
+    assert found.factor > 1.0 and found.peak.unsolved == 0
+    # the motion of all finite elements with the deviations' forces is that of the reduced wheel
+    assert found.stress.mismatch < 5e-3
+    # frequencies alone are another wheel: that of the same root
+    rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(alone)]
+    file.write_text("\n".join(["blade, 1F, 2F, 1T", *rows]))
+    other = with_whole_wheel(pipeline.run(scene, tmp_path)).wheel[0]
+    np.testing.assert_allclose(other.deviation, alone, atol=1e-12)
+    assert other.factor == pytest.approx(found.factor, rel=0.1)
+    assert other.peak.height != found.peak.height
+
+
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     """Four wheels, the lowest and the highest also in full; a second call finds them."""
     scene = load_scene(MISTUNED, COARSE_MISTUNED)
@@ -287,6 +311,21 @@ def test_bad_input_is_refused_before_long_work(overrides, message):
 def test_bad_pattern_file_is_refused_before_long_work(rows, message, tmp_path):
     file = tmp_path / "pattern.csv"
     file.write_text("\n".join(["blade, 1F", *rows]))
+    with pytest.raises(InputError, match=message):
+        refuse_run(load_scene(MISTUNED, [f"mistuning.pattern={file}"]))
+
+
+@pytest.mark.parametrize(
+    ("names", "row", "message"),
+    [
+        ("1F stiffness, 2F stiffness", "0.01, 0.02", "2 families with a stiffness, expected 1"),
+        ("mass", "-1.5", "-1.5 of blade 1 leaves it no mass"),
+        ("1F, mass", "0.01, 0.02", "expected frequencies alone, or stiffnesses and masses"),
+    ],
+)
+def test_bad_columns_are_refused_before_long_work(names, row, message, tmp_path):
+    file = tmp_path / "pattern.csv"
+    file.write_text("\n".join([f"blade, {names}", *(f"{i}, {row}" for i in range(1, 37))]))
     with pytest.raises(InputError, match=message):
         refuse_run(load_scene(MISTUNED, [f"mistuning.pattern={file}"]))
 

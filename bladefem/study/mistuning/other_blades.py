@@ -80,14 +80,17 @@ class OtherBlades:
 
     changes: Mapping[int, BladeChange]
 
-    def added(self, pattern: Pattern, count: int, families: int) -> Pattern:
-        """A pattern of frequencies (N, q, q), or a tuned one, with these blades' deviations."""
+    def added(self, pattern: Pattern, count: int) -> Pattern:
+        """A pattern of the q families (N, q, q), also with the root's motions, or a tuned one, with
+        these blades' deviations.
+        """
         size = len(next(iter(self.changes.values())).stiffness)
         stiffness = np.zeros((count, size, size))
         mass = np.zeros((count, size, size))
         for total, given in ((stiffness, pattern.stiffness), (mass, pattern.mass)):
             if given is not None:
-                total[:, :families, :families] = given
+                own = given.shape[1]
+                total[:, :own, :own] = given
         for number, change in self.changes.items():
             stiffness[number] += change.stiffness
             mass[number] += change.mass

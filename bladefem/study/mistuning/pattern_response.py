@@ -10,7 +10,7 @@ import numpy as np
 
 from ...hbm.linear_resonances import free_resonances
 from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
-from ...wheel.model import Pattern, Wheel, frequency_pattern
+from ...wheel.model import Pattern, Wheel
 from ...wheel.resonance import WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
@@ -106,7 +106,7 @@ def _stuck_peaks(
 
 def pattern_response(
     wheel: Wheel,
-    families: np.ndarray,
+    pattern: Pattern,
     deviation: np.ndarray,
     curve: Curve,
     stress: Callable[[Pattern, WheelSolution, int], DampedStress],
@@ -117,16 +117,12 @@ def pattern_response(
 
     Args:
         wheel: the tuned wheel under that load.
-        families: (q,) circular frequencies of the blade-alone modes [rad/s].
-        deviation: (N, q) relative deviations of these.
+        pattern: what differs from blade to blade.
+        deviation: (N, q) relative deviations of the blade-alone frequencies.
         stress: of a blade, by the pattern, the solution and the blade's number.
-        others: blades of another shape, in addition.
+        others: the blades of another shape in the pattern.
         options: when a point is accepted.
     """
-    pattern = frequency_pattern(families, deviation)
-    if others is not None:
-        pattern = others.added(pattern, *deviation.shape)
-        deviation = deviation + others.frequencies(*deviation.shape)
     settings = curve.settings
     H = max(settings.harmonics, *wheel.excitation)
     samples = max(settings.samples, 8 * (H + 1))

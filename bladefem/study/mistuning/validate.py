@@ -11,7 +11,8 @@ from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.other_blades import other_blades
 from ...scene.tables import Scene
-from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
+from ...wheel.pattern_file import BladeDeviations, frequency_deviations, read_deviations
+from ...wheel.scatter import Scatter, drawn_deviations
 
 # mistuning.level: all wheels by the law of one damper
 LAW_LEVEL = "damper law"
@@ -78,35 +79,23 @@ def scene_deviations(
     scene: Scene,
     count: int,
     families: int,
-) -> np.ndarray:
-    """(N, q) relative deviations of frequency: of the file, or the first ones drawn.
+) -> BladeDeviations:
+    """Relative deviations of the blades: of the file, or the first ones drawn.
 
     Raises:
         InputError: neither is given, the file does not fit, or a blade would be unstable.
     """
     given = scene.mistuning
     if given.pattern:
-        _, values = read_pattern(given.pattern, count)
-        if values.shape[1] not in (1, families):
-            raise InputError(
-                f"mistuning.pattern: {values.shape[1]} families, expected 1 for all or "
-                f"mistuning.families = {families}"
-            )
-        if values.min() <= -1:
-            blade = int(np.argmin(values.min(axis=1)))
-            raise InputError(
-                f"mistuning.pattern: deviation {values.min():.4g} of blade {blade + 1} leaves it "
-                "no stiffness, expected relative deviations of frequency above -1"
-            )
-        return np.broadcast_to(values, (count, families)).copy()
+        return read_deviations(given.pattern, count, families)
     if given.scatter is None and given.blades:
-        return np.zeros((count, families))
+        return frequency_deviations(np.zeros((count, families)))
     if given.scatter is None:
         raise InputError("mistuning: expected a pattern file or a scatter")
     # the same first wheel as the statistics draw
     scatter = Scatter(given.scatter, seed=given.seed)
     deviation = drawn_deviations(count, scatter, 1).blades[0]
-    return np.repeat(deviation[:, None], families, axis=1)
+    return frequency_deviations(np.repeat(deviation[:, None], families, axis=1))
 
 
 def scene_scatter(scene: Scene) -> Scatter:

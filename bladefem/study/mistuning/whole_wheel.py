@@ -45,6 +45,7 @@ def reduce_wheel(
     clamped: ModeSet | None,
     families: int,
     wheel_modes: Sequence[ModeSet] = (),
+    root: bool = False,
 ) -> WheelSector:
     """The sector in nodal diameters 0 to N/2.
 
@@ -52,12 +53,14 @@ def reduce_wheel(
         modes: modes kept in each nodal diameter.
         clamped: modes of the aerofoil held at its root.
         families: of these that deviate from blade to blade.
-        wheel_modes: modes of the tuned wheel, wanted where some blades have another shape.
+        wheel_modes: modes of the tuned wheel, wanted with the root.
+        root: read the motions of the aerofoil's root too: of blades of another shape, stiffness or
+            mass, whose inertia differs under these.
 
     Raises:
         InputError: the scene is no wheel, or names no aerofoil.
     """
-    omega, readings = blade_readings(bodies, clamped, families, wheel_modes)
+    omega, readings = blade_readings(bodies, clamped, families, wheel_modes, root)
     diameters = range(sector_of(bodies.mesh).count // 2 + 1)
     reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
     return WheelSector(reduced, omega)
@@ -68,10 +71,11 @@ def blade_readings(
     clamped: ModeSet | None,
     families: int,
     modes: Sequence[ModeSet] = (),
+    root: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Circular frequencies (q,) of the blade-alone modes [rad/s], and the columns (n_points*dim, q)
-    that read their coordinates, with more for the motion of the root where some blades have another
-    shape; the arguments are those of `reduce_wheel`.
+    that read their coordinates, with more for the motions of the root; the arguments are those of
+    `reduce_wheel`.
     """
     from ...fem.held_part import section_readings
     from ...fem.readings import modal_readings
@@ -89,8 +93,7 @@ def blade_readings(
         )
     omega = 2 * pi * clamped.frequencies[:families]
     readings = modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
-    if bodies.scene.mistuning.blades:
-        # a blade of another shape has another inertia under motions of its root too
+    if root:
         foot = foot_of(bodies.mesh, modes, families)
         readings = np.hstack([readings, section_readings(bodies.mesh, foot.nodes, foot.motions)])
     return omega, readings
