@@ -359,7 +359,7 @@ class Mistuning:
     )
     orders: tuple[str, ...] | None = quantity(
         None,
-        help="further engine orders, multiples of the first, as texts like '18: 0.3 N; 90 deg'",
+        help="further engine orders, as texts like '18: 0.3 N; 90 deg'",
     )
 
 

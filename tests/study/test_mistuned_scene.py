@@ -24,6 +24,7 @@ from bladefem.study.mistuning.blade_stress import (
     blade_motion,
     blade_stress,
 )
+from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
@@ -243,6 +244,41 @@ def test_blades_of_another_stiffness_and_mass(tmp_path):
     assert other.peak.height != found.peak.height
 
 
+def test_engine_orders_of_one_period():
+    """Order 9 and 6 in a period of three to a revolution; alone it is harmonic 1."""
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    assert own_harmonic(scene) == 1
+    both = vary(scene, mistuning__orders=("6: 0.5 N; 30 deg", "18: 0.1 N"))
+    assert own_harmonic(both) == 3
+    forces = order_forces(both, 36)
+    assert sorted(forces) == [2, 3, 6]
+    around = 2 * np.pi * np.arange(36) / 36
+    wave = 0.5 * np.exp(1j * (6 * around + np.radians(30)))
+    np.testing.assert_allclose(forces[2][:, 0], wave, atol=1e-12)
+    np.testing.assert_allclose(forces[3][:, 0], 1.5 * np.exp(9j * around), atol=1e-12)
+
+
+def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(tmp_path):
+    """Order 6 next to 9, with hardly a force: harmonics 3, 6, 9 of three periods a revolution, and
+    the answer of harmonics 1, 2, 3 of nine.
+    """
+    fixed = [*COARSE_MISTUNED, "model.harmonics=1", "model.samples=64"]
+    run = pipeline.run(load_scene(MISTUNED, fixed), tmp_path)
+    one = with_whole_wheel(run)
+    faint = vary(run.scene, mistuning__orders=("6: 1e-9 N",))
+    both = with_whole_wheel(replace(run, scene=faint))
+    r, s = one.wheel[0], both.wheel[0]
+    assert (r.harmonic, s.harmonic) == (1, 3)
+    assert s.solution.probe.shape[1] == 4
+    assert s.peak.height == pytest.approx(r.peak.height, rel=1e-3)
+    assert s.frequency == pytest.approx(r.frequency, rel=1e-5)
+    assert s.factor == pytest.approx(r.factor, rel=1e-3)
+    assert s.free_factor == pytest.approx(r.free_factor, rel=1e-6)
+    assert s.stress.largest == pytest.approx(r.stress.largest, rel=5e-3)
+    np.testing.assert_allclose(np.exp(1j * (s.phase - r.phase)), 1, atol=0.02)
+    assert any("engine orders beyond the tuned sector's" in text for text in both.messages)
+
+
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     """Four wheels, the lowest and the highest also in full; a second call finds them."""
     scene = load_scene(MISTUNED, COARSE_MISTUNED)
@@ -265,7 +301,8 @@ def test_statistics_by_the_damper_law_are_checked_in_full(folder):
             "mistuning.pattern = .*nowhere.csv': there is no such file",
         ),
         (["disc.sectors=35"], "36 blades, expected 35"),
-        (["mistuning.orders=10: 0.3 N"], "expected a multiple of excitation.engine_order = 9"),
+        (["mistuning.orders=0: 0.3 N"], "expected an order above 0"),
+        (["mistuning.orders=100: 0.3 N"], "order 100 is harmonic 100 of the common divisor 1"),
         (
             ["mistuning.orders=18: 0.3 N", "mistuning.level=damper law"],
             "takes one engine order, expected no mistuning.orders",

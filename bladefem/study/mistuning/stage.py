@@ -40,12 +40,14 @@ from ..pipeline.stage_inputs import stage_key
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_material import deviation_pattern
 from .blade_stress import WheelShapes, all_modes, blade_stress
+from .engine_orders import own_harmonic
 from .law_level import law_level, with_checks
 from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
 from .pattern_response import (
     SEARCH_TOLERANCE,
     PatternResponse,
     frequency_grid,
+    in_common_period,
     pattern_response,
     pattern_sentences,
 )
@@ -143,6 +145,9 @@ def _best_response(
         lambda *of_blade: on_root(comm, lambda: stress(*of_blade)),
         others,
         solver_options(run.scene.accuracy),
+        own_harmonic(run.scene),
+        # harmonics that the scene gives are kept
+        run.scene.accuracy / 2 if run.scene.model.harmonics is None else None,
     )
 
 
@@ -217,8 +222,9 @@ def _kept_statistics(
     """Statistics under the load of one curve, computed or found in the folder."""
     scene = run.scene
     spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
-    H = max(curve.settings.harmonics, *wheel.excitation)
-    samples = max(curve.settings.samples, 8 * (H + 1))
+    harmonic = own_harmonic(scene)
+    H = max(harmonic * curve.settings.harmonics, *wheel.excitation)
+    samples = max(harmonic * curve.settings.samples, 8 * (H + 1))
     families = len(sector.families)
     options = solver_options(scene.accuracy)
     if others is not None:
@@ -243,7 +249,7 @@ def _kept_statistics(
             cheap = on_root(comm, lambda: law_level(wheel, patterns, drawn, curve, mode, band))
 
             def whole_peak(pattern: Pattern) -> float:
-                own = frequency_grid(wheel, curve, pattern, spread)
+                own = frequency_grid(wheel, curve, pattern, spread, harmonic)
                 return find_wheel_peak(
                     wheel_respond(wheel, pattern, H, samples, options), own, SEARCH_TOLERANCE
                 ).height
@@ -253,8 +259,10 @@ def _kept_statistics(
         return scatter_statistics(
             {curve.load: wheel},
             {curve.load: patterns},
-            lambda load, pattern: frequency_grid(wheel, curve, pattern, spread),
-            lambda wheel, pattern: wheel_respond(wheel, pattern, H, samples, options),
+            lambda load, pattern: frequency_grid(wheel, curve, pattern, spread, harmonic),
+            lambda wheel, pattern: in_common_period(
+                wheel_respond(wheel, pattern, H, samples, options), harmonic
+            ),
             comm,
             SEARCH_TOLERANCE,
             progress,

@@ -13,6 +13,7 @@ from ...scene.other_blades import other_blades
 from ...scene.tables import Scene
 from ...wheel.pattern_file import BladeDeviations, frequency_deviations, read_deviations
 from ...wheel.scatter import Scatter, drawn_deviations
+from .engine_orders import read_orders
 
 # mistuning.level: all wheels by the law of one damper
 LAW_LEVEL = "damper law"
@@ -102,32 +103,3 @@ def scene_scatter(scene: Scene) -> Scatter:
     """The scene's standard deviations."""
     m = scene.mistuning
     return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.mass, m.traction, m.seed)
-
-
-def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
-    """Order, amplitude [N] and phase [rad] of each entry of mistuning.orders.
-
-    Raises:
-        InputError: an entry is not "18: 0.3 N" or "18: 0.3 N, 90 deg", or no multiple of the
-            engine order.
-    """
-    from ...scene.units import parse
-
-    found = []
-    for entry in scene.mistuning.orders or ():
-        order, colon, rest = entry.partition(":")
-        force, _, phase = rest.partition(";")
-        name = f"mistuning.orders '{entry}'"
-        if not colon or not order.strip().isdigit():
-            raise InputError(
-                f"{name}: expected a whole order and a force, such as '18: 0.3 N; 90 deg'"
-            )
-        base = scene.excitation.engine_order
-        if base == 0 or int(order) % base or int(order) == 0:
-            raise InputError(
-                f"{name}: expected a multiple of excitation.engine_order = {base}, so that all "
-                "orders have one period"
-            )
-        angle = parse(phase.strip(), "rad", name) if phase.strip() else 0.0
-        found.append((int(order), parse(force.strip(), "N", name), angle))
-    return found

@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...reduction.assemble import pair_model
 from ...reduction.truncate import truncate_modes
 from ...scene.tables import Scene
-from ...wheel.model import Wheel, engine_order
+from ...wheel.model import Wheel
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.bodies import Bodies
@@ -25,8 +25,8 @@ from ..pipeline.coriolis import with_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
 from ..pipeline.joined_contacts import joined_member
 from ..pipeline.reduced_sector import Reduced, reduce_sector, with_damper_mass
+from .engine_orders import order_forces
 from .other_blades import foot_of
-from .validate import read_orders
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ def whole_wheel(
         count,
         dict(enumerate(model.sides)),
         model.elements,
-        _excitation(scene, count),
+        order_forces(scene, count),
         model.damping,
         damper,
         model.damper_damping,
@@ -135,14 +135,3 @@ def whole_wheel(
         coupled=False,
         start=model.start,
     )
-
-
-def _excitation(scene: Scene, count: int) -> dict[int, np.ndarray]:
-    """Harmonic to amplitudes: the scene's engine order and its multiples in mistuning.orders."""
-    order = scene.excitation.engine_order
-    found = {1: engine_order(count, order, np.array([scene.excitation.force]))}
-    for multiple, force, phase in read_orders(scene):
-        part = engine_order(count, multiple, np.array([force]), phase)
-        harmonic = multiple // order
-        found[harmonic] = found.get(harmonic, 0.0) + part
-    return found
