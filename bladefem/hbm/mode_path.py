@@ -118,6 +118,7 @@ def follow_mode(
     frame: ModeFrame,
     amplitudes: Iterable[float],
     start: PathSpot | None = None,
+    arcs: int = MAX_ARCS,
 ) -> Iterator[PathSpot]:
     """Motions along the branch through the amplitudes, with those between them where it turns.
 
@@ -132,7 +133,7 @@ def follow_mode(
     plain = known
     for amplitude in amplitudes:
         s = float(np.log(amplitude))
-        spots, lost, near = _towards(frame, s, known, plain, ended)
+        spots, lost, near = _towards(frame, s, known, plain, ended, arcs)
         if spots[-1].converged:
             yield from _from_above(frame, missing, spots[-1])
             missing = []
@@ -175,6 +176,7 @@ def _towards(
     known: tuple[PathSpot, ...],
     plain: tuple[PathSpot, ...],
     ended: str,
+    arcs: int,
 ) -> tuple[list[PathSpot], str, tuple[PathSpot, ...]]:
     """Motions up to an amplitude, and why the branch was lost on the way, if it was; also
     the last two motions at given amplitude, none where it is begun.
@@ -189,7 +191,7 @@ def _towards(
         near = _shorter_steps(frame, s, known)
         if near[-1].s == s:
             return [near[-1]], "", near
-        spots, reason = _walk(frame, s, near)
+        spots, reason = _walk(frame, s, near, arcs)
         if not reason:
             # without a fold, what lies between shows nothing new
             return spots if any(spot.fold for spot in spots) else spots[-1:], "", near
@@ -238,6 +240,7 @@ def _walk(
     frame: ModeFrame,
     s: float,
     known: tuple[PathSpot, ...],
+    arcs: int,
 ) -> tuple[list[PathSpot], str]:
     """Arcs from the last motion known to an amplitude, which is solved last; "" or why it is not
     reached.
@@ -247,7 +250,7 @@ def _walk(
     spots: list[PathSpot] = []
     arc = FIRST_ARC
     reason = ""
-    for _ in range(MAX_ARCS):
+    for _ in range(arcs):
         direction = _direction(frame, trail, way)
         spot = _step(frame, trail[-1], direction, arc)
         if not spot.converged and arc <= CORNER_ARC:
@@ -276,7 +279,7 @@ def _walk(
             return spots, "the branch returns to far other amplitudes"
         if spot.iterations <= QUICK_STEPS:
             arc = min(ARC_GROWTH * arc, LONGEST_ARC)
-    return spots, f"{MAX_ARCS} motions do not reach the next amplitude"
+    return spots, f"{arcs} motions do not reach the next amplitude"
 
 
 def _refused(
