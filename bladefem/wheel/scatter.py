@@ -139,8 +139,8 @@ def with_dampers(
     elements = replace(
         e,
         mu=friction * e.mu,
-        kt=stiffness * e.kt,
-        kn=stiffness * e.kn,
+        kt=wheel.scaled_stiffness("kt", stiffness),
+        kn=wheel.scaled_stiffness("kn", stiffness),
         n0=load * e.n0,
         t0=None if e.t0 is None else load[:, None] * e.t0,
     )

@@ -89,6 +89,32 @@ def test_whole_wheel_is_the_tuned_sector(reduced, finest, share):
     )
 
 
+def test_a_stiff_layer_is_that_of_the_tuned_sector(reduced):
+    """Part of it in series, or softened throughout, as the settings of the curve say."""
+    scene, run, patches, sector, case, settings = reduced
+    n = len(case.elements.kt)
+    e = case.elements
+    series = -0.5 * np.column_stack([1 / e.kn, 1 / e.kt, 1 / e.kt])
+    case = replace(case, series=series)
+    family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+    answers = []
+    for softened in (False, True):
+        own = replace(settings, softened=softened)
+        wheel = whole_wheel(scene, run.mesh, sector, patches, case, own)
+        assert (wheel.series is None) == softened
+        assert softened or wheel.series.shape == (n, 3)
+        model = family_member(family, own).model
+        omega = 0.99 * model.side(1).omega[0]
+        one = solve(model, omega, 1, 72, options=TIGHT)
+        found = solve_wheel(wheel, omega, 1, 72, options=TIGHT)
+        assert one.converged and found.converged
+        turn = np.exp(2j * np.pi * 9 / 36 * np.arange(36))
+        scale = abs(one.probe).max()
+        np.testing.assert_allclose(found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-9 * scale)
+        answers.append(one.probe[1, 0])
+    assert abs(answers[1] - answers[0]) > 1e-3 * abs(answers[0])
+
+
 def test_stiffer_blades_raise_the_resonance_by_the_aerofoils_share(reduced):
     """1 % on all blades: the wheel's resonance rises, by less than the blades' own."""
     scene, run, patches, sector, case, settings = reduced

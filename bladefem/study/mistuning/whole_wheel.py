@@ -14,6 +14,7 @@ from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet, Patch
 from ...errors import InputError
+from ...hbm.model import softened_layer
 from ...reduction.assemble import pair_model
 from ...reduction.truncate import truncate_modes
 from ...scene.tables import Scene
@@ -122,6 +123,8 @@ def whole_wheel(
         scene, mesh, reduced, patches, case, settings.harmonics, settings.damper, sides
     )
     model = joined_member(model, patches, settings.points, scene.contact.points).model
+    if settings.softened:
+        model = softened_layer(model)
     damper = model.damper[0] if isinstance(model.damper, tuple) else model.damper
     return Wheel(
         count,
@@ -134,4 +137,5 @@ def whole_wheel(
         influence=wheel_influence(scene_flow(scene, count), bodies),
         coupled=False,
         start=model.start,
+        series=model.series,
     )
