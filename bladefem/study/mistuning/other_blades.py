@@ -193,9 +193,7 @@ def blade_change(tuned: HeldPart, other: HeldPart, name: str) -> BladeChange:
         InputError: one of its modes is none of the tuned ones.
     """
     q = len(tuned.omega)
-    seen = _at_places(tuned, other.points)
-    mass = other.mass_products(np.concatenate([seen, other.shapes]))
-    T = np.linalg.solve(mass[:q, :q], mass[:q, q:])
+    T, mass = by_tuned_modes(tuned, other)
     assurance = np.einsum("ij,ij->j", T, mass[:q, q:])
     worst = int(np.argmin(assurance))
     if assurance[worst] < LOWEST_ASSURANCE:
@@ -217,6 +215,16 @@ def blade_change(tuned: HeldPart, other: HeldPart, name: str) -> BladeChange:
     change[q:, q:] = other.inertia - tuned.inertia
     stiffness[q:, q:] = other.stiffness - tuned.stiffness
     return BladeChange(stiffness, change, other.omega[order] / tuned.omega - 1, assurance)
+
+
+def by_tuned_modes(tuned: HeldPart, other: HeldPart) -> tuple[np.ndarray, np.ndarray]:
+    """(q, q) the other aerofoil's modes by the tuned ones at the same places, and the products
+    (2q, 2q) of the tuned and the other modes with the other aerofoil's mass.
+    """
+    q = len(tuned.omega)
+    seen = _at_places(tuned, other.points)
+    mass = other.mass_products(np.concatenate([seen, other.shapes]))
+    return np.linalg.solve(mass[:q, :q], mass[:q, q:]), mass
 
 
 def _at_places(tuned: HeldPart, places: np.ndarray) -> np.ndarray:

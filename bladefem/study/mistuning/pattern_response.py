@@ -18,6 +18,7 @@ from ...wheel.tuned import tuned_sector
 from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 from .other_blades import OtherBlades, other_blade_sentences
+from .own_stress import OwnStress
 
 # points of the first look at a band
 FIRST_LOOK_POINTS = 15
@@ -60,6 +61,8 @@ class PatternResponse:
     stress: DampedStress
     # blades of another shape
     others: OtherBlades | None = None
+    # of the aerofoil of that blade on its own mesh, where it has another shape
+    own_stress: OwnStress | None = None
 
     @property
     def factor(self) -> float:
@@ -135,7 +138,7 @@ def pattern_response(
     pattern: Pattern,
     deviation: np.ndarray,
     curve: Curve,
-    stress: Callable[[Pattern, WheelSolution, int], DampedStress],
+    stress: Callable[[Pattern, WheelSolution, int], tuple[DampedStress, OwnStress | None]],
     others: OtherBlades | None = None,
     options: Options = DEFAULT_OPTIONS,
     harmonic: int = 1,
@@ -147,7 +150,8 @@ def pattern_response(
         wheel: the tuned wheel under that load.
         pattern: what differs from blade to blade.
         deviation: (N, q) relative deviations of the blade-alone frequencies.
-        stress: of a blade, by the pattern, the solution and the blade's number.
+        stress: of a blade, by the pattern, the solution and the blade's number; of one of another
+            shape also that of its own aerofoil.
         others: the blades of another shape in the pattern.
         options: when a point is accepted.
         harmonic: of the scene's engine order.
@@ -174,6 +178,7 @@ def pattern_response(
         SEARCH_TOLERANCE,
     )
     one_order = len(wheel.excitation) == 1
+    alternating, own = stress(pattern, solution, peak.blade)
     return PatternResponse(
         curve.load,
         curve.mass,
@@ -186,8 +191,9 @@ def pattern_response(
         _free_factor(wheel, pattern, grid, harmonic),
         truncation,
         tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
-        stress(pattern, solution, peak.blade),
+        alternating,
         others,
+        own,
     )
 
 
@@ -237,8 +243,14 @@ def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
         )
         if not r.peak.closed_in:
             text += "; the highest point is an end of the band, the resonance may be higher"
-        if r.others is not None and r.peak.blade in r.others.changes:
-            text += "; that blade has another shape, its stress is that of the others' shape"
+        if r.own_stress is not None:
+            own = r.own_stress
+            place = ", ".join(f"{1e3 * x:.1f}" for x in own.place)
+            text += (
+                "; that blade has another shape: the stress above is that of the others' shape, "
+                f"that of its own aerofoil {1e-6 * own.largest:.4g} MPa at ({place}) mm, estimated "
+                f"error of its mesh there {100 * own.mesh_error:.2g} %"
+            )
         sentences.append(text)
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))

@@ -33,16 +33,18 @@ from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases
-from ..pipeline.damped_motion import DampedStress
+from ..pipeline.damped_motion import DampedMotion, DampedStress, stress_of_motion
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
+from ..pipeline.scene_mesh import build_mesh
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_material import deviation_pattern
-from .blade_stress import WheelShapes, all_modes, blade_stress
+from .blade_stress import WheelShapes, all_modes, blade_motion
 from .engine_orders import own_harmonic
 from .law_level import law_level, with_checks
 from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
+from .own_stress import OwnStress, own_stress
 from .pattern_response import (
     SEARCH_TOLERANCE,
     PatternResponse,
@@ -126,7 +128,9 @@ def _best_response(
     if others is not None:
         frequency = frequency + others.frequencies(*frequency.shape)
 
-    def stress(pattern: Pattern, solution: WheelSolution, blade: int) -> DampedStress:
+    def stress(
+        pattern: Pattern, solution: WheelSolution, blade: int
+    ) -> tuple[DampedStress, OwnStress | None]:
         case = _cases(run)[curve.load, curve.mass]
         alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
         alone.kept.update(bodies.kept)
@@ -134,7 +138,11 @@ def _best_response(
         patches = list(run.contact.problem.patches)
         shapes = WheelShapes(alone, patches, all_modes(alone), readings)
         points = curve.settings.points
-        return blade_stress(shapes, wheel, pattern, case, solution, blade, points)
+        motion = blade_motion(shapes, wheel, pattern, case, solution, blade, points)
+        own = None
+        if others is not None and blade in others.changes:
+            own = _own_stress(run, len(sector.families), blade, motion, readings)
+        return stress_of_motion(alone, case, motion), own
 
     shared = replace(wheel, comm=comm)
     return pattern_response(
@@ -149,6 +157,27 @@ def _best_response(
         # harmonics that the scene gives are kept
         run.scene.accuracy / 2 if run.scene.model.harmonics is None else None,
     )
+
+
+def _own_stress(
+    run: SolvedRun,
+    families: int,
+    blade: int,
+    motion: DampedMotion,
+    readings: np.ndarray,
+) -> OwnStress:
+    """The stress of the aerofoil of a blade of another shape.
+
+    Args:
+        motion: of that blade on the mesh of the others.
+        readings: (n_points*dim, q + p) of the families and of the root.
+    """
+    foot = foot_of(run.mesh, run.modes, families)
+    tuned = held_aerofoil(run.scene, run.mesh, foot, families, run.clamped)
+    scene = _given_blades(run.scene)[blade]
+    other = held_aerofoil(scene, build_mesh(scene), foot, families)
+    fields = motion.harmonics
+    return own_stress(tuned, other, fields.reshape(len(fields), -1) @ readings)
 
 
 def _run_deviations(run: SolvedRun) -> BladeDeviations:
