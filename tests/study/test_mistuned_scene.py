@@ -3,6 +3,7 @@ before long work.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from bladefem.study.mistuning.blade_stress import (
     blade_motion,
 )
 from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
+from bladefem.study.mistuning.pattern_response import richer_balance
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
@@ -286,6 +288,17 @@ def test_engine_orders_of_one_period():
     wave = 0.5 * np.exp(1j * (6 * around + np.radians(30)))
     np.testing.assert_allclose(forces[2][:, 0], wave, atol=1e-12)
     np.testing.assert_allclose(forces[3][:, 0], 1.5 * np.exp(9j * around), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("excited", "H", "more"), [([1], 1, 3), ([1], 3, 7), ([1, 2], 2, 6), ([9, 10], 10, 30)]
+)
+def test_error_by_harmonics_knows_the_third_of_each_order(excited, H, more):
+    """Orders 9 and 10 in a period of one revolution: twice as many harmonics as ten do not reach
+    27.
+    """
+    wheel = SimpleNamespace(excitation=dict.fromkeys(excited))
+    assert richer_balance(wheel, H, 64) == (more, max(128, 8 * (more + 1)))
 
 
 def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(tmp_path):

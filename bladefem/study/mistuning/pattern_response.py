@@ -168,9 +168,10 @@ def pattern_response(
         )
         # of NaN nothing says that richer settings are solved
         enough = wanted is None or not truncation > wanted
-        if enough or 2 * H + 1 > MOST_HARMONICS * harmonic:
+        more = richer_balance(wheel, H, samples)
+        if enough or more[0] > MOST_HARMONICS * harmonic:
             break
-        H, samples = 2 * H + 1, 2 * samples
+        H, samples = more
     # the same way to the tuned one, so that the factor compares like with like
     tuned = find_wheel_peak(
         in_common_period(wheel_respond(wheel, Pattern(), H, samples, options), harmonic),
@@ -197,6 +198,15 @@ def pattern_response(
     )
 
 
+def richer_balance(wheel: Wheel, H: int, samples: int) -> tuple[int, int]:
+    """Harmonics and samples that tell what the present ones leave: at least twice as many, and with
+    the next odd multiple of the highest excited harmonic, which friction excites most.
+    """
+    top = max(wheel.excitation)
+    more = max(2 * H + 1, top * (2 * (H // top) + 1))
+    return more, max(2 * samples, 8 * (more + 1))
+
+
 def _peak_of_pattern(
     wheel: Wheel,
     pattern: Pattern,
@@ -216,8 +226,7 @@ def _peak_of_pattern(
     richer = solve_wheel(
         wheel,
         omega,
-        2 * H + 1,
-        2 * samples,
+        *richer_balance(wheel, H, samples),
         pattern=pattern,
         start=solution,
         options=options,
