@@ -5,8 +5,12 @@ frequency and damping follow from them. Between amplitudes that are asked for th
 at given amplitude, started on the line through the two motions known last. Where Newton fails, or
 the motion found lies far from the one predicted, and shorter steps do not mend it, the branch is
 followed by pseudo-arclength (Keller 1977) with the secant as direction, until the amplitude is
-passed. Mean displacements count neither in distances nor in directions: those of a free damper that
-slides everywhere are hardly determined, and drift without a change of the motion.
+passed. Sampled forces have corners where a contact opens or begins to slip: there the branch may
+turn by more than a right angle and misses the plane in which the secant looks for it. Arcs that
+fail are tried again along the tangents of the pieces that meet there. Amplitudes that are not
+reached from below are tried from above, where the branch is found again. Mean displacements count
+neither in distances nor in directions: those of a free damper that slides everywhere are hardly
+determined, and drift without a change of the motion.
 """
 
 from __future__ import annotations
@@ -53,10 +57,17 @@ SMALLEST_COSINE = 0.8
 FOLD_ARC = 0.02
 # arcs that may turn by any angle: the forces of sampled friction have corners
 CORNER_ARC = 1e-3
+# lengths at which a corner is looked beyond, and tried to be passed, over the arc that fails
+CORNER_PROBES = (1.0, 10.0, 0.1, 0.0)
+CORNER_ARCS = (1.0, 3.0, 10.0)
+# cosine of the angle to the last arc below which an arc leads back
+BACK_COSINE = -0.98
 # share of critical: sampled friction damps by less only on motions that are none of the joint's
 SMALLEST_DAMPING = -1e-6
 # way back in the logarithm of the amplitude at which the branch is given up
 FARTHEST_RETURN = 4.0
+# folds that a reason lists
+TURNS_TOLD = 3
 # motions between two amplitudes that are asked for
 MAX_ARCS = 200
 
@@ -107,6 +118,7 @@ def follow_mode(
     frame: ModeFrame,
     amplitudes: Iterable[float],
     start: PathSpot | None = None,
+    arcs: int = MAX_ARCS,
 ) -> Iterator[PathSpot]:
     """Motions along the branch through the amplitudes, with those between them where it turns.
 
@@ -114,14 +126,20 @@ def follow_mode(
     gives a motion that is not converged, with the reason.
     """
     known: tuple[PathSpot, ...] = () if start is None else (start,)
-    # why the branch was given up
+    # why the branch was given up, and the amplitudes that were not reached since
     ended = ""
+    missing: list[PathSpot] = []
     # the last two that were reached at given amplitude
     plain = known
     for amplitude in amplitudes:
         s = float(np.log(amplitude))
-        spots, lost, near = _towards(frame, s, known, plain, ended)
-        yield from spots
+        spots, lost, near = _towards(frame, s, known, plain, ended, arcs)
+        if spots[-1].converged:
+            yield from _from_above(frame, missing, spots[-1])
+            missing = []
+            yield from spots
+        else:
+            missing += spots
         solved = [spot for spot in spots if spot.converged]
         if lost:
             ended = lost
@@ -131,6 +149,25 @@ def follow_mode(
         else:
             known = (*known, *solved)[-2:]
         plain = near or known
+    yield from missing
+
+
+def _from_above(
+    frame: ModeFrame,
+    missing: list[PathSpot],
+    found: PathSpot,
+) -> Iterator[PathSpot]:
+    """The motions at amplitudes that were not reached, stepped down to from one above them."""
+    known: tuple[PathSpot, ...] = (found,)
+    reached = []
+    for spot in reversed(missing):
+        steps = _shorter_steps(frame, spot.s, known)
+        if steps[-1].s != spot.s:
+            break
+        known = steps
+        reached.append(replace(steps[-1], reason="reached from above"))
+    yield from missing[: len(missing) - len(reached)]
+    yield from reversed(reached)
 
 
 def _towards(
@@ -139,6 +176,7 @@ def _towards(
     known: tuple[PathSpot, ...],
     plain: tuple[PathSpot, ...],
     ended: str,
+    arcs: int,
 ) -> tuple[list[PathSpot], str, tuple[PathSpot, ...]]:
     """Motions up to an amplitude, and why the branch was lost on the way, if it was; also
     the last two motions at given amplitude, none where it is begun.
@@ -153,16 +191,23 @@ def _towards(
         near = _shorter_steps(frame, s, known)
         if near[-1].s == s:
             return [near[-1]], "", near
-        spots, reason = _walk(frame, s, near)
+        spots, reason = _walk(frame, s, near, arcs)
         if not reason:
             # without a fold, what lies between shows nothing new
             return spots if any(spot.fold for spot in spots) else spots[-1:], "", near
         turns = [f"{spot.amplitude:.4g}" for spot in spots if spot.fold]
         if turns:
-            reason = f"the amplitude turns back at {' and '.join(turns)}, then {reason}"
+            more = f" and {len(turns) - TURNS_TOLD} times more" if len(turns) > TURNS_TOLD else ""
+            told = " and ".join(turns[:TURNS_TOLD])
+            reason = f"the amplitude turns back at {told}{more}, then {reason}"
         # what does not come back is left out
         known = plain = near
-    starts = [_predicted(frame, known, s), _predicted(frame, plain, s), _full_stick(frame, s)]
+    starts = [
+        _predicted(frame, known, s),
+        _predicted(frame, plain, s),
+        _full_stick(frame, s),
+        _without_contact(frame),
+    ]
     for q in starts:
         spot = _solve(frame, _Plane(q, s), MAX_NEWTON_STEPS)
         if spot.converged:
@@ -195,6 +240,7 @@ def _walk(
     frame: ModeFrame,
     s: float,
     known: tuple[PathSpot, ...],
+    arcs: int,
 ) -> tuple[list[PathSpot], str]:
     """Arcs from the last motion known to an amplitude, which is solved last; "" or why it is not
     reached.
@@ -204,9 +250,11 @@ def _walk(
     spots: list[PathSpot] = []
     arc = FIRST_ARC
     reason = ""
-    for _ in range(MAX_ARCS):
+    for _ in range(arcs):
         direction = _direction(frame, trail, way)
         spot = _step(frame, trail[-1], direction, arc)
+        if not spot.converged and arc <= CORNER_ARC:
+            spot = _round_corner(frame, trail[-1], direction, arc, spot)
         reason = spot.reason
         if spot.converged:
             reason = _refused(frame, trail, spot, direction, arc)
@@ -231,7 +279,7 @@ def _walk(
             return spots, "the branch returns to far other amplitudes"
         if spot.iterations <= QUICK_STEPS:
             arc = min(ARC_GROWTH * arc, LONGEST_ARC)
-    return spots, f"{MAX_ARCS} motions do not reach the next amplitude"
+    return spots, f"{arcs} motions do not reach the next amplitude"
 
 
 def _refused(
@@ -280,6 +328,86 @@ def _step(
     return _solve(frame, _Plane(q, s, (direction[0] / size, direction[1])), MAX_ARC_STEPS)
 
 
+def _round_corner(
+    frame: ModeFrame,
+    last: PathSpot,
+    direction: tuple[np.ndarray, float],
+    arc: float,
+    failed: PathSpot,
+) -> PathSpot:
+    """The motion after a corner of the branch, or the one that failed.
+
+    Args:
+        failed: where the search along the direction ended.
+    """
+    size = _size(frame, last.q)
+    probes = [failed]
+    for reach in CORNER_PROBES:
+        s = last.s + reach * arc * direction[1]
+        q = _carried(frame, last, reach * arc * size * direction[0], s)
+        state = _iterate(frame, _Plane(q, s), q, s).state
+        probes.append(replace(last, q=q, s=s, state=state))
+    for probe in probes:
+        try:
+            along = _tangent(frame, probe, direction)
+        except linalg.LinAlgError:
+            continue
+        for way in (along, (-along[0], -along[1])):
+            for longer in CORNER_ARCS:
+                spot = _step(frame, last, way, longer * arc)
+                if spot.converged and _leaves(frame, last, spot, direction, longer * arc):
+                    return spot
+    return failed
+
+
+def _leaves(
+    frame: ModeFrame,
+    last: PathSpot,
+    spot: PathSpot,
+    direction: tuple[np.ndarray, float],
+    arc: float,
+) -> bool:
+    """Whether a motion is another one than the last, and not on the way that led there."""
+    change = np.where(frame.moving, spot.q - last.q, 0.0) / _size(frame, last.q)
+    step = spot.s - last.s
+    length = np.hypot(np.linalg.norm(change), step)
+    ahead = (change @ direction[0] + step * direction[1]) / max(length, np.finfo(float).tiny)
+    return bool(length > 0.2 * arc and ahead > BACK_COSINE)
+
+
+def _tangent(
+    frame: ModeFrame,
+    spot: PathSpot,
+    direction: tuple[np.ndarray, float],
+) -> tuple[np.ndarray, float]:
+    """Of the branch on the piece of the forces on which a motion lies, length 1.
+
+    Raises:
+        LinAlgError: the direction is at a right angle to it.
+    """
+    N = len(spot.q)
+    size = _size(frame, spot.q)
+    bordered = _bordered(frame, spot.state, spot.q, spot.amplitude)
+    bordered[N, :N] = direction[0] / size
+    bordered[N, N] = direction[1]
+    along = linalg.solve(bordered, np.append(np.zeros(N), 1.0), overwrite_a=True)
+    q = np.where(frame.moving, along[:N], 0.0) / size
+    length = np.hypot(np.linalg.norm(q), along[N])
+    return q / length, float(along[N] / length)
+
+
+def _bordered(frame: ModeFrame, state: ModeState, q: np.ndarray, amplitude: float) -> np.ndarray:
+    """(N + 1, N + 1) derivatives of the residual over the amplitude by q and log a; the last row is
+    the caller's.
+    """
+    N = len(q)
+    J = mode_jacobian(frame, state, amplitude)
+    bordered = np.empty((N + 1, N + 1))
+    bordered[:N, :N] = J
+    bordered[:N, N] = J @ q + amplitude_derivative(frame, state, amplitude) - state.r / amplitude
+    return bordered
+
+
 def _distance(frame: ModeFrame, q: np.ndarray, predicted: np.ndarray) -> float:
     return float(np.linalg.norm((q - predicted)[frame.moving]) / _size(frame, q))
 
@@ -299,6 +427,13 @@ def _full_stick(frame: ModeFrame, s: float) -> np.ndarray:
     motion = np.zeros((len(frame.shape), frame.H + 1), dtype=complex)
     motion[:, 1] = stuck_mode(frame)
     return to_real(motion).ravel() - np.exp(-s) * frame.still
+
+
+def _without_contact(frame: ModeFrame) -> np.ndarray:
+    """(N,) of the mode alone, as where the amplitude is so large that contacts hardly matter."""
+    motion = np.zeros((len(frame.shape), frame.H + 1), dtype=complex)
+    motion[:, 1] = frame.shape
+    return to_real(motion).ravel()
 
 
 def _predicted(frame: ModeFrame, known: tuple[PathSpot, ...], s: float) -> np.ndarray:
@@ -371,15 +506,13 @@ def _merit(plane: _Plane, it: _Iterate) -> float:
 def _advance(frame: ModeFrame, plane: _Plane, it: _Iterate) -> _Iterate | None:
     """The first halving of the Newton step that lowers the residual, or None."""
     amplitude = float(np.exp(it.s))
-    J = mode_jacobian(frame, it.state, amplitude)
     rhs = it.state.r / amplitude
     if plane.normal is None:
+        J = mode_jacobian(frame, it.state, amplitude)
         dq, ds = linalg.solve(J, rhs, overwrite_a=True), 0.0
     else:
         N = len(rhs)
-        bordered = np.empty((N + 1, N + 1))
-        bordered[:N, N] = J @ it.q + amplitude_derivative(frame, it.state, amplitude) - rhs
-        bordered[:N, :N] = J
+        bordered = _bordered(frame, it.state, it.q, amplitude)
         bordered[N, :N], bordered[N, N] = plane.normal
         step = linalg.solve(bordered, np.append(rhs, it.off), overwrite_a=True)
         dq, ds = step[:N], float(step[N])

@@ -19,7 +19,7 @@ from .mode_equations import (
     mode_with_others,
     probe_amplitudes,
 )
-from .mode_path import PathSpot, follow_mode
+from .mode_path import MAX_ARCS, PathSpot, follow_mode
 from .model import ReducedModel
 from .validate_model import check_point
 
@@ -59,6 +59,7 @@ def nonlinear_mode(
     H: int = 3,
     samples: int = 128,
     start: NonlinearMode | None = None,
+    arcs: int = MAX_ARCS,
 ) -> Iterator[NonlinearMode]:
     """Frequency and damping of one mode along its branch through growing amplitudes, begun at the
     linear mode with all contacts sticking that holds most of the blade mode.
@@ -72,6 +73,7 @@ def nonlinear_mode(
         amplitudes: of the blade mode's first harmonic [m kg^1/2], above zero.
         mode: number of the blade mode in the nodal diameter of harmonic 1, from 0.
         start: a motion of this model, with these harmonics, to begin at in place of full stick.
+        arcs: motions between two amplitudes after which the branch is given up there.
 
     Raises:
         InputError: amplitudes, mode, H or samples are out of range, or there are too many unknowns.
@@ -90,7 +92,7 @@ def nonlinear_mode(
             raise InputError(f"amplitude {amplitude}: expected a positive number")
     frame = mode_frame(model, mode, H, samples)
     first = None if start is None else _as_spot(frame, start)
-    for spot in follow_mode(frame, map(float, amplitudes), first):
+    for spot in follow_mode(frame, map(float, amplitudes), first, arcs):
         yield _as_mode(frame, spot)
 
 

@@ -87,11 +87,14 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
                 f"load {one.load:g} N: the nonlinear mode turns back in amplitude at {turns}; "
                 "several motions share the amplitudes between"
             )
-        lost = int((~one.converged).sum())
-        if lost:
+        lost = np.flatnonzero(~one.converged)
+        if len(lost):
+            first, last = 1e6 * one.wanted[lost].min(), 1e6 * one.wanted[lost].max()
+            between = f"from {first:.4g} to {last:.4g} um" if len(lost) > 1 else f"{first:.4g} um"
             sentences.append(
                 warning(
-                    f"load {one.load:g} N: {lost} of {len(one.converged)} amplitudes not solved"
+                    f"load {one.load:g} N: {len(lost)} of {len(one.converged)} amplitudes not "
+                    f"solved, {between}: {one.lost}"
                 )
             )
         if not np.isfinite(one.error):

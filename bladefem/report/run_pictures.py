@@ -84,7 +84,7 @@ def _live_wheel(result: SolvedRun) -> dict[str, dict[str, Any]]:
     if result.wheel is None:
         return {}
     r = shown_response(result.wheel)
-    title = f"{r.load:.4g} N per seat, {r.solution.frequency:.5g} Hz"
+    title = f"{r.load:.4g} N per seat, {r.frequency:.5g} Hz"
     return {WHEEL_FIGURE: live_wheel(r.solution.probe[:, 1:, 0], title)}
 
 

@@ -108,14 +108,13 @@ def pattern_drawings(
 ) -> dict[str, Callable[[Path], object]]:
     """Pictures of `shown_response`."""
     r = shown_response(found)
-    first = r.solution.probe[:, 1, 0]
     title = f"{r.load:g} N: blade {r.peak.blade + 1} is {r.factor:.3g} times the tuned wheel"
     return {
         "wheel/blades": lambda file: view.draw_blades(
             r.peak.by_blade, r.deviation[:, 0], r.tuned, title, file
         ),
         WHEEL_FIGURE: lambda file: view.draw_wheel_motion(
-            r.solution.size(), np.angle(first), f"{r.solution.frequency:.5g} Hz, {r.load:g} N", file
+            r.solution.size(), r.phase, f"{r.frequency:.5g} Hz, {r.load:g} N", file
         ),
     }
 

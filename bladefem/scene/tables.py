@@ -304,7 +304,8 @@ class Mistuning:
     pattern: str | None = quantity(
         None,
         help="CSV file of relative deviations of blade-alone frequencies, one row a blade, one "
-        "column a family; relative to the scene file",
+        "column a family, or of their stiffness and mass by columns like '1F stiffness' and "
+        "'mass'; relative to the scene file",
     )
     scatter: float | None = quantity(
         None,
@@ -358,7 +359,7 @@ class Mistuning:
     )
     orders: tuple[str, ...] | None = quantity(
         None,
-        help="further engine orders, multiples of the first, as texts like '18: 0.3 N; 90 deg'",
+        help="further engine orders, as texts like '18: 0.3 N; 90 deg'",
     )
 
 

@@ -59,6 +59,10 @@ class Backbone:
     fold: BooleanArray
     # resonance amplitude [m] and frequency [Hz] of the balance
     balance: tuple[float, float]
+    # (k,) amplitudes of the blade mode alone at the probe [m], also of motions that were not found
+    wanted: RealArray
+    # why the first of those was not found; empty where all were
+    lost: str
 
     @property
     def predicted(self) -> tuple[float, float]:
@@ -175,4 +179,13 @@ def curve_backbone(
         np.array([p.converged for p in points]),
         np.array([p.fold for p in points]),
         (curve.peak_amplitude, curve.peak_frequency),
+        seen * np.array([p.amplitude for p in points]),
+        next((_ended(p.reason) for p in points if not p.converged), ""),
     )
+
+
+def _ended(reason: str) -> str:
+    """Why the branch ended, without its amplitudes, which are those of the mode."""
+    before, _, last = reason.rpartition(", then ")
+    folded = "after folds in amplitude, " if before else ""
+    return folded + (last if before else reason.rpartition(": ")[2])

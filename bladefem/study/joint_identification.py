@@ -13,9 +13,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, linprog
 
-from ..errors import InputError
+from ..errors import InputError, NotSolvedError
 from ..friction.closed_form import jenkins
 from .fit_intervals import UNKNOWN_LOG_HALF_WIDTH, half_widths
 
@@ -32,6 +32,9 @@ FINEST_LIMIT_RATIO = 1e-3
 # by more than an instrument, with every loading and temperature
 FREQUENCY_ERROR = 1e-3
 DAMPING_ERROR = 0.05
+# slip limits of the patch that may have any distribution, and how far beyond the amplitudes
+BOUND_LIMITS = 400
+BOUND_REACH = 1e3
 # slopes q from which the fit starts; the lowest end wins
 START_SLOPES = (0.4, 0.8, 1.6)
 # clearances over the largest amplitude, and shares of the stop, from which the fit starts
@@ -148,6 +151,49 @@ def fit_joint(
         float(np.sqrt(np.mean(best.fun**2))),
         used,
     )
+
+
+def least_frequency_miss(
+    amplitude: np.ndarray,
+    frequency: np.ndarray,
+    damping: np.ndarray,
+    within: float,
+) -> float:
+    """The smallest relative miss of frequency that any patch of friction elements must have at its
+    worst level, whatever the distribution of its slip limits and though it knows all levels, while
+    its damping is within a share of each measured one.
+
+    A linear programme in the elements' stiffnesses, which are not negative: squared frequencies and
+    losses are linear in them. The loss without friction counts as a constant share of the stuck
+    joint's stiffness, which differs from a constant damping by the softening of it, a per cent.
+
+    Args:
+        amplitude: (k,) [m], frequency (k,) [Hz], damping (k,) share of critical [1].
+        within: of the damping [1].
+
+    Raises:
+        NotSolvedError: the linear programme ends without a solution.
+    """
+    a, f, z = np.array([amplitude, frequency, damping], dtype=float)
+    limits = np.geomspace(FINEST_LIMIT_RATIO * a.min(), BOUND_REACH * a.max(), BOUND_LIMITS)
+    law = jenkins(a[:, None] / limits, 1.0, 1.0)
+    one, none = np.ones((len(a), 1)), np.zeros((len(a), 1))
+    # unknowns: the stuck joint, its loss, the elements, the miss; rows: levels, over f^2
+    squared = np.hstack([one, none, law.stiffness - 1, none]) / f[:, None] ** 2
+    loss = np.hstack([none, one, law.damping, none]) / f[:, None] ** 2
+    miss = np.hstack([np.zeros((len(a), 2 + BOUND_LIMITS)), 2 * one])
+    upper = loss - 2 * (1 + within) * z[:, None] * squared
+    lower = 2 * (1 - within) * z[:, None] * squared - loss
+    ones = np.ones(len(a))
+    found = linprog(
+        miss[0] / 2,
+        np.vstack([squared - miss, -squared - miss, upper, lower]),
+        np.concatenate([ones, -ones, 0 * ones, 0 * ones]),
+        method="highs",
+    )
+    if not found.success:
+        raise NotSolvedError(f"least miss of frequency: {found.message}")
+    return float(found.fun)
 
 
 def _starts(

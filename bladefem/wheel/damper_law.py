@@ -432,10 +432,12 @@ def _real_map(G: np.ndarray) -> np.ndarray:
     return out.reshape(2 * len(G), -1)
 
 
-def scaled_elements(e: Elements, name: str, factor: float) -> Elements:
-    """Elements with another friction coefficient, stiffness or normal load."""
+def scaled_elements(wheel: Wheel, name: str, factor: float) -> Elements:
+    """Elements of one damper with another friction coefficient, stiffness or normal load."""
+    e = wheel.elements
     if name == "friction":
         return replace(e, mu=factor * e.mu)
     if name == "stiffness":
-        return replace(e, kt=factor * e.kt, kn=factor * e.kn)
+        kt, kn = (wheel.scaled_stiffness(name, factor)[: len(e.kt)] for name in ("kt", "kn"))
+        return replace(e, kt=kt, kn=kn)
     return replace(e, n0=factor * e.n0, t0=None if e.t0 is None else factor * e.t0)

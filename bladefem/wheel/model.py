@@ -112,6 +112,9 @@ class Wheel:
     # (n, tangents) friction force of one damper from which the law starts; elements.t0 when None
     # [N]
     start: RealArray | None = None
+    # (n, 1 + tangents) compliance of the contacts' layer that the elements leave to the sectors
+    # [m/N], see `hbm.model.ReducedModel`; None where they leave none
+    series: RealArray | None = None
     # ranks that share each point of the wheel, collectively; None: one rank has all
     comm: Communicator | None = None
 
@@ -155,6 +158,16 @@ class Wheel:
     def all_elements(self) -> Elements:
         """The elements of all dampers, sector by sector."""
         return _spread(self.elements, self.nodes, self.count)
+
+    def scaled_stiffness(self, name: str, factor: np.ndarray | float) -> np.ndarray:
+        """(elements,) stiffness "kt" or "kn" of `all_elements` with a factor on the stiffness of
+        the whole layer: what is in series stays as it is [N/m].
+        """
+        stiffness = getattr(self.all_elements, name)
+        if self.series is None:
+            return factor * stiffness
+        series = np.tile(self.series[:, 0 if name == "kn" else 1], self.count)
+        return stiffness / (1.0 + (1.0 / factor - 1.0) * (1.0 + stiffness * series))
 
     @cached_property
     def springs(self) -> np.ndarray:
@@ -365,6 +378,11 @@ def _check_wheel(wheel: Wheel) -> None:
                 f"excitation of harmonic {h} of shape {np.shape(amplitudes)}: expected "
                 f"({wheel.count}, {loads}) amplitudes of a harmonic 0, 1, 2, ..."
             )
+    if wheel.series is not None and np.shape(wheel.series) != (wheel.nodes, 1 + t):
+        raise InputError(
+            f"series of shape {np.shape(wheel.series)}: expected ({wheel.nodes}, {1 + t}), "
+            "compliances of each element of one damper"
+        )
     modes = {len(body.omega) for body in wheel.sectors.values()}
     if wheel.influence is not None:
         expected = (wheel.count, *modes) if len(modes) == 1 else None

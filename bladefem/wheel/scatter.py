@@ -4,9 +4,8 @@ for every load and on every rank.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import norm, qmc
@@ -140,8 +139,8 @@ def with_dampers(
     elements = replace(
         e,
         mu=friction * e.mu,
-        kt=stiffness * e.kt,
-        kn=stiffness * e.kn,
+        kt=wheel.scaled_stiffness("kt", stiffness),
+        kn=wheel.scaled_stiffness("kn", stiffness),
         n0=load * e.n0,
         t0=None if e.t0 is None else load[:, None] * e.t0,
     )
@@ -167,65 +166,6 @@ def with_tractions(
     size = np.linalg.norm(start, axis=1, keepdims=True)
     beyond = np.divide(limit, size, out=np.ones_like(size), where=size > limit)
     return replace(pattern, start=beyond * start)
-
-
-def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
-    """Family names and relative frequency deviations (N, families) of a CSV file.
-
-    The first row names the families, each further row is a blade; a first column "blade" numbers
-    them. "#" starts a comment.
-
-    Raises:
-        InputError: the file is missing, not numbers, or has another number of blades.
-    """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError(f"mistuning.pattern = '{path}': there is no such file")
-    text = path.read_text(encoding="utf-8").splitlines()
-    rows = [line.split("#")[0].strip() for line in text]
-    cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
-    if len(cells) < 2:
-        raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")
-    names = cells[0]
-    values = _read_numbers(path, cells[1:], len(names))
-    if names[0].lower() == "blade":
-        _check_order(path, values[:, 0])
-        names = names[1:]
-        values = values[:, 1:]
-    if len(values) != count:
-        raise InputError(
-            f"pattern file {path.name}: {len(values)} blades, expected {count}, one a sector"
-        )
-    if not names:
-        raise InputError(f"pattern file {path.name}: expected a column of deviations")
-    return names, values
-
-
-def _read_numbers(
-    path: Path,
-    rows: Sequence[Sequence[str]],
-    columns: int,
-) -> np.ndarray:
-    for i, row in enumerate(rows):
-        if len(row) != columns:
-            raise InputError(
-                f"pattern file {path.name}: {len(row)} columns in blade {i + 1}, expected {columns}"
-            )
-    try:
-        values = np.array(rows, dtype=float)
-    except ValueError as error:
-        raise InputError(f"pattern file {path.name}: {error}, expected numbers") from None
-    if not np.isfinite(values).all():
-        raise InputError(f"pattern file {path.name}: expected finite numbers")
-    return values
-
-
-def _check_order(path: Path, numbers: np.ndarray) -> None:
-    expected = np.arange(len(numbers)) + numbers[0]
-    if numbers[0] not in (0, 1) or not np.array_equal(numbers, expected):
-        raise InputError(
-            f"pattern file {path.name}: expected blades in order, numbered from 0 or from 1"
-        )
 
 
 def _uniform_sample(

@@ -117,6 +117,58 @@ def test_close_modes_are_followed_from_the_stuck_mode():
     assert found[-1].omega == pytest.approx(body.omega[0], rel=0.03)
 
 
+def forces_in_time(model, w, samples):
+    """(n, 3) complex first harmonics of the contacts' forces by a return map, and their means;
+    displacements (n, 3, 2H+1), contacts that lift off.
+    """
+    e = model.elements
+    t = 2 * np.pi * np.arange(samples) / samples
+    H = w.shape[2] // 2
+    x = np.repeat(w[:, :, :1], samples, axis=2)
+    for h in range(1, H + 1):
+        x = x + w[:, :, 2 * h - 1, None] * np.cos(h * t) + w[:, :, 2 * h, None] * np.sin(h * t)
+    normal = np.maximum(e.n0[:, None] + e.kn[:, None] * x[:, 0], 0.0)
+    f = np.zeros_like(x)
+    f[:, 0] = normal
+    force = e.kt[:, None] * x[:, 1:, 0]
+    for step in range(1, 9 * samples):
+        k = step % samples
+        force = force + e.kt[:, None] * (x[:, 1:, k] - x[:, 1:, k - 1])
+        size = np.linalg.norm(force, axis=1)
+        limit = e.mu * normal[:, k]
+        force = force * np.minimum(1.0, limit / np.maximum(size, 1e-300))[:, None]
+        f[:, 1:, k] = force
+    turn = np.exp(-1j * t)
+    return 2 / samples * (f @ turn), f.mean(axis=2)
+
+
+def test_corners_of_lifting_contacts_are_passed():
+    """Contacts that lift off, three harmonics, 64 samples: the branch turns by more than a right
+    angle at corners of the sampled forces. Eight of the twenty amplitudes were not reached before.
+    Each motion fulfils the equations of all modes, with forces by a return map in NumPy of 512
+    steps, to what 64 samples leave.
+    """
+    model = block(5, dofs=60)
+    body = model.side(1)
+    shapes = body.shapes[body.ports["contact"]]
+    amplitudes = np.geomspace(0.05, 50, 20) / abs(shapes[:, 0]).max()
+    found = list(nonlinear_mode(model, amplitudes, H=3, samples=64))
+    assert all(p.converged for p in found), [p.reason for p in found if not p.converged]
+    lifted = 0
+    for p in found:
+        harmonic, mean = forces_in_time(model, p.w, 512)
+        lifted += mean[:, 0].min() > 1.01 * model.elements.n0.min()
+        f = shapes.T @ harmonic.ravel()
+        Z = body.omega**2 - p.omega**2 * (1 + 2j * p.zeta)
+        q = -f / Z
+        q[0] = p.amplitude
+        moved = p.w[:, :, 1] - 1j * p.w[:, :, 2]
+        size = abs(moved).max()
+        np.testing.assert_allclose(shapes @ q, moved.ravel(), atol=1e-2 * size)
+        assert abs(Z[0] * p.amplitude + f[0]) < 1e-2 * abs(f).max()
+    assert lifted > 5
+
+
 def two_modes(own, shapes, kt, limit):
     """Two modes on one Jenkins element, without damping of their own."""
     ports = {"contact": shapes[None], "load": np.array([0]), "probe": np.array([0])}

@@ -123,6 +123,32 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
     assert len(flow_headlines(shown)) == len(flow_drawing(shown)) == 1
 
 
+def test_limit_cycles_of_other_loads_are_scaled(reduced):
+    """Twice the normal load, twice the limit cycle: as solved anew; not where anything else
+    differs.
+    """
+    patches = list(reduced.contact.problem.patches)
+    (case,) = load_cases(reduced.scene, reduced.mesh, reduced.contact)
+    e = case.elements
+    twice = replace(e, n0=2 * e.n0, t0=2 * e.traction)
+    other = replace(case, load=2 * case.load, elements=twice)
+    flow = scene_flow(reduced.scene, COUNT)
+    sector = subject.reduce_sector(
+        Bodies(reduced.scene, reduced.mesh), patches, [0, 9, 10], reduced.settings.modes
+    )
+    first, direct = (
+        subject._held(reduced, sector, patches, one, flow, -10) for one in (case, other)
+    )
+    (scaled,) = subject._by_scale(other, [(case, [first])])
+    for name in ("load", "amplitude", "frequency", "largest", "friction"):
+        assert getattr(scaled, name) == pytest.approx(getattr(direct, name), rel=1e-6)
+    assert scaled.amplitude == pytest.approx(2 * first.amplitude)
+    stiffer = replace(other, elements=replace(twice, kt=1.1 * e.kt))
+    skewed = replace(other, elements=replace(twice, n0=twice.n0 * np.linspace(0.9, 1, len(e.n0))))
+    for one in (stiffer, skewed, replace(other, mass=0.01)):
+        assert subject._by_scale(one, [(case, [first])]) is None
+
+
 def test_flutter_that_no_friction_holds_is_one_sentence(reduced):
     patches = list(reduced.contact.problem.patches)
     keep = StageRunner(None, None, StageClock({}, []))

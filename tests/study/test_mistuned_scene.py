@@ -3,6 +3,7 @@ before long work.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -22,15 +23,16 @@ from bladefem.study.mistuning.blade_stress import (
     WheelShapes,
     all_modes,
     blade_motion,
-    blade_stress,
 )
+from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
+from bladefem.study.mistuning.pattern_response import richer_balance
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
-from bladefem.study.pipeline.damped_motion import damped_stress
+from bladefem.study.pipeline.damped_motion import damped_stress, stress_of_motion
 from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.utilisation import (
     blade_nodes,
@@ -88,6 +90,32 @@ def test_whole_wheel_is_the_tuned_sector(reduced, finest, share):
     )
 
 
+def test_a_stiff_layer_is_that_of_the_tuned_sector(reduced):
+    """Part of it in series, or softened throughout, as the settings of the curve say."""
+    scene, run, patches, sector, case, settings = reduced
+    n = len(case.elements.kt)
+    e = case.elements
+    series = -0.5 * np.column_stack([1 / e.kn, 1 / e.kt, 1 / e.kt])
+    case = replace(case, series=series)
+    family = family_of_case(scene, run.mesh, run.reduced, patches, case)
+    answers = []
+    for softened in (False, True):
+        own = replace(settings, softened=softened)
+        wheel = whole_wheel(scene, run.mesh, sector, patches, case, own)
+        assert (wheel.series is None) == softened
+        assert softened or wheel.series.shape == (n, 3)
+        model = family_member(family, own).model
+        omega = 0.99 * model.side(1).omega[0]
+        one = solve(model, omega, 1, 72, options=TIGHT)
+        found = solve_wheel(wheel, omega, 1, 72, options=TIGHT)
+        assert one.converged and found.converged
+        turn = np.exp(2j * np.pi * 9 / 36 * np.arange(36))
+        scale = abs(one.probe).max()
+        np.testing.assert_allclose(found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-9 * scale)
+        answers.append(one.probe[1, 0])
+    assert abs(answers[1] - answers[0]) > 1e-3 * abs(answers[0])
+
+
 def test_stiffer_blades_raise_the_resonance_by_the_aerofoils_share(reduced):
     """1 % on all blades: the wheel's resonance rises, by less than the blades' own."""
     scene, run, patches, sector, case, settings = reduced
@@ -136,7 +164,8 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes, 
     mean = run.strength.mean[blade]
     tuned = fatigue_utilisation(diagram, place, stress.field[blade], mean)
     for number in (0, 17):
-        own = blade_stress(shapes, wheel, pattern, case, found, number, points)
+        motion = blade_motion(shapes, wheel, pattern, case, found, number, points)
+        own = stress_of_motion(shapes.bodies, case, motion)
         used = fatigue_utilisation(diagram, place, own.field[blade], mean)
         np.testing.assert_allclose(used.used, tuned.used, rtol=0, atol=1e-9 * tuned.used.max())
         assert used.worst == tuned.worst
@@ -215,8 +244,82 @@ def test_blades_of_another_shape(tmp_path):
     assert found.stress.mismatch < 5e-3
     said = [text for text in run.messages if text.startswith("blades 3, 20 of another shape")]
     assert f"{100 * shift[0]:+.3g} %" in said[0]
+    # one of these is the highest; its own aerofoil is a little narrower
+    assert found.peak.blade in odd
+    assert found.own_stress.largest == pytest.approx(found.stress.largest, rel=0.1)
+    assert any("that of its own aerofoil" in text for text in run.messages)
     again = with_whole_wheel(pipeline.run(scene, tmp_path))
     assert any(text.startswith("other_blades: found") for text in again.messages)
+
+
+def test_blades_of_another_stiffness_and_mass(tmp_path):
+    """A file with a density a blade, and a stiffness a family."""
+    rng = np.random.default_rng(4)
+    values = 0.01 * rng.normal(size=(36, 4))
+    file = tmp_path / "pattern.csv"
+    rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(values)]
+    file.write_text("\n".join(["blade, mass, 1F stiffness, 2F stiffness, 1T stiffness", *rows]))
+    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, f"mistuning.pattern={file}"])
+    run = with_whole_wheel(pipeline.run(scene, tmp_path))
+    (found,) = run.wheel
+    alone = np.sqrt((1 + values[:, 1:]) / (1 + values[:, :1])) - 1
+    np.testing.assert_allclose(found.deviation, alone, atol=1e-12)
+    assert found.factor > 1.0 and found.peak.unsolved == 0
+    # the motion of all finite elements with the deviations' forces is that of the reduced wheel
+    assert found.stress.mismatch < 5e-3
+    # frequencies alone are another wheel: that of the same root
+    rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(alone)]
+    file.write_text("\n".join(["blade, 1F, 2F, 1T", *rows]))
+    other = with_whole_wheel(pipeline.run(scene, tmp_path)).wheel[0]
+    np.testing.assert_allclose(other.deviation, alone, atol=1e-12)
+    assert other.factor == pytest.approx(found.factor, rel=0.1)
+    assert other.peak.height != found.peak.height
+
+
+def test_engine_orders_of_one_period():
+    """Order 9 and 6 in a period of three to a revolution; alone it is harmonic 1."""
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    assert own_harmonic(scene) == 1
+    both = vary(scene, mistuning__orders=("6: 0.5 N; 30 deg", "18: 0.1 N"))
+    assert own_harmonic(both) == 3
+    forces = order_forces(both, 36)
+    assert sorted(forces) == [2, 3, 6]
+    around = 2 * np.pi * np.arange(36) / 36
+    wave = 0.5 * np.exp(1j * (6 * around + np.radians(30)))
+    np.testing.assert_allclose(forces[2][:, 0], wave, atol=1e-12)
+    np.testing.assert_allclose(forces[3][:, 0], 1.5 * np.exp(9j * around), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("excited", "H", "more"), [([1], 1, 3), ([1], 3, 7), ([1, 2], 2, 6), ([9, 10], 10, 30)]
+)
+def test_error_by_harmonics_knows_the_third_of_each_order(excited, H, more):
+    """Orders 9 and 10 in a period of one revolution: twice as many harmonics as ten do not reach
+    27.
+    """
+    wheel = SimpleNamespace(excitation=dict.fromkeys(excited))
+    assert richer_balance(wheel, H, 64) == (more, max(128, 8 * (more + 1)))
+
+
+def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(tmp_path):
+    """Order 6 next to 9, with hardly a force: harmonics 3, 6, 9 of three periods a revolution, and
+    the answer of harmonics 1, 2, 3 of nine.
+    """
+    fixed = [*COARSE_MISTUNED, "model.harmonics=1", "model.samples=64"]
+    run = pipeline.run(load_scene(MISTUNED, fixed), tmp_path)
+    one = with_whole_wheel(run)
+    faint = vary(run.scene, mistuning__orders=("6: 1e-9 N",))
+    both = with_whole_wheel(replace(run, scene=faint))
+    r, s = one.wheel[0], both.wheel[0]
+    assert (r.harmonic, s.harmonic) == (1, 3)
+    assert s.solution.probe.shape[1] == 4
+    assert s.peak.height == pytest.approx(r.peak.height, rel=1e-3)
+    assert s.frequency == pytest.approx(r.frequency, rel=1e-5)
+    assert s.factor == pytest.approx(r.factor, rel=1e-3)
+    assert s.free_factor == pytest.approx(r.free_factor, rel=1e-6)
+    assert s.stress.largest == pytest.approx(r.stress.largest, rel=5e-3)
+    np.testing.assert_allclose(np.exp(1j * (s.phase - r.phase)), 1, atol=0.02)
+    assert any("engine orders beyond the tuned sector's" in text for text in both.messages)
 
 
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
@@ -241,7 +344,8 @@ def test_statistics_by_the_damper_law_are_checked_in_full(folder):
             "mistuning.pattern = .*nowhere.csv': there is no such file",
         ),
         (["disc.sectors=35"], "36 blades, expected 35"),
-        (["mistuning.orders=10: 0.3 N"], "expected a multiple of excitation.engine_order = 9"),
+        (["mistuning.orders=0: 0.3 N"], "expected an order above 0"),
+        (["mistuning.orders=100: 0.3 N"], "order 100 is harmonic 100 of the common divisor 1"),
         (
             ["mistuning.orders=18: 0.3 N", "mistuning.level=damper law"],
             "takes one engine order, expected no mistuning.orders",
@@ -287,6 +391,21 @@ def test_bad_input_is_refused_before_long_work(overrides, message):
 def test_bad_pattern_file_is_refused_before_long_work(rows, message, tmp_path):
     file = tmp_path / "pattern.csv"
     file.write_text("\n".join(["blade, 1F", *rows]))
+    with pytest.raises(InputError, match=message):
+        refuse_run(load_scene(MISTUNED, [f"mistuning.pattern={file}"]))
+
+
+@pytest.mark.parametrize(
+    ("names", "row", "message"),
+    [
+        ("1F stiffness, 2F stiffness", "0.01, 0.02", "2 families with a stiffness, expected 1"),
+        ("mass", "-1.5", "-1.5 of blade 1 leaves it no mass"),
+        ("1F, mass", "0.01, 0.02", "expected frequencies alone, or stiffnesses and masses"),
+    ],
+)
+def test_bad_columns_are_refused_before_long_work(names, row, message, tmp_path):
+    file = tmp_path / "pattern.csv"
+    file.write_text("\n".join([f"blade, {names}", *(f"{i}, {row}" for i in range(1, 37))]))
     with pytest.raises(InputError, match=message):
         refuse_run(load_scene(MISTUNED, [f"mistuning.pattern={file}"]))
 

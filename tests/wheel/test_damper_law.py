@@ -125,7 +125,7 @@ def test_dampers_scatter(made):
     factors = drawn_deviations(BLADES.count, scatter, 6).factors(scatter)
     changed = {
         name: tuple(
-            damper_law(wheel, family, SIZES, 64, scaled_elements(wheel.elements, name, factor))
+            damper_law(wheel, family, SIZES, 64, scaled_elements(wheel, name, factor))
             for factor in (1.1, 0.9)
         )
         + (0.1,)

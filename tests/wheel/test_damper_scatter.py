@@ -20,10 +20,11 @@ from scipy import linalg
 
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
-from bladefem.hbm.model import Damping
+from bladefem.hbm.model import Damping, in_series
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.reduction.assemble import join_bodies
+from bladefem.wheel.damper_law import scaled_elements
 from bladefem.wheel.lumped import LumpedBlades, lumped_pattern, lumped_wheel
 from bladefem.wheel.model import Pattern, heavier_damper
 from bladefem.wheel.one_body import one_body_model
@@ -72,6 +73,35 @@ def test_heavier_damper_is_the_one_given_explicitly(damper):
     loads = with_dampers(wheel, Pattern(), {"load": FACTORS})
     light = solve_wheel(wheel, OMEGA, H, SAMPLES, pattern=loads, options=TIGHT)
     assert abs(light.probe - found.probe).max() > 1e-3 * scale
+
+
+def test_stiffness_of_a_layer_of_which_a_part_is_in_series():
+    """Softer elements and the rest of the layer among the sectors: the same wheel, and the same
+    scatter of the stiffness of the whole layer.
+    """
+    stiff = elements(2, 2.0, 6.0, 2.0)
+    whole = ring_wheel(stiff, RIGID, forces({1: 0.9}), Damping(mass=0.05))
+    soft = replace(stiff, kt=0.4 * stiff.kt, kn=0.7 * stiff.kn)
+    series = np.column_stack([1 / stiff.kn - 1 / soft.kn, 1 / stiff.kt - 1 / soft.kt])
+    sectors = {d: in_series(body, series) for d, body in whole.sectors.items()}
+    split = replace(whole, elements=soft, sectors=sectors, series=series)
+    factors = {"stiffness": np.array([1.0, 1.3, 0.8, 1.0, 1.1, 0.9])}
+    tuned, found = [], []
+    for wheel in (whole, split):
+        scattered = with_dampers(wheel, Pattern(), factors)
+        tuned.append(solve_wheel(wheel, OMEGA, 1, SAMPLES, options=TIGHT))
+        found.append(solve_wheel(wheel, OMEGA, 1, SAMPLES, pattern=scattered, options=TIGHT))
+    for one, other in (tuned, found):
+        # sticking all along
+        assert one.converged and other.converged and one.shares[..., 0].min() > 0.999
+        scale = abs(one.probe).max()
+        np.testing.assert_allclose(other.probe, one.probe, atol=1e-10 * scale)
+    assert abs(found[0].probe - tuned[0].probe).max() > 1e-2 * abs(tuned[0].probe).max()
+    law = scaled_elements(split, "stiffness", 1.3)
+    np.testing.assert_allclose(1 / law.kt + series[:, 1], 1 / (1.3 * stiff.kt))
+    np.testing.assert_allclose(1 / law.kn + series[:, 0], 1 / (1.3 * stiff.kn))
+    with pytest.raises(InputError, match=r"series of shape \(2,\): expected \(2, 2\)"):
+        replace(split, series=np.zeros(2))
 
 
 def test_density_of_an_elastic_damper():

@@ -2,6 +2,8 @@
 plain marching in time, which knows neither nodal diameters nor harmonics.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg
@@ -14,6 +16,7 @@ from bladefem.wheel.lumped import (
     lumped_pattern,
     lumped_wheel,
 )
+from bladefem.wheel.model import engine_order
 from bladefem.wheel.solve import solve_wheel
 
 COUNT = 12
@@ -42,13 +45,19 @@ def ring_matrices(deviation):
     return np.diag(mass), C, stiffness
 
 
-def march(omega, deviation, force, limit):
-    """First harmonic of all tips, and friction work of each element in the last period."""
+def march(omega, deviation, orders, limit, wanted, periods=PERIODS, steps=STEPS):
+    """Harmonics of all tips (N, wanted), and friction work of each element in the last period.
+
+    Args:
+        orders: harmonic of omega to the engine order, its force and its phase on blade 0.
+        wanted: harmonics of omega.
+        steps: in a period of omega.
+    """
     mass, C, K = ring_matrices(deviation)
-    dt = 2 * np.pi / omega / STEPS
+    dt = 2 * np.pi / omega / steps
     platform = 3 * np.arange(COUNT) + PLATFORM
     tip = 3 * np.arange(COUNT) + TIP
-    phase = 2 * np.pi * ORDER * np.arange(COUNT) / COUNT
+    around = 2 * np.pi * np.arange(COUNT) / COUNT
     # (M / dt^2 + C / 2 dt) x_new = F - K x + 2 M x / dt^2 - (M / dt^2 - C / 2 dt) x_old
     left = linalg.inv(np.diag(mass) / dt**2 + C / (2 * dt))
     now_matrix = left @ (2 * np.diag(mass) / dt**2 - K)
@@ -56,23 +65,24 @@ def march(omega, deviation, force, limit):
     x = np.zeros(3 * COUNT)
     old = np.zeros(3 * COUNT)
     slider = np.zeros(COUNT)
-    harmonic = np.zeros(COUNT, dtype=complex)
+    harmonics = np.zeros((COUNT, len(wanted)), dtype=complex)
     work = np.zeros(COUNT)
-    for step in range(STEPS * PERIODS):
+    for step in range(steps * periods):
         w = x[platform] - x[np.roll(platform, -1)]
         before = slider
         slider = np.clip(slider, w - limit / KT, w + limit / KT)
         f = KT * (w - slider)
         angle = omega * step * dt
         load = np.zeros(3 * COUNT)
-        load[tip] = force * np.cos(angle + phase)
+        for h, (order, force, phase) in orders.items():
+            load[tip] += force * np.cos(h * angle + order * around + phase)
         load[platform] -= f
         load[np.roll(platform, -1)] += f
-        if step >= STEPS * (PERIODS - 1):
-            harmonic += 2 / STEPS * x[tip] * np.exp(-1j * angle)
+        if step >= steps * (periods - 1):
+            harmonics += 2 / steps * x[tip, None] * np.exp(-1j * angle * np.array(wanted))
             work += limit * abs(slider - before)
         x, old = now_matrix @ x + old_matrix @ old + left @ load, x
-    return harmonic, work
+    return harmonics, work
 
 
 @pytest.mark.parametrize("limit", [3.0])
@@ -82,7 +92,8 @@ def test_wheel_equals_marching_in_time(limit):
     deviation = 0.02 * rng.normal(size=COUNT)
     M, K, _ = lumped_matrices(BLADES)
     omega = 1.01 * np.sqrt(linalg.eigh(K, M)[0][0])
-    tips, work = march(omega, deviation, force, limit)
+    tips, work = march(omega, deviation, {1: (ORDER, force, 0.0)}, limit, [1])
+    tips = tips[:, 0]
     wheel = lumped_wheel(BLADES, ORDER, force, KT, limit)
     found = solve_wheel(wheel, omega, 15, 0, pattern=lumped_pattern(BLADES, deviation))
     assert found.converged
@@ -90,4 +101,32 @@ def test_wheel_equals_marching_in_time(limit):
     assert (found.shares[..., 1] > 0.05).all()
     assert np.ptp(abs(tips)) > 0.2 * abs(tips).mean()
     np.testing.assert_allclose(found.probe[:, 1, 0], tips, atol=5e-4 * abs(tips).max())
+    np.testing.assert_allclose(found.dissipated, work, rtol=5e-3)
+
+
+def test_orders_that_are_no_multiples_equal_marching_in_time():
+    """Orders 2 and 3: harmonics 2 and 3 of a period of one revolution, the second ahead by 40
+    deg.
+    """
+    limit = 3.0
+    first, second, phase = 10.0, 300.0, np.radians(40)
+    deviation = 0.02 * np.random.default_rng(1).normal(size=COUNT)
+    M, K, _ = lumped_matrices(BLADES)
+    omega = 1.01 * np.sqrt(linalg.eigh(K, M)[0][0]) / ORDER
+    orders = {3: (3, first, 0.0), 2: (2, second, phase)}
+    tips, work = march(omega, deviation, orders, limit, [1, 2, 3], 25, 3 * STEPS)
+    excitation = {
+        3: engine_order(COUNT, 3, np.array([first])),
+        2: engine_order(COUNT, 2, np.array([second]), phase),
+    }
+    wheel = replace(lumped_wheel(BLADES, ORDER, first, KT, limit), excitation=excitation)
+    found = solve_wheel(wheel, omega, 30, 0, pattern=lumped_pattern(BLADES, deviation))
+    assert found.converged
+    assert (found.shares[..., 1] > 0.05).all()
+    largest = abs(tips).max()
+    assert abs(tips[:, 1]).max() > 0.1 * largest
+    # the second order makes the dampers slip for the first one too
+    alone, _ = march(omega, deviation, {3: orders[3]}, limit, [3], 25, 3 * STEPS)
+    assert abs(alone[:, 0] - tips[:, 2]).max() > 0.02 * largest
+    np.testing.assert_allclose(found.probe[:, 1:4, 0], tips, atol=5e-4 * largest)
     np.testing.assert_allclose(found.dissipated, work, rtol=5e-3)

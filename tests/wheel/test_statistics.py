@@ -8,8 +8,9 @@ from scipy import linalg, stats
 
 from bladefem.errors import InputError
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
+from bladefem.wheel.pattern_file import read_pattern
 from bladefem.wheel.resonance import find_wheel_peak
-from bladefem.wheel.scatter import Scatter, drawn_patterns, read_pattern
+from bladefem.wheel.scatter import Scatter, drawn_patterns
 from bladefem.wheel.statistics import (
     Amplification,
     best_load,

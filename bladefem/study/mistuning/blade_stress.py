@@ -1,5 +1,5 @@
-"""Stress of one blade of a mistuned wheel: its whole damped motion, of all modes, nodal diameters,
-harmonics and damper forces.
+"""Motion of one blade of a mistuned wheel, for its stress: of all modes, nodal diameters, harmonics
+and damper forces.
 
 The forces of all contacts, of the excitation and of the deviations act on the tuned wheel, which
 falls into nodal diameters: each is one solve with the sector's finite elements, and one blade's
@@ -26,9 +26,7 @@ from ..pipeline.coriolis import response_damping
 from ..pipeline.damped_motion import (
     MAX_FREQUENCY_RATIO,
     DampedMotion,
-    DampedStress,
     node_forces,
-    stress_of_motion,
 )
 from ..pipeline.flow import family_modes, flowing_modes, scene_flow
 from ..pipeline.normal_modes import MODES_SHOWN, wheel_modes
@@ -61,29 +59,6 @@ def all_modes(bodies: Bodies, reduced: int = 0) -> list[ModeSet]:
     return bodies.kept[SHAPES_KEY]
 
 
-def blade_stress(
-    shapes: WheelShapes,
-    wheel: Wheel,
-    pattern: Pattern,
-    case: LoadCase,
-    solution: WheelSolution,
-    blade: int,
-    points: int | None = None,
-) -> DampedStress:
-    """The largest alternating stress of one blade.
-
-    Args:
-        pattern: that the solution was made with.
-        blade: number of the blade, from 0.
-        points: friction elements on each patch that it was made with; None for all.
-
-    Raises:
-        NotSolvedError: the modes do not cover a harmonic.
-    """
-    motion = blade_motion(shapes, wheel, pattern, case, solution, blade, points)
-    return stress_of_motion(shapes.bodies, case, motion)
-
-
 def blade_motion(
     shapes: WheelShapes,
     wheel: Wheel,
@@ -93,7 +68,16 @@ def blade_motion(
     blade: int,
     points: int | None = None,
 ) -> DampedMotion:
-    """The displacements of one blade; the arguments are those of `blade_stress`."""
+    """The displacements of one blade, of all waves.
+
+    Args:
+        pattern: that the solution was made with.
+        blade: number of the blade, from 0.
+        points: friction elements on each patch that it was made with; None for all.
+
+    Raises:
+        NotSolvedError: the modes do not cover a harmonic.
+    """
     from ...fem.forced_motion import forced_motion
 
     bodies = shapes.bodies

@@ -95,7 +95,7 @@ def _changed_law(
         # of the same load: that is a parameter of its own
         wheel = replace(wheel, damper=heavier_damper(wheel.damper, factor))
     else:
-        elements = scaled_elements(wheel.elements, name, factor)
+        elements = scaled_elements(wheel, name, factor)
     return damper_law(wheel, family_of_modes(wheel, omega, mode), sizes, samples, elements)
 
 

@@ -80,14 +80,17 @@ class OtherBlades:
 
     changes: Mapping[int, BladeChange]
 
-    def added(self, pattern: Pattern, count: int, families: int) -> Pattern:
-        """A pattern of frequencies (N, q, q), or a tuned one, with these blades' deviations."""
+    def added(self, pattern: Pattern, count: int) -> Pattern:
+        """A pattern of the q families (N, q, q), also with the root's motions, or a tuned one, with
+        these blades' deviations.
+        """
         size = len(next(iter(self.changes.values())).stiffness)
         stiffness = np.zeros((count, size, size))
         mass = np.zeros((count, size, size))
         for total, given in ((stiffness, pattern.stiffness), (mass, pattern.mass)):
             if given is not None:
-                total[:, :families, :families] = given
+                own = given.shape[1]
+                total[:, :own, :own] = given
         for number, change in self.changes.items():
             stiffness[number] += change.stiffness
             mass[number] += change.mass
@@ -190,9 +193,7 @@ def blade_change(tuned: HeldPart, other: HeldPart, name: str) -> BladeChange:
         InputError: one of its modes is none of the tuned ones.
     """
     q = len(tuned.omega)
-    seen = _at_places(tuned, other.points)
-    mass = other.mass_products(np.concatenate([seen, other.shapes]))
-    T = np.linalg.solve(mass[:q, :q], mass[:q, q:])
+    T, mass = by_tuned_modes(tuned, other)
     assurance = np.einsum("ij,ij->j", T, mass[:q, q:])
     worst = int(np.argmin(assurance))
     if assurance[worst] < LOWEST_ASSURANCE:
@@ -214,6 +215,16 @@ def blade_change(tuned: HeldPart, other: HeldPart, name: str) -> BladeChange:
     change[q:, q:] = other.inertia - tuned.inertia
     stiffness[q:, q:] = other.stiffness - tuned.stiffness
     return BladeChange(stiffness, change, other.omega[order] / tuned.omega - 1, assurance)
+
+
+def by_tuned_modes(tuned: HeldPart, other: HeldPart) -> tuple[np.ndarray, np.ndarray]:
+    """(q, q) the other aerofoil's modes by the tuned ones at the same places, and the products
+    (2q, 2q) of the tuned and the other modes with the other aerofoil's mass.
+    """
+    q = len(tuned.omega)
+    seen = _at_places(tuned, other.points)
+    mass = other.mass_products(np.concatenate([seen, other.shapes]))
+    return np.linalg.solve(mass[:q, :q], mass[:q, q:]), mass
 
 
 def _at_places(tuned: HeldPart, places: np.ndarray) -> np.ndarray:

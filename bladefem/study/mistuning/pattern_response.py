@@ -10,14 +10,15 @@ import numpy as np
 
 from ...hbm.linear_resonances import free_resonances
 from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
-from ...wheel.model import Pattern, Wheel, frequency_pattern
-from ...wheel.resonance import WheelPeak, find_wheel_peak
+from ...wheel.model import Pattern, Wheel
+from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
 from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 from .other_blades import OtherBlades, other_blade_sentences
+from .own_stress import OwnStress
 
 # points of the first look at a band
 FIRST_LOOK_POINTS = 15
@@ -25,6 +26,8 @@ FIRST_LOOK_POINTS = 15
 LINEAR_POINTS = 300
 # resonances with sticking dampers that are looked at
 MAX_RESONANCES = 8
+# harmonics of the engine order beyond which the indicator asks for no more
+MOST_HARMONICS = 15
 # relative error of a peak's height by the search over frequencies
 SEARCH_TOLERANCE = 0.01
 
@@ -38,29 +41,50 @@ class PatternResponse:
     mass: float | None
     # (N, q) relative deviations of the blade-alone frequencies
     deviation: np.ndarray
+    # of the scene's engine order, among those of the common period of all orders
+    harmonic: int
     # peak of the tuned wheel [m] and where [Hz]
     tuned: float
     tuned_frequency: float
     # the mistuned wheel with friction
     peak: WheelPeak
-    # its solution at the peak
+    # its solution at the peak, in harmonics of the common period
     solution: WheelSolution
     # amplification of the same pattern without dampers
     free_factor: float
     # relative change of the peak's height with twice the harmonics and samples; NaN: not solved
     truncation: float
     # relative difference of the tuned peak from that of the sector's own curve, whose means are
-    # free
+    # free; NaN where that curve knows fewer engine orders
     sector_difference: float
     # of the blade that moves most, at its resonance
     stress: DampedStress
     # blades of another shape
     others: OtherBlades | None = None
+    # of the aerofoil of that blade on its own mesh, where it has another shape
+    own_stress: OwnStress | None = None
 
     @property
     def factor(self) -> float:
         """Highest blade over the tuned wheel."""
         return self.peak.height / self.tuned
+
+    @property
+    def frequency(self) -> float:
+        """Of the scene's engine order, at the peak [Hz]."""
+        return self.harmonic * self.solution.frequency
+
+    @property
+    def phase(self) -> np.ndarray:
+        """(N,) of the blades in the scene's engine order, at the peak [rad]."""
+        return np.angle(self.solution.probe[:, self.harmonic, 0])
+
+
+def in_common_period(respond: Respond, harmonic: int) -> Respond:
+    """What a wheel answers at a circular frequency of its own engine order, from what it answers at
+    that of the common period of all orders.
+    """
+    return lambda omega: respond(omega / harmonic)
 
 
 def frequency_grid(
@@ -68,25 +92,28 @@ def frequency_grid(
     curve: Curve,
     pattern: Pattern,
     spread: float,
+    harmonic: int = 1,
 ) -> np.ndarray:
-    """(k,) circular frequencies to look at first, as far as deviations reach [rad/s].
+    """(k,) circular frequencies of the scene's engine order to look at first, as far as deviations
+    reach [rad/s].
 
     Even steps find the broad resonances of sliding dampers; where dampers stick a blade resonates
     as sharply as its own damping lets it, at resonances of the linear wheel, which are added.
 
     Args:
         spread: largest relative deviation of frequency.
+        harmonic: of that engine order.
     """
-    model = tuned_sector(wheel, 1)
+    model = tuned_sector(wheel, harmonic)
     own = curve.peak.omega
     ends = [own]
     if model is not None:
-        free = free_resonances(model)
+        free = harmonic * free_resonances(model, harmonic)
         ends.append(float(free[np.argmin(abs(free - own))]))
     low = min(ends) * (1 - spread)
     high = max(ends) * (1 + spread)
     return np.union1d(
-        np.linspace(low, high, FIRST_LOOK_POINTS), _stuck_peaks(wheel, pattern, low, high)
+        np.linspace(low, high, FIRST_LOOK_POINTS), _stuck_peaks(wheel, pattern, low, high, harmonic)
     )
 
 
@@ -95,10 +122,12 @@ def _stuck_peaks(
     pattern: Pattern,
     low: float,
     high: float,
+    harmonic: int,
 ) -> np.ndarray:
     """Circular frequencies of the highest resonances with all contacts sticking."""
     fine = np.linspace(low, high, LINEAR_POINTS)
-    sizes = [stuck_wheel(wheel, w, max(wheel.excitation), pattern)[:, 1:, 0] for w in fine]
+    highest = max(wheel.excitation)
+    sizes = [stuck_wheel(wheel, w / harmonic, highest, pattern)[:, 1:, 0] for w in fine]
     height = np.linalg.norm(np.array(sizes), axis=2).max(axis=1)
     inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])) + 1
     return fine[inner[np.argsort(-height[inner])[:MAX_RESONANCES]]]
@@ -106,64 +135,105 @@ def _stuck_peaks(
 
 def pattern_response(
     wheel: Wheel,
-    families: np.ndarray,
+    pattern: Pattern,
     deviation: np.ndarray,
     curve: Curve,
-    stress: Callable[[Pattern, WheelSolution, int], DampedStress],
+    stress: Callable[[Pattern, WheelSolution, int], tuple[DampedStress, OwnStress | None]],
     others: OtherBlades | None = None,
     options: Options = DEFAULT_OPTIONS,
+    harmonic: int = 1,
+    wanted: float | None = None,
 ) -> PatternResponse:
     """The wheel with one pattern, under the load of a curve.
 
     Args:
         wheel: the tuned wheel under that load.
-        families: (q,) circular frequencies of the blade-alone modes [rad/s].
-        deviation: (N, q) relative deviations of these.
-        stress: of a blade, by the pattern, the solution and the blade's number.
-        others: blades of another shape, in addition.
+        pattern: what differs from blade to blade.
+        deviation: (N, q) relative deviations of the blade-alone frequencies.
+        stress: of a blade, by the pattern, the solution and the blade's number; of one of another
+            shape also that of its own aerofoil.
+        others: the blades of another shape in the pattern.
         options: when a point is accepted.
+        harmonic: of the scene's engine order.
+        wanted: estimated error by harmonics and samples above which there are more of them; None:
+            those of the curve.
     """
-    pattern = frequency_pattern(families, deviation)
-    if others is not None:
-        pattern = others.added(pattern, *deviation.shape)
-        deviation = deviation + others.frequencies(*deviation.shape)
     settings = curve.settings
-    H = max(settings.harmonics, *wheel.excitation)
-    samples = max(settings.samples, 8 * (H + 1))
-    grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005)
-    solved = wheel_respond(wheel, pattern, H, samples, options)
-    peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
+    H = max(harmonic * settings.harmonics, *wheel.excitation)
+    samples = max(harmonic * settings.samples, 8 * (H + 1))
+    grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
+    while True:
+        peak, solution, truncation = _peak_of_pattern(
+            wheel, pattern, grid, H, samples, harmonic, options
+        )
+        # of NaN nothing says that richer settings are solved
+        enough = wanted is None or not truncation > wanted
+        more = richer_balance(wheel, H, samples)
+        if enough or more[0] > MOST_HARMONICS * harmonic:
+            break
+        H, samples = more
     # the same way to the tuned one, so that the factor compares like with like
     tuned = find_wheel_peak(
-        wheel_respond(wheel, Pattern(), H, samples, options),
+        in_common_period(wheel_respond(wheel, Pattern(), H, samples, options), harmonic),
         curve.peak.omega * np.array([0.998, 1.0, 1.002]),
         SEARCH_TOLERANCE,
     )
-    solution = solve_wheel(wheel, peak.omega, H, samples, pattern=pattern, options=options)
+    one_order = len(wheel.excitation) == 1
+    alternating, own = stress(pattern, solution, peak.blade)
+    return PatternResponse(
+        curve.load,
+        curve.mass,
+        deviation,
+        harmonic,
+        tuned.height,
+        tuned.omega / (2 * pi),
+        peak,
+        solution,
+        _free_factor(wheel, pattern, grid, harmonic),
+        truncation,
+        tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
+        alternating,
+        others,
+        own,
+    )
+
+
+def richer_balance(wheel: Wheel, H: int, samples: int) -> tuple[int, int]:
+    """Harmonics and samples that tell what the present ones leave: at least twice as many, and with
+    the next odd multiple of the highest excited harmonic, which friction excites most.
+    """
+    top = max(wheel.excitation)
+    more = max(2 * H + 1, top * (2 * (H // top) + 1))
+    return more, max(2 * samples, 8 * (more + 1))
+
+
+def _peak_of_pattern(
+    wheel: Wheel,
+    pattern: Pattern,
+    grid: np.ndarray,
+    H: int,
+    samples: int,
+    harmonic: int,
+    options: Options,
+) -> tuple[WheelPeak, WheelSolution, float]:
+    """The peak, its solution, and the relative change of its height there with twice the harmonics
+    and samples; NaN: not solved.
+    """
+    solved = in_common_period(wheel_respond(wheel, pattern, H, samples, options), harmonic)
+    peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
+    omega = peak.omega / harmonic
+    solution = solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
     richer = solve_wheel(
         wheel,
-        peak.omega,
-        2 * H + 1,
-        2 * samples,
+        omega,
+        *richer_balance(wheel, H, samples),
         pattern=pattern,
         start=solution,
         options=options,
     )
     change = abs(richer.size().max() / solution.size().max() - 1)
-    return PatternResponse(
-        curve.load,
-        curve.mass,
-        deviation,
-        tuned.height,
-        tuned.omega / (2 * pi),
-        peak,
-        solution,
-        _free_factor(wheel, pattern, grid),
-        float(change) if richer.converged and solution.converged else float("nan"),
-        tuned.height / curve.balance_amplitude - 1,
-        stress(pattern, solution, peak.blade),
-        others,
-    )
+    known = richer.converged and solution.converged
+    return peak, solution, float(change) if known else float("nan")
 
 
 def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
@@ -182,16 +252,24 @@ def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
         )
         if not r.peak.closed_in:
             text += "; the highest point is an end of the band, the resonance may be higher"
-        if r.others is not None and r.peak.blade in r.others.changes:
-            text += "; that blade has another shape, its stress is that of the others' shape"
+        if r.own_stress is not None:
+            own = r.own_stress
+            place = ", ".join(f"{1e3 * x:.1f}" for x in own.place)
+            text += (
+                "; that blade has another shape: the stress above is that of the others' shape, "
+                f"that of its own aerofoil {1e-6 * own.largest:.4g} MPa at ({place}) mm, estimated "
+                f"error of its mesh there {100 * own.mesh_error:.2g} %"
+            )
         sentences.append(text)
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))
     far = max(abs(r.sector_difference) for r in found)
-    sentences.append(
-        "the whole wheel holds mean displacements in the preload state, which moves the tuned "
-        f"resonance by {100 * far:.2g} % at most"
+    moved = (
+        "where engine orders beyond the tuned sector's excite as well"
+        if np.isnan(far)
+        else f"which moves the tuned resonance by {100 * far:.2g} % at most"
     )
+    sentences.append(f"the whole wheel holds mean displacements in the preload state, {moved}")
     return sentences
 
 
@@ -199,13 +277,16 @@ def _free_factor(
     wheel: Wheel,
     pattern: Pattern,
     grid: np.ndarray,
+    harmonic: int,
 ) -> float:
     """Amplification without dampers over the same band."""
     fine = np.linspace(grid[0], grid[-1], LINEAR_POINTS)
+    highest = max(wheel.excitation)
 
     def respond(pattern: Pattern) -> float:
         def sizes(w: float) -> np.ndarray:
-            return np.linalg.norm(free_wheel(wheel, w, 1, pattern)[:, 1:, 0], axis=1)
+            moving = free_wheel(wheel, w / harmonic, highest, pattern)[:, 1:, 0]
+            return np.linalg.norm(moving, axis=1)
 
         return find_wheel_peak(sizes, fine, SEARCH_TOLERANCE).height
 

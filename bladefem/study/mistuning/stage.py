@@ -19,6 +19,7 @@ from ...util.communicator import Communicator
 from ...util.message import warning
 from ...util.progress import Progress, without_progress
 from ...wheel.model import Pattern, Wheel, frequency_pattern
+from ...wheel.pattern_file import BladeDeviations
 from ...wheel.resonance import find_wheel_peak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.solve import TUNED_PATTERN, WheelSolution
@@ -32,18 +33,23 @@ from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases
-from ..pipeline.damped_motion import DampedStress
+from ..pipeline.damped_motion import DampedMotion, DampedStress, stress_of_motion
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
+from ..pipeline.scene_mesh import build_mesh
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.utilisation import wheel_utilisation_message
-from .blade_stress import WheelShapes, all_modes, blade_stress
+from .blade_material import deviation_pattern
+from .blade_stress import WheelShapes, all_modes, blade_motion
+from .engine_orders import own_harmonic
 from .law_level import law_level, with_checks
-from .other_blades import OtherBlades, changed_blades
+from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
+from .own_stress import OwnStress, own_stress
 from .pattern_response import (
     SEARCH_TOLERANCE,
     PatternResponse,
     frequency_grid,
+    in_common_period,
     pattern_response,
     pattern_sentences,
 )
@@ -61,8 +67,9 @@ def with_whole_wheel(
     start = time.perf_counter()
     best = min(run.response.curves, key=lambda curve: curve.peak_amplitude)
     bodies = Bodies(run.scene, run.mesh, comm, progress)
-    sector, remarks = _kept_sector(run, [best], bodies, comm)
-    deviation = scene_deviations(run.scene, sector.reduced.sectors, len(sector.families))
+    deviation = _run_deviations(run)
+    root = deviation.of_material or bool(run.scene.mistuning.blades)
+    sector, remarks = _kept_sector(run, [best], bodies, comm, root)
     others, other_remarks = _kept_blades(run, comm)
     key = stage_key(
         "whole wheel",
@@ -77,7 +84,7 @@ def with_whole_wheel(
         run.folder,
         "whole_wheel",
         key,
-        lambda: _best_response(run, sector, deviation, best, bodies, others),
+        lambda: _best_response(run, sector, deviation, best, bodies, others, root),
         comm,
     )
     remarks.extend(other_remarks)
@@ -95,10 +102,11 @@ def with_whole_wheel(
 def _best_response(
     run: SolvedRun,
     sector: WheelSector,
-    deviation: np.ndarray,
+    deviation: BladeDeviations,
     curve: Curve,
     bodies: Bodies,
     others: OtherBlades | None,
+    root: bool,
 ) -> PatternResponse:
     """The response of all blades under the load of a curve, whose sectors the ranks share, with the
     stress of the highest one, on one rank.
@@ -107,30 +115,92 @@ def _best_response(
 
     comm = bodies.comm
     # all ranks have to take the same decisions: from the same numbers to the last digit
-    wheel, deviation, curve, others = on_root(
-        comm, lambda: (_wheels(run, sector, [curve])[0], deviation, curve, others)
+    wheel, pattern, curve, others = on_root(
+        comm,
+        lambda: (
+            _wheels(run, sector, [curve])[0],
+            _run_pattern(run, sector, deviation, others),
+            curve,
+            others,
+        ),
     )
+    frequency = deviation.blade_alone
+    if others is not None:
+        frequency = frequency + others.frequencies(*frequency.shape)
 
-    def stress(pattern: Pattern, solution: WheelSolution, blade: int) -> DampedStress:
+    def stress(
+        pattern: Pattern, solution: WheelSolution, blade: int
+    ) -> tuple[DampedStress, OwnStress | None]:
         case = _cases(run)[curve.load, curve.mass]
         alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
         alone.kept.update(bodies.kept)
-        _, readings = blade_readings(alone, run.clamped, len(sector.families), run.modes)
+        _, readings = blade_readings(alone, run.clamped, len(sector.families), run.modes, root)
         patches = list(run.contact.problem.patches)
         shapes = WheelShapes(alone, patches, all_modes(alone), readings)
         points = curve.settings.points
-        return blade_stress(shapes, wheel, pattern, case, solution, blade, points)
+        motion = blade_motion(shapes, wheel, pattern, case, solution, blade, points)
+        own = None
+        if others is not None and blade in others.changes:
+            own = _own_stress(run, len(sector.families), blade, motion, readings)
+        return stress_of_motion(alone, case, motion), own
 
     shared = replace(wheel, comm=comm)
     return pattern_response(
         shared,
-        sector.families,
-        deviation,
+        pattern,
+        frequency,
         curve,
         lambda *of_blade: on_root(comm, lambda: stress(*of_blade)),
         others,
         solver_options(run.scene.accuracy),
+        own_harmonic(run.scene),
+        # harmonics that the scene gives are kept
+        run.scene.accuracy / 2 if run.scene.model.harmonics is None else None,
     )
+
+
+def _own_stress(
+    run: SolvedRun,
+    families: int,
+    blade: int,
+    motion: DampedMotion,
+    readings: np.ndarray,
+) -> OwnStress:
+    """The stress of the aerofoil of a blade of another shape.
+
+    Args:
+        motion: of that blade on the mesh of the others.
+        readings: (n_points*dim, q + p) of the families and of the root.
+    """
+    foot = foot_of(run.mesh, run.modes, families)
+    tuned = held_aerofoil(run.scene, run.mesh, foot, families, run.clamped)
+    scene = _given_blades(run.scene)[blade]
+    other = held_aerofoil(scene, build_mesh(scene), foot, families)
+    fields = motion.harmonics
+    return own_stress(tuned, other, fields.reshape(len(fields), -1) @ readings)
+
+
+def _run_deviations(run: SolvedRun) -> BladeDeviations:
+    """Those of the scene's pattern."""
+    name = kind_named(run.scene.kind).sectors
+    count = 0 if name is None else value_at(run.scene, name)
+    return scene_deviations(run.scene, count, run.scene.mistuning.families)
+
+
+def _run_pattern(
+    run: SolvedRun,
+    sector: WheelSector,
+    deviation: BladeDeviations,
+    others: OtherBlades | None,
+) -> Pattern:
+    """The deviations of all blades as forces on their readings; on one rank."""
+    aerofoil = None
+    if deviation.of_material:
+        families = len(sector.families)
+        foot = foot_of(run.mesh, run.modes, families)
+        aerofoil = held_aerofoil(run.scene, run.mesh, foot, families, run.clamped)
+    pattern = deviation_pattern(sector.families, deviation, aerofoil)
+    return pattern if others is None else others.added(pattern, len(deviation.mass))
 
 
 def scatter_of_run(
@@ -146,7 +216,8 @@ def scatter_of_run(
     scene = run.scene
     refuse_scatter(scene)
     curves = run.response.curves
-    sector, _ = _kept_sector(run, curves, Bodies(scene, run.mesh, comm, progress), comm)
+    root = bool(scene.mistuning.blades)
+    sector, _ = _kept_sector(run, curves, Bodies(scene, run.mesh, comm, progress), comm, root)
     made = _wheels(run, sector, curves)
     others, _ = _kept_blades(run, comm)
     return joined_loads(
@@ -180,8 +251,9 @@ def _kept_statistics(
     """Statistics under the load of one curve, computed or found in the folder."""
     scene = run.scene
     spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
-    H = max(curve.settings.harmonics, *wheel.excitation)
-    samples = max(curve.settings.samples, 8 * (H + 1))
+    harmonic = own_harmonic(scene)
+    H = max(harmonic * curve.settings.harmonics, *wheel.excitation)
+    samples = max(harmonic * curve.settings.samples, 8 * (H + 1))
     families = len(sector.families)
     options = solver_options(scene.accuracy)
     if others is not None:
@@ -189,7 +261,7 @@ def _kept_statistics(
 
     def made(deviation: np.ndarray) -> Pattern:
         pattern = frequency_pattern(sector.families, deviation)
-        return pattern if others is None else others.added(pattern, wheel.count, families)
+        return pattern if others is None else others.added(pattern, wheel.count)
 
     def compute() -> Amplification:
         patterns = drawn_patterns(
@@ -206,7 +278,7 @@ def _kept_statistics(
             cheap = on_root(comm, lambda: law_level(wheel, patterns, drawn, curve, mode, band))
 
             def whole_peak(pattern: Pattern) -> float:
-                own = frequency_grid(wheel, curve, pattern, spread)
+                own = frequency_grid(wheel, curve, pattern, spread, harmonic)
                 return find_wheel_peak(
                     wheel_respond(wheel, pattern, H, samples, options), own, SEARCH_TOLERANCE
                 ).height
@@ -216,8 +288,10 @@ def _kept_statistics(
         return scatter_statistics(
             {curve.load: wheel},
             {curve.load: patterns},
-            lambda load, pattern: frequency_grid(wheel, curve, pattern, spread),
-            lambda wheel, pattern: wheel_respond(wheel, pattern, H, samples, options),
+            lambda load, pattern: frequency_grid(wheel, curve, pattern, spread, harmonic),
+            lambda wheel, pattern: in_common_period(
+                wheel_respond(wheel, pattern, H, samples, options), harmonic
+            ),
             comm,
             SEARCH_TOLERANCE,
             progress,
@@ -233,9 +307,10 @@ def _kept_sector(
     curves: list[Curve],
     bodies: Bodies,
     comm: Communicator | None,
+    root: bool,
 ) -> tuple[WheelSector, list[str]]:
-    """The sector in all nodal diameters, computed or found in the folder, and the remark that it
-    was.
+    """The sector in all nodal diameters, with the motions of the aerofoil's root or without,
+    computed or found in the folder, and the remark that it was.
     """
     scene = run.scene
     patches = list(run.contact.problem.patches)
@@ -245,9 +320,9 @@ def _kept_sector(
     def compute() -> WheelSector:
         # the stress of a blade needs the shapes of the same modes
         all_modes(bodies, modes)
-        return reduce_wheel(bodies, patches, modes, run.clamped, families, run.modes)
+        return reduce_wheel(bodies, patches, modes, run.clamped, families, run.modes, root)
 
-    key = stage_key("wheel", scene, modes, bool(scene.mistuning.blades))
+    key = stage_key("wheel", scene, modes, root)
     sector, seconds = cached_stage(run.folder, "wheel_sector", key, compute, comm)
     return sector, [] if seconds is None else [found_remark("wheel_sector", seconds)]
 

@@ -11,7 +11,9 @@ from ...scene.fields import value_at
 from ...scene.kinds import kind_named
 from ...scene.other_blades import other_blades
 from ...scene.tables import Scene
-from ...wheel.scatter import Scatter, drawn_deviations, read_pattern
+from ...wheel.pattern_file import BladeDeviations, frequency_deviations, read_deviations
+from ...wheel.scatter import Scatter, drawn_deviations
+from .engine_orders import read_orders
 
 # mistuning.level: all wheels by the law of one damper
 LAW_LEVEL = "damper law"
@@ -78,67 +80,26 @@ def scene_deviations(
     scene: Scene,
     count: int,
     families: int,
-) -> np.ndarray:
-    """(N, q) relative deviations of frequency: of the file, or the first ones drawn.
+) -> BladeDeviations:
+    """Relative deviations of the blades: of the file, or the first ones drawn.
 
     Raises:
         InputError: neither is given, the file does not fit, or a blade would be unstable.
     """
     given = scene.mistuning
     if given.pattern:
-        _, values = read_pattern(given.pattern, count)
-        if values.shape[1] not in (1, families):
-            raise InputError(
-                f"mistuning.pattern: {values.shape[1]} families, expected 1 for all or "
-                f"mistuning.families = {families}"
-            )
-        if values.min() <= -1:
-            blade = int(np.argmin(values.min(axis=1)))
-            raise InputError(
-                f"mistuning.pattern: deviation {values.min():.4g} of blade {blade + 1} leaves it "
-                "no stiffness, expected relative deviations of frequency above -1"
-            )
-        return np.broadcast_to(values, (count, families)).copy()
+        return read_deviations(given.pattern, count, families)
     if given.scatter is None and given.blades:
-        return np.zeros((count, families))
+        return frequency_deviations(np.zeros((count, families)))
     if given.scatter is None:
         raise InputError("mistuning: expected a pattern file or a scatter")
     # the same first wheel as the statistics draw
     scatter = Scatter(given.scatter, seed=given.seed)
     deviation = drawn_deviations(count, scatter, 1).blades[0]
-    return np.repeat(deviation[:, None], families, axis=1)
+    return frequency_deviations(np.repeat(deviation[:, None], families, axis=1))
 
 
 def scene_scatter(scene: Scene) -> Scatter:
     """The scene's standard deviations."""
     m = scene.mistuning
     return Scatter(m.scatter or 0.0, m.friction, m.stiffness, m.load, m.mass, m.traction, m.seed)
-
-
-def read_orders(scene: Scene) -> list[tuple[int, float, float]]:
-    """Order, amplitude [N] and phase [rad] of each entry of mistuning.orders.
-
-    Raises:
-        InputError: an entry is not "18: 0.3 N" or "18: 0.3 N, 90 deg", or no multiple of the
-            engine order.
-    """
-    from ...scene.units import parse
-
-    found = []
-    for entry in scene.mistuning.orders or ():
-        order, colon, rest = entry.partition(":")
-        force, _, phase = rest.partition(";")
-        name = f"mistuning.orders '{entry}'"
-        if not colon or not order.strip().isdigit():
-            raise InputError(
-                f"{name}: expected a whole order and a force, such as '18: 0.3 N; 90 deg'"
-            )
-        base = scene.excitation.engine_order
-        if base == 0 or int(order) % base or int(order) == 0:
-            raise InputError(
-                f"{name}: expected a multiple of excitation.engine_order = {base}, so that all "
-                "orders have one period"
-            )
-        angle = parse(phase.strip(), "rad", name) if phase.strip() else 0.0
-        found.append((int(order), parse(force.strip(), "N", name), angle))
-    return found

@@ -14,10 +14,11 @@ from geometry.mesh import Mesh, sector_of
 
 from ...data import ModeSet, Patch
 from ...errors import InputError
+from ...hbm.model import softened_layer
 from ...reduction.assemble import pair_model
 from ...reduction.truncate import truncate_modes
 from ...scene.tables import Scene
-from ...wheel.model import Wheel, engine_order
+from ...wheel.model import Wheel
 from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.bodies import Bodies
@@ -25,8 +26,8 @@ from ..pipeline.coriolis import with_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
 from ..pipeline.joined_contacts import joined_member
 from ..pipeline.reduced_sector import Reduced, reduce_sector, with_damper_mass
+from .engine_orders import order_forces
 from .other_blades import foot_of
-from .validate import read_orders
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,7 @@ def reduce_wheel(
     clamped: ModeSet | None,
     families: int,
     wheel_modes: Sequence[ModeSet] = (),
+    root: bool = False,
 ) -> WheelSector:
     """The sector in nodal diameters 0 to N/2.
 
@@ -52,12 +54,14 @@ def reduce_wheel(
         modes: modes kept in each nodal diameter.
         clamped: modes of the aerofoil held at its root.
         families: of these that deviate from blade to blade.
-        wheel_modes: modes of the tuned wheel, wanted where some blades have another shape.
+        wheel_modes: modes of the tuned wheel, wanted with the root.
+        root: read the motions of the aerofoil's root too: of blades of another shape, stiffness or
+            mass, whose inertia differs under these.
 
     Raises:
         InputError: the scene is no wheel, or names no aerofoil.
     """
-    omega, readings = blade_readings(bodies, clamped, families, wheel_modes)
+    omega, readings = blade_readings(bodies, clamped, families, wheel_modes, root)
     diameters = range(sector_of(bodies.mesh).count // 2 + 1)
     reduced = reduce_sector(bodies, patches, list(diameters), modes, readings)
     return WheelSector(reduced, omega)
@@ -68,10 +72,11 @@ def blade_readings(
     clamped: ModeSet | None,
     families: int,
     modes: Sequence[ModeSet] = (),
+    root: bool = False,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Circular frequencies (q,) of the blade-alone modes [rad/s], and the columns (n_points*dim, q)
-    that read their coordinates, with more for the motion of the root where some blades have another
-    shape; the arguments are those of `reduce_wheel`.
+    that read their coordinates, with more for the motions of the root; the arguments are those of
+    `reduce_wheel`.
     """
     from ...fem.held_part import section_readings
     from ...fem.readings import modal_readings
@@ -89,8 +94,7 @@ def blade_readings(
         )
     omega = 2 * pi * clamped.frequencies[:families]
     readings = modal_readings(bodies.still_blade, clamped.shapes[:families], omega)
-    if bodies.scene.mistuning.blades:
-        # a blade of another shape has another inertia under motions of its root too
+    if root:
         foot = foot_of(bodies.mesh, modes, families)
         readings = np.hstack([readings, section_readings(bodies.mesh, foot.nodes, foot.motions)])
     return omega, readings
@@ -119,27 +123,19 @@ def whole_wheel(
         scene, mesh, reduced, patches, case, settings.harmonics, settings.damper, sides
     )
     model = joined_member(model, patches, settings.points, scene.contact.points).model
+    if settings.softened:
+        model = softened_layer(model)
     damper = model.damper[0] if isinstance(model.damper, tuple) else model.damper
     return Wheel(
         count,
         dict(enumerate(model.sides)),
         model.elements,
-        _excitation(scene, count),
+        order_forces(scene, count),
         model.damping,
         damper,
         model.damper_damping,
         influence=wheel_influence(scene_flow(scene, count), bodies),
         coupled=False,
         start=model.start,
+        series=model.series,
     )
-
-
-def _excitation(scene: Scene, count: int) -> dict[int, np.ndarray]:
-    """Harmonic to amplitudes: the scene's engine order and its multiples in mistuning.orders."""
-    order = scene.excitation.engine_order
-    found = {1: engine_order(count, order, np.array([scene.excitation.force]))}
-    for multiple, force, phase in read_orders(scene):
-        part = engine_order(count, multiple, np.array([force]), phase)
-        harmonic = multiple // order
-        found[harmonic] = found.get(harmonic, 0.0) + part
-    return found

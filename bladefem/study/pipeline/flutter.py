@@ -40,6 +40,11 @@ AMPLITUDES = 50
 LOWEST_RATIO, HIGHEST_RATIO = 0.2, 300.0
 # further ones between two of them where friction balances the flow
 CLOSER_AMPLITUDES = 8
+# motions between two amplitudes after which the branch is begun anew beyond: far from limit cycles
+# contacts that lift off fold it often
+MAX_ARCS = 40
+# relative difference of normal loads that are the same but for a factor
+SAME_SHAPE = 1e-9
 # modal amplitude at which nothing slips [m kg^1/2]
 STICKING_AMPLITUDE = 1e-10
 
@@ -141,12 +146,64 @@ def find_flutter(
     cases = load_cases(scene, run.mesh, run.contact)
 
     def compute() -> tuple[HeldFlutter, ...]:
-        return tuple(
-            _held(run, sector, patches, case, flow, wave) for case in cases for wave in found.fed
-        )
+        solved: list[tuple[LoadCase, list[HeldFlutter]]] = []
+        for case in cases:
+            held = _by_scale(case, solved)
+            if held is None:
+                held = [_held(run, sector, patches, case, flow, wave) for wave in found.fed]
+            solved.append((case, held))
+        return tuple(one for _, held in solved for one in held)
 
     key = stage_key("response", scene, "flutter", found.fed, [(c.load, c.mass) for c in cases])
     return replace(found, held=keep("flutter", key, compute))
+
+
+def _by_scale(
+    case: LoadCase,
+    solved: list[tuple[LoadCase, list[HeldFlutter]]],
+) -> list[HeldFlutter] | None:
+    """The limit cycles of a case from those of another one, or None.
+
+    With all normal loads and friction forces times a factor, and nothing else, all motions have
+    that factor too: Coulomb's law and contacts that lift off are homogeneous.
+    """
+    for other, held in solved:
+        factor = _load_factor(other, case)
+        if factor is not None:
+            return [
+                replace(
+                    one,
+                    load=case.load,
+                    amplitude=factor * one.amplitude,
+                    largest=factor * one.largest,
+                )
+                for one in held
+            ]
+    return None
+
+
+def _load_factor(one: LoadCase, other: LoadCase) -> float | None:
+    """Factor of the normal loads from one case to another that differs by nothing else; None where
+    it does. Layers that stiffen and laws of other authors have a scale of their own.
+    """
+    a, b = one.elements, other.elements
+    laws = (a.law, b.law, one.decay, other.decay)
+    if any(law is not None for law in laws) or one.mass != other.mass:
+        return None
+    same = [(a.kt, b.kt), (a.kn, b.kn), (a.mu, b.mu)]
+    if (one.series is None) != (other.series is None):
+        return None
+    if one.series is not None and other.series is not None:
+        same.append((one.series, other.series))
+    if any(np.shape(x) != np.shape(y) or not np.array_equal(x, y) for x, y in same):
+        return None
+    if abs(one.selection - other.selection).max() > 0:
+        return None
+    factor = other.load / one.load
+    for x, y in ((a.n0, b.n0), (a.traction, b.traction)):
+        if abs(factor * x - y).max() > SAME_SHAPE * abs(b.n0).max():
+            return None
+    return factor
 
 
 def _held(
@@ -202,7 +259,9 @@ def _closed_in(
     """The nonlinear mode at some amplitudes, and closer where its damping balances the rest; in
     the order of its branch.
     """
-    points = list(nonlinear_mode(model, [float(a) for a in amplitudes], mode, 1, samples))
+    points = list(
+        nonlinear_mode(model, [float(a) for a in amplitudes], mode, 1, samples, arcs=MAX_ARCS)
+    )
     known = [p for p in points if p.converged]
     net = np.array([p.zeta for p in known]) + damping
     found = list(known)
@@ -210,7 +269,7 @@ def _closed_in(
     for i in np.flatnonzero(np.sign(net[1:]) != np.sign(net[:-1]))[::-1]:
         between = np.geomspace(known[i].amplitude, known[i + 1].amplitude, CLOSER_AMPLITUDES + 2)
         closer = [float(a) for a in between[1:-1]]
-        found[i + 1 : i + 1] = nonlinear_mode(model, closer, mode, 1, samples, known[i])
+        found[i + 1 : i + 1] = nonlinear_mode(model, closer, mode, 1, samples, known[i], MAX_ARCS)
     return found
 
 

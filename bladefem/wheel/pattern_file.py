@@ -1,0 +1,163 @@
+"""Deviations of the blades of a wheel, and the file that lists them by blade and family."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..util.arrays import RealArray
+
+# what a column deviates in, by the last word of its name; the first where none is said
+FREQUENCY = "frequency"
+STIFFNESS = "stiffness"
+MASS = "mass"
+QUANTITIES = (FREQUENCY, STIFFNESS, MASS)
+
+
+@dataclass(frozen=True)
+class BladeDeviations:
+    """Relative deviations of N blades in q families of blade-alone modes.
+
+    A family of stiffness 1 + k and mass 1 + m has sqrt((1 + k) / (1 + m)) times its frequency. A
+    frequency is a stiffness alone, (1 + deviation)^2 - 1.
+    """
+
+    # (N, q) each [1]
+    frequency: RealArray
+    stiffness: RealArray
+    mass: RealArray
+    # whether the stiffness and the mass are one number a blade: its modulus and its density, of
+    # which its higher families and the motions of its root have the same
+    one_stiffness: bool = False
+    one_mass: bool = False
+
+    @property
+    def of_material(self) -> bool:
+        """Stiffness or mass is given, not the frequency alone."""
+        return bool(np.any(self.stiffness) or np.any(self.mass))
+
+    @property
+    def blade_alone(self) -> np.ndarray:
+        """(N, q) relative deviations of the blade-alone frequencies."""
+        return (1 + self.frequency) * np.sqrt((1 + self.stiffness) / (1 + self.mass)) - 1
+
+
+def frequency_deviations(values: np.ndarray) -> BladeDeviations:
+    """Those of frequencies (N, q) alone."""
+    return BladeDeviations(values, np.zeros_like(values), np.zeros_like(values))
+
+
+def read_deviations(path: str | Path, count: int, families: int) -> BladeDeviations:
+    """The deviations in a CSV file; see `read_pattern` for its rows.
+
+    A column is a family's frequency, or its stiffness or its mass where its name ends in that word:
+    "1F", "1F stiffness", "mass". Each quantity has one column for all families, or one a family.
+
+    Raises:
+        InputError: the file does not fit, or a blade would have no stiffness or no mass.
+    """
+    names, values = read_pattern(path, count)
+    quantities = [_quantity(name) for name in names]
+    found = {}
+    single = {}
+    for quantity in QUANTITIES:
+        columns = values[:, [own == quantity for own in quantities]]
+        single[quantity] = columns.shape[1] == 1
+        if columns.shape[1] not in (0, 1, families):
+            of = "" if quantity == FREQUENCY else f" with a {quantity}"
+            raise InputError(
+                f"mistuning.pattern: {columns.shape[1]} families{of}, expected 1 for all or "
+                f"mistuning.families = {families}"
+            )
+        _refuse_nothing_left(columns, quantity)
+        if columns.shape[1] == 0:
+            columns = np.zeros((count, 1))
+        found[quantity] = np.broadcast_to(columns, (count, families)).copy()
+    if FREQUENCY in quantities and set(quantities) != {FREQUENCY}:
+        raise InputError(
+            f"pattern file {Path(path).name}: columns of frequency next to columns of stiffness or "
+            "mass, expected frequencies alone, or stiffnesses and masses"
+        )
+    return BladeDeviations(
+        found[FREQUENCY], found[STIFFNESS], found[MASS], single[STIFFNESS], single[MASS]
+    )
+
+
+def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
+    """Names and relative deviations (N, columns) of a CSV file.
+
+    The first row names the columns, each further row is a blade; a first column "blade" numbers
+    them. "#" starts a comment.
+
+    Raises:
+        InputError: the file is missing, not numbers, or has another number of blades.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"mistuning.pattern = '{path}': there is no such file")
+    text = path.read_text(encoding="utf-8").splitlines()
+    rows = [line.split("#")[0].strip() for line in text]
+    cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
+    if len(cells) < 2:
+        raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")
+    names = cells[0]
+    values = _read_numbers(path, cells[1:], len(names))
+    if names[0].lower() == "blade":
+        _check_order(path, values[:, 0])
+        names = names[1:]
+        values = values[:, 1:]
+    if len(values) != count:
+        raise InputError(
+            f"pattern file {path.name}: {len(values)} blades, expected {count}, one a sector"
+        )
+    if not names:
+        raise InputError(f"pattern file {path.name}: expected a column of deviations")
+    return names, values
+
+
+def _quantity(name: str) -> str:
+    """What a column deviates in."""
+    words = name.lower().split()
+    return words[-1] if words and words[-1] in QUANTITIES else FREQUENCY
+
+
+def _refuse_nothing_left(columns: np.ndarray, quantity: str) -> None:
+    if columns.min(initial=0.0) > -1:
+        return
+    blade = int(np.argmin(columns.min(axis=1)))
+    left = MASS if quantity == MASS else STIFFNESS
+    raise InputError(
+        f"mistuning.pattern: deviation {columns.min():.4g} of blade {blade + 1} leaves it no "
+        f"{left}, expected relative deviations of {quantity} above -1"
+    )
+
+
+def _read_numbers(
+    path: Path,
+    rows: Sequence[Sequence[str]],
+    columns: int,
+) -> np.ndarray:
+    for i, row in enumerate(rows):
+        if len(row) != columns:
+            raise InputError(
+                f"pattern file {path.name}: {len(row)} columns in blade {i + 1}, expected {columns}"
+            )
+    try:
+        values = np.array(rows, dtype=float)
+    except ValueError as error:
+        raise InputError(f"pattern file {path.name}: {error}, expected numbers") from None
+    if not np.isfinite(values).all():
+        raise InputError(f"pattern file {path.name}: expected finite numbers")
+    return values
+
+
+def _check_order(path: Path, numbers: np.ndarray) -> None:
+    expected = np.arange(len(numbers)) + numbers[0]
+    if numbers[0] not in (0, 1) or not np.array_equal(numbers, expected):
+        raise InputError(
+            f"pattern file {path.name}: expected blades in order, numbered from 0 or from 1"
+        )
