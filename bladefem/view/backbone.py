@@ -141,7 +141,7 @@ def _draw_prediction(ax: Axes, found: Sequence[Backbone], colours: dict[float, A
     ax.plot(load[order], predicted[order], color="#777777", label="by the mode")
     for one, height in zip(found, balance, strict=True):
         ax.plot(one.load, height, "o", color=colours[one.load])
-    ax.plot([], [], "o", color="#777777", label="balance")
+    ax.plot([], [], "o", color="#777777", label="forced response")
     if len(found) > 1:
         log_axis(ax, "x")
         log_axis(ax, "y")
