@@ -22,7 +22,7 @@ from ..errors import NotSolvedError
 from .compat import MPI, shared_matrix
 from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
-from .open_matrix import OpenMatrix, entries
+from .open_matrix import OpenMatrix, entries, picked
 from .schur import (
     Bridge,
     drop_complement,
@@ -159,7 +159,7 @@ def eliminate_interior(
         inner,
         rim,
         S,
-        A[rim][:, inner].tocsr(),
+        picked(A, rim, inner),
         bridge,
         order,
         negative,
