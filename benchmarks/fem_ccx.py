@@ -59,6 +59,16 @@ the basis, both sides in one run beside other work:
      49 632  5          straight     17.6           3.3    5.3  0.44    1.05   2.4e-07      9.3e-06
     148 773  5          curved       90.2          14.1    6.4  1.32    0.82   3.5e-07      1.3e-05
 
+With rows and columns picked in one pass and cut faces folded from parts, one complex diameter each,
+both sides in one run on a machine three times overbooked:
+
+     49 632  5          curved       24.4           4.4    5.6  0.44    1.06   3.4e-07      6.4e-05
+    148 773  5          curved      147.7          19.1    7.7  1.33    0.82   3.5e-07      1.3e-05
+
+Where 16.8 s at 148 773 go: 3.6 s into the Cholesky factorisation, 3.8 s into the count (another
+factorisation, 3.2 s), 3.7 s into 26 sweeps over the factors with SLEPc's one vector. The block
+iteration takes 10 sweeps of six vectors, 3.6 s in place of SLEPc's 5.4 s with all around it.
+
     python benchmarks/fem_ccx.py 45000 151000      both sides in one run, some 12 minutes
 """
 

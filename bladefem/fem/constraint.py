@@ -13,7 +13,7 @@ a plane "antisymmetry_x", ... the two others are zero: the deformed body turns o
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,9 +25,10 @@ from ..errors import InputError, suggestion
 from .body import Body
 from .compat import PETSc
 from .cut_faces import repeated_motion, tie_cut_faces
+from .cyclic_schur import FaceMap
 from .distributed import local_rows, to_petsc
 from .linalg import Doubled, Folded, Matrix, combined
-from .open_sector import Opened, maps_of_part, open_sector
+from .open_sector import Opened, boundary_map, columns_of_part, open_sector
 from .supports import held_directions, polar_elimination
 
 
@@ -49,6 +50,12 @@ class Transformation:
     opened: Opened | None
     # 0 without cyclic symmetry
     sectors: int
+
+    @cached_property
+    def faces(self) -> FaceMap:
+        """How unknowns of an open sector depend on those of nodal diameters, but for the phase."""
+        assert self.opened is not None
+        return boundary_map(self.opened, self.low, high_part(self))
 
 
 @dataclass(frozen=True)
@@ -166,8 +173,9 @@ def at_diameter(t: Transformation, nodal_diameter: int | None) -> Constrained:
     phase = np.exp(1j * angle) if not real else 1.0 if n == 0 else -1.0
     T = (t.low + phase * high_part(t)).tocsr()
     if t.opened is not None:
-        C, faces = maps_of_part(t.opened, T)
+        C = columns_of_part(t.opened, T[t.opened.places])
         shared = t.opened.shared
+        faces = replace(t.faces, phase=phase)
         stiffness = Folded(t.opened.K, C, t.opened.elimination, shared, faces)
         mass = Folded(t.opened.M, C, None, shared, faces)
         return Constrained(t.body, T, own, stiffness, lambda: mass, n)

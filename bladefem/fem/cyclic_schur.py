@@ -11,7 +11,8 @@ real and imaginary parts. Of several ranks each eliminates the interior of its o
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ from ..errors import NotSolvedError
 from .compat import MPI, shared_matrix
 from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
-from .open_matrix import OpenMatrix, entries
+from .open_matrix import OpenMatrix, entries, picked
 from .schur import (
     Bridge,
     drop_complement,
@@ -68,6 +69,8 @@ class Core:
     # after the elimination of the separators
     shared: SharedBoundary | None = None
     separators: Separators | None = None
+    # what all nodal diameters make their Schur complement of, once one has asked
+    folded: list[_FoldedParts] = field(default_factory=list)
 
 
 @dataclass(frozen=True)
@@ -80,8 +83,28 @@ class FaceMap:
     masters: np.ndarray
     # (ns,) between the ranks' parts
     between: np.ndarray
-    # (nr, nm) open unknowns of the cut faces from masters
-    C: sp.csr_matrix
+    # (nr, nm) real: open unknowns of the cut faces from masters are low + phase high
+    low: sp.csr_matrix
+    high: sp.csr_matrix
+    phase: complex
+
+    @cached_property
+    def C(self) -> sp.csr_matrix:
+        """(nr, nm) open unknowns of the cut faces from masters."""
+        return (self.low + self.phase * self.high).tocsr()
+
+
+@dataclass(frozen=True)
+class _FoldedParts:
+    """C^H S C = own + phase across + conj(phase) across^T."""
+
+    # of the maps that they were made with
+    low: sp.csr_matrix
+    high: sp.csr_matrix
+    # (nm, nm) low^T S low + high^T S high
+    own: np.ndarray
+    # (nm, nm) low^T S high
+    across: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -114,7 +137,11 @@ def face_map(C: sp.csr_matrix) -> FaceMap:
     rim = rim_of(C)
     inner = np.setdiff1d(np.arange(C.shape[0]), rim)
     on_face = np.unique(C[rim].indices)
-    return FaceMap(C[inner].indices, on_face, np.empty(0, int), C[rim][:, on_face].tocsr())
+    faces = C[rim][:, on_face].tocsr()
+    part = C[inner].indices, on_face, np.empty(0, int), faces.real.tocsr()
+    if not np.iscomplexobj(faces):
+        return FaceMap(*part, sp.csr_matrix(faces.shape), 1.0)
+    return FaceMap(*part, faces.imag.tocsr(), 1j)
 
 
 def eliminate_interior(
@@ -159,7 +186,7 @@ def eliminate_interior(
         inner,
         rim,
         S,
-        A[rim][:, inner].tocsr(),
+        picked(A, rim, inner),
         bridge,
         order,
         negative,
@@ -271,15 +298,25 @@ def count_negative(core: Core, faces: FaceMap) -> int:
 
 
 def _folded_complement(core: Core, faces: FaceMap) -> np.ndarray:
-    """C^H S C (nm, nm) of the real symmetric S, without a complex copy of S."""
-    turned = faces.C.T.tocsr()
-    if not np.iscomplexobj(turned):
-        half = turned @ core.S
-    else:
-        half = np.empty((turned.shape[0], len(core.S)), complex)
-        half.real = turned.real @ core.S
-        half.imag = turned.imag @ core.S
-    return np.asarray(faces.C.conj().T @ half.T)
+    """C^H S C (nm, nm) of the real symmetric S; what of it serves all nodal diameters is kept."""
+    parts = core.folded[0] if core.folded else None
+    if parts is None or parts.low is not faces.low or parts.high is not faces.high:
+        parts = _fold(core.S, faces.low, faces.high)
+        core.folded[:] = [parts]
+    out = np.array(parts.own, np.result_type(parts.own, faces.phase))
+    out += faces.phase * parts.across
+    out += np.conj(faces.phase) * parts.across.T
+    return out
+
+
+def _fold(S: np.ndarray, low: sp.csr_matrix, high: sp.csr_matrix) -> _FoldedParts:
+    """The parts of C^H S C that no phase is in."""
+    left, right = low.T.tocsr(), high.T.tocsr()
+    # rows of products are those of S, which is symmetric
+    beside = np.ascontiguousarray((right @ S).T)
+    return _FoldedParts(
+        low, high, left @ np.ascontiguousarray((left @ S).T) + right @ beside, left @ beside
+    )
 
 
 def solve_diameter(rim: Rim, B: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from .compat import MPI
-from .memory import available_memory, modal_solve_memory
+from .memory import available_memory, give_back, modal_solve_memory
 
 Result = TypeVar("Result")
 # more ranks on one sector have ever less to do between two exchanges
@@ -19,6 +19,11 @@ MAX_RANKS_PER_SECTOR = 4
 # two ranks that share it take as long for the modes as two that share out its nodal diameters, and
 # the stresses take twice as long, as no rank has the whole sector's factors then
 MIN_DOFS_PER_RANK = 40_000
+# the same where more than two share it, so that none has the whole sector's factors anyway: on
+# 139 000 degrees of freedom four ranks that share it take as long as two pairs, 28 and 27 s for the
+# modes and 23 and 23 s for the reduction, with 1.20 and 1.29 GiB a rank; and what all ranks have
+# assembled serves both
+MIN_DOFS_OF_FURTHER_RANKS = 30_000
 # tasks of a group up to which none of them helps another
 MAX_UNGROUPED_TASKS = 3
 # share of the free memory that groups may fill
@@ -44,7 +49,9 @@ def group_size(
     together = comm.allreduce(here.size, MPI.MAX)
     here.Free()
     sizes = [size for size in range(1, comm.size + 1) if comm.size % size == 0]
-    useful = min(MAX_RANKS_PER_SECTOR, max(dofs // MIN_DOFS_PER_RANK, 1))
+    useful = 1
+    if dofs >= 2 * MIN_DOFS_PER_RANK:
+        useful = min(MAX_RANKS_PER_SECTOR, max(dofs // MIN_DOFS_OF_FURTHER_RANKS, 2))
     least = max(size for size in sizes if size <= useful)
     for size in sizes:
         memory = modal_solve_memory(dofs, size, cut=cut) * max(together // size, 1)
@@ -80,8 +87,10 @@ def shared_out(
         whatever a group raised.
     """
     groups = max(min(comm.size // size, len(tasks)), 1)
-    color = comm.rank * groups // comm.size
-    mine = _even_shares(tasks, groups, cost)[color]
+    colors = [rank * groups // comm.size for rank in range(comm.size)]
+    color = colors[comm.rank]
+    shares = _even_shares(tasks, groups, cost)
+    mine = shares[color]
     whole = comm.Split(color, comm.rank)
     part = whole.Split(0 if whole.rank < size else MPI.UNDEFINED, whole.rank)
     found: dict[int, Result] = {}
@@ -93,14 +102,20 @@ def shared_out(
             # the other groups must not wait for ever
             error = problem
         part.Free()
-    first = whole.rank == 0
     whole.Free()
-    merged: dict[int, Result] = {}
-    for results, failure in comm.allgather((found if first and error is None else {}, error)):
+    for failure in comm.allgather(error):
         if failure is not None:
             raise failure
-        merged |= results
-    return [merged[n] for n in tasks]
+    give_back()
+    # one by one: all of them as messages would be the peak of memory
+    for owner, share in enumerate(shares):
+        root = colors.index(owner)
+        for task in share:
+            result = comm.bcast(found.get(task) if comm.rank == root else None, root)
+            if task not in found:
+                found[task] = result
+            del result
+    return [found[n] for n in tasks]
 
 
 def _even_shares(

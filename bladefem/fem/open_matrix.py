@@ -45,13 +45,16 @@ class Repeated:
         return n, n
 
 
+# share of rows up to which leaving some out one by one is cheaper than copying the others
+FEW_DROPPED_ROWS = 0.05
+
 OpenMatrix: TypeAlias = sp.csr_matrix | Selected | Repeated
 
 
 def entries(A: OpenMatrix) -> sp.csr_matrix:
     """The matrix (n_open, n_open) with entries of its own, where it has none yet."""
     if isinstance(A, Selected):
-        return A.whole[A.chosen][:, A.chosen].tocsr()
+        return picked(A.whole, A.chosen, A.chosen)
     if isinstance(A, Repeated):
         return chosen_rows(A, np.arange(A.shape[0]))
     return A
@@ -69,13 +72,39 @@ def entries_of_sum(
 def chosen_rows(A: OpenMatrix, places: np.ndarray) -> sp.csr_matrix:
     """(k, n_open) some rows."""
     if isinstance(A, Selected):
-        return A.whole[A.chosen[places]][:, A.chosen].tocsr()
+        return picked(A.whole, A.chosen[places], A.chosen)
     if isinstance(A, Repeated):
         node, direction = np.divmod(places, A.dim)
         rows = A.nodal[node]
         columns = A.dim * rows.indices + np.repeat(direction, np.diff(rows.indptr))
         return sp.csr_matrix((rows.data, columns, rows.indptr), (len(places), A.shape[1]))
     return A[places].tocsr()
+
+
+def picked(A: sp.csr_matrix, rows: np.ndarray, columns: np.ndarray) -> sp.csr_matrix:
+    """(k, l) some rows and columns of A (m, n), no column twice.
+
+    The same as A[rows][:, columns] in a third of the time.
+    """
+    place = np.full(A.shape[1], -1, A.indices.dtype)
+    place[columns] = np.arange(len(columns))
+    dropped = np.setdiff1d(np.arange(A.shape[0]), rows)
+    ascending = bool((np.diff(rows) > 0).all())
+    if not ascending or len(dropped) > FEW_DROPPED_ROWS * A.shape[0]:
+        A = A[rows]
+        dropped = np.empty(0, int)
+        rows = np.arange(A.shape[0])
+    number = np.take(place, A.indices, mode="clip")
+    kept = number >= 0
+    for row in dropped:
+        kept[A.indptr[row] : A.indptr[row + 1]] = False
+    lengths = np.zeros(A.shape[0], A.indptr.dtype)
+    filled = np.flatnonzero(np.diff(A.indptr))
+    if len(filled):
+        lengths[filled] = np.add.reduceat(kept, A.indptr[filled], dtype=lengths.dtype)
+    starts = np.zeros(len(rows) + 1, A.indptr.dtype)
+    np.cumsum(lengths[rows], out=starts[1:])
+    return sp.csr_matrix((A.data[kept], number[kept], starts), (len(rows), len(columns)))
 
 
 def diagonal(A: OpenMatrix) -> np.ndarray:

@@ -108,26 +108,30 @@ def columns_of_part(opened: Opened, A: sp.csr_matrix) -> sp.csr_matrix:
     return A if opened.shared is None else A[:, opened.shared.columns].tocsr()
 
 
-def maps_of_part(opened: Opened, T: sp.csr_matrix) -> tuple[sp.csr_matrix, core.FaceMap]:
-    """Open unknowns from those of one nodal diameter: of all (n_open, n), and of the boundary.
+def boundary_map(opened: Opened, low: sp.csr_matrix, high: sp.csr_matrix) -> core.FaceMap:
+    """How open unknowns depend on those of nodal diameters, but for the phase, which is 1 here.
 
     Args:
-        T: (n_points*dim, n_free) of the nodal diameter.
+        low: (n_points*dim, n_free) the transformation T0 of nodal diameters.
+        high: the part T1 that the phase belongs to.
     """
     shared = opened.shared
-    C = columns_of_part(opened, T[opened.places])
+    pattern = abs(low) + abs(high)
     if shared is None:
-        return C, core.face_map(C)
+        places, rim = opened.places, opened.elimination.rim
+        inside = np.setdiff1d(np.arange(len(places)), rim)
+        faces = places[rim]
+        masters = np.unique(pattern[faces].indices)
+        known = pattern[places[inside]].indices, masters, np.empty(0, int)
+        return core.FaceMap(*known, low[faces][:, masters], high[faces][:, masters], 1.0)
     inner = len(shared.inside)
-    boundary = T[opened.boundary][:, shared.columns[inner:]].tocsr()
-    rim = boundary[~shared.cut.separator]
-    masters = np.unique(rim.indices)
-    return C, core.FaceMap(
-        np.arange(inner),
-        inner + masters,
-        inner + boundary[shared.cut.separator].indices,
-        rim[:, masters].tocsr(),
+    pattern, low, high = (
+        A[opened.boundary][:, shared.columns[inner:]].tocsr() for A in (pattern, low, high)
     )
+    between = shared.cut.separator
+    masters = np.unique(pattern[~between].indices)
+    known = np.arange(inner), inner + masters, inner + pattern[between].indices
+    return core.FaceMap(*known, low[~between][:, masters], high[~between][:, masters], 1.0)
 
 
 def _opened(

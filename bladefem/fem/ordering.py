@@ -24,7 +24,7 @@ from ctypes.util import find_library
 import numpy as np
 import scipy.sparse as sp
 
-from .open_matrix import OpenMatrix, chosen_rows
+from .open_matrix import OpenMatrix, chosen_rows, picked
 
 # unknowns from which METIS beats AMD
 MIN_METIS_UNKNOWNS = 20_000
@@ -57,7 +57,9 @@ def interior_first(
     _, first, node = np.unique(groups[inner], return_index=True, return_inverse=True)
     # unknowns of a node are coupled with the same nodes: one of them shows these
     heads = inner[first]
-    place = _nested_dissection(library, _without_diagonal(chosen_rows(A, heads)[:, heads]))
+    place = _nested_dissection(
+        library, _without_diagonal(picked(chosen_rows(A, heads), np.arange(len(heads)), heads))
+    )
     if place is None:
         return None
     out = np.empty(A.shape[0], np.int64)

@@ -53,3 +53,19 @@ def test_ranks_share_a_sector_that_is_large_enough():
     comm = MPI.COMM_WORLD
     several = {1: 1, 2: 2, 3: 3, 4: 4}[comm.size]
     assert group_size(comm, 200_000, free=1e12) == several
+    # where a pair would still leave each of them a large part
+    assert group_size(comm, 139_341, free=1e12) == several
+    # two whole sectors before two halves
+    assert group_size(comm, 78_000, free=1e12) == 1
+
+
+def test_results_of_groups_come_one_by_one_and_in_order():
+    ranks = MPI.COMM_WORLD.size
+    tasks = list(range(7))
+
+    def work(part, some):
+        return [np.full(3, 10.0 * n) for n in some]
+
+    for size in {1, ranks}:
+        found = shared_out(MPI.COMM_WORLD, tasks, size, work)
+        np.testing.assert_array_equal(found, [np.full(3, 10.0 * n) for n in tasks])

@@ -16,6 +16,7 @@ from bladefem.fem.open_matrix import (
     diagonal,
     entries,
     entries_of_sum,
+    picked,
     times,
 )
 from bladefem.scene.tables import Material
@@ -52,6 +53,29 @@ def test_every_kind_is_its_dense_matrix(kind, dtype):
     np.testing.assert_array_equal(diagonal(A), dense.diagonal())
     other, dense_other = KINDS["own"]
     np.testing.assert_allclose(entries_of_sum(A, -2.0, other).toarray(), dense - 2 * dense_other)
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        np.arange(40),
+        np.r_[0:7, 8:40],
+        np.array([3, 5, 30]),
+        np.array([9, 2, 2]),
+        np.arange(40)[::-1],
+    ],
+    ids=["all", "nearly all", "few", "in any order", "turned"],
+)
+@pytest.mark.parametrize(
+    "columns", [np.arange(40), np.r_[0:7, 8:40], np.array([4, 6]), np.array([8, 1])]
+)
+def test_rows_and_columns_are_picked_as_scipy_does(rows, columns):
+    A = sp.random(40, 40, 0.2, "csr", random_state=7)
+    A.data[A.indptr[11] : A.indptr[12]] = 0
+    A.eliminate_zeros()
+    found = picked(A, rows, columns)
+    assert found.nnz == A[rows][:, columns].nnz
+    np.testing.assert_array_equal(found.toarray(), A.toarray()[np.ix_(rows, columns)])
 
 
 def test_the_stiffness_of_an_open_sector_is_the_body_s_own_memory(body):

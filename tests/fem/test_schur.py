@@ -96,3 +96,20 @@ def test_factors_that_were_given_back_are_made_again():
     b = modes(con, 6, kept).frequencies
     assert t.opened.core is kept.factor.parts.core
     np.testing.assert_allclose(a, b, rtol=1e-11)
+
+
+def test_cut_faces_fold_as_the_triple_product_says():
+    """What the first nodal diameter leaves for the others is theirs, and a map from the bare matrix
+    of one nodal diameter says the same.
+    """
+    t = opened()
+    S = t.opened.core.S
+    for n in [1, 0, 3, 4]:
+        stiffness = at_diameter(t, n).K
+        C = stiffness.C[t.opened.core.rim][:, stiffness.faces.masters].toarray()
+        plain = C.conj().T @ S @ C
+        for faces in (stiffness.faces, core.face_map(stiffness.C)):
+            np.testing.assert_array_equal(faces.C.toarray(), C)
+            found = core._folded_complement(t.opened.core, faces)
+            assert found.dtype == plain.dtype
+            np.testing.assert_allclose(found, plain, atol=1e-14 * abs(plain).max())
