@@ -263,7 +263,7 @@ def _band_with(
     start = state_of_solution(model, point, DISTURBANCE_SHARE)
     march = march_ring(model, start, left + kept, instants, enough, counted)
     if march.operations > counted:
-        reason = f"a march takes {march.operations:.1g} operations, at most {counted:.2g}"
+        reason = f"a march takes {march.operations:.2g} operations, at most {counted:.2g}"
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
     motion = march.motion
     most = LONGER_WHILE_WIDENING * (left + kept)
