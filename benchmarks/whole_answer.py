@@ -240,15 +240,15 @@ def by_choice(known: Prepared, k: int) -> Answer:
 
 def by_settings(settings: Settings, known: Prepared, k: int) -> Answer:
     """A sweep with given settings, and its resonance judged as that of a run: where the highest
-    point is unstable, again with more harmonics, a march from there tells what the blade keeps to.
+    point is unstable, again with more harmonics, or others beside it are, marches from there tell
+    what the blade keeps to.
     """
     scene, family = known.scene, known.families[k]
     model = family_member(family, settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, scene.accuracy)
     found = judged_resonance(Marches(family), Checked(settings, points, {}), scene)
-    top, kept = found.point, found.kept
-    amplitude = kept.highest if found.contradicted and kept is not None else size(top)
-    return Answer(amplitude, top.frequency, asking(model, settings, top))
+    top = found.point
+    return Answer(found.amplitude, top.frequency, asking(model, settings, top))
 
 
 def by_loop(settings: Settings, known: Prepared, k: int) -> Answer:
