@@ -92,6 +92,8 @@ FINEST_OTHERS = (0.85, 7)
 # the plane blades with normal loads that do not follow the motion
 PAPER = "paper"
 SCENES = ["plane", PAPER, "wedge", "own_blade", "mistuned"]
+# relative width of the band of a marched resonance beyond which it is no periodic motion
+WIDE_BAND = 0.1
 # frequencies of the phasors, in half widths of the resonance; accuracy of their balance
 FREQUENCIES_IN_HALF_WIDTHS = (-3, -1.5, -0.7, -0.3, -0.1, 0, 0.1, 0.3, 0.7, 1.5, 3)
 ASKED_ACCURACY = 1e-3
@@ -285,11 +287,16 @@ def truth_of(known: Prepared, k: int, harmonics: int) -> Truth:
     vertex of a parabola through the highest points.
 
     Raises:
-        NotSolvedError: the peak was lost on the way.
+        NotSolvedError: the peak was lost on the way, or the blade keeps to no periodic motion.
     """
     family = known.families[k]
     case = known.cases[k]
     curve = curve_of(known.scene, case, lambda _: family, restarted_settings(known.settings))
+    if curve.marched_instead and curve.marched > WIDE_BAND:
+        raise NotSolvedError(
+            f"{case.load:g} N: the blade bounces between amplitudes {100 * curve.marched:.0f} % "
+            "apart, which no balance tells"
+        )
     harmonics = max(harmonics, curve.settings.harmonics)
     samples = max(512, 32 * (harmonics + 1))
     s = replace(known.richest, harmonics=harmonics, samples=samples)
