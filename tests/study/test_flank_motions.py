@@ -68,7 +68,7 @@ MARCHES = SimpleNamespace(models=None)
 def test_the_highest_the_fastest_and_both_ends_are_marched_from(curve, marks, kept):
     found = flank_motions(MARCHES, curve, marks, 1.0)
     assert kept[1] == [3.0, 2.0, 0.0, 5.0]
-    assert found.point is curve.points[3] and not found.too_long
+    assert found.point is curve.points[3] and not found.reason
 
 
 def test_neighbours_of_a_motion_beyond_the_resonance_are_marched_too(curve, marks, kept):
@@ -90,12 +90,16 @@ def test_only_motions_that_are_nearly_as_high_and_not_known_count(curve, marks, 
     assert flank_motions(MARCHES, curve, marks, 1.2) == FlankMotions()
 
 
-def test_marches_that_take_too_long_are_told(curve, marks, kept):
+def test_marches_that_are_not_known_are_told(curve, marks, kept):
     kept[0][2.0] = (np.nan, np.nan)
     found = flank_motions(MARCHES, curve, marks, 1.0)
-    assert found.too_long and found.point is None and kept[1] == [3.0, 2.0]
-    assert "under 4 N" in unmarched_sentence([SimpleNamespace(load=4.0, unmarched=True)])
-    assert unmarched_sentence([SimpleNamespace(load=4.0, unmarched=False)]) == ""
+    # the first one is known, after the one that takes too long there is none
+    assert found.point is curve.points[3] and kept[1] == [3.0, 2.0]
+    kept[0][3.0] = (np.nan, np.nan)
+    assert flank_motions(MARCHES, curve, marks, 1.0).point is None
+    told = unmarched_sentence([SimpleNamespace(load=4.0, unmarched=found.reason)])
+    assert "4 N (a march takes too many operations)" in told
+    assert unmarched_sentence([SimpleNamespace(load=4.0, unmarched="")]) == ""
 
 
 @pytest.mark.parametrize(
@@ -131,19 +135,25 @@ def test_a_higher_march_beside_a_marched_resonance_is_given(curve, marks, monkey
     assert found.contradicted and found.amplitude == 0.94
 
 
-def test_the_report_says_where_the_amplitude_was_marched_from():
+@pytest.mark.parametrize(("verdict", "said"), [(STABLE, "lasts"), ("unknown", "was not judged")])
+def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
     curve = SimpleNamespace(
         load=4.0,
         unstable_peak=None,
         marched_instead=True,
-        amplitude=np.array([2.05e-6, 2.149e-6]),
-        frequency=np.array([1014.2, 1077.3]),
+        # what was not solved is no motion
+        amplitude=np.array([2.05e-6, 2.149e-6, 9e-6]),
+        frequency=np.array([1014.2, 1077.3, 1090.0]),
+        converged=np.array([True, True, False]),
+        stability=np.array([UNSTABLE, verdict, ""]),
         balance_amplitude=2.05e-6,
         peak_frequency=1014.2,
         kept=KeptBand(1014.2, 1.15e-6, 3.6e-6, 350),
     )
     text = unstable_sentence(curve, 0.02)
-    assert "2.149 um, lasts" in text and "march from 2.05 um at 1014.2 Hz" in text
+    assert (
+        f"2.149 um at 1077.3 Hz, {said}, and" in text and "march from 2.05 um at 1014.2 Hz" in text
+    )
     assert "between 1.15 and 3.6 um" in text
     assert "first point of the band" in text
     assert Curve.marched.fget(curve) == pytest.approx(1 - 1.15 / 3.6)

@@ -233,6 +233,7 @@ def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, fewest, m
     monkeypatch.setattr(module, "march_ring", march)
     found = module.band_by_steps(model, point)
     assert fewest <= found.periods <= most
+    assert found.widens == (fewest == 800) == ("still widens" in found.sentence)
     kept = size(point) * heights[: found.periods][-module.KEPT_BY_STEPS :]
     assert found.highest == pytest.approx(kept.max(), rel=2e-3)
     assert found.lowest == pytest.approx(kept.min(), rel=2e-3)

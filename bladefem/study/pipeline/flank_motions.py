@@ -30,16 +30,16 @@ MAX_COUNTED = 1.5e10
 class FlankMotions:
     """The highest band of amplitudes beside a resonance."""
 
-    # an unstable motion of the curve, and what the blade keeps to after it; None where nothing was
-    # marched
+    # an unstable motion of the curve, and what the blade keeps to after it; None where no march is
+    # known
     point: Solution | None = None
     kept: KeptBand | None = None
-    # there are such motions, and marches from them take too long
-    too_long: bool = False
+    # why marches from such motions are not known; "" where they are, or there are none
+    reason: str = ""
 
     @property
     def highest(self) -> float:
-        """Highest amplitude of a period [m]; 0 where nothing was marched."""
+        """Highest amplitude of a period [m]; 0 where none is known."""
         return 0.0 if self.kept is None else self.kept.highest
 
 
@@ -79,22 +79,22 @@ def flank_motions(
         first += places[max(0, at - 1) : at + 1]
     bands: dict[int, KeptBand] = {}
 
-    def march(numbers: list[int]) -> bool:
+    def march(numbers: list[int]) -> None:
         for i in dict.fromkeys(numbers):
             bands[i] = band_by_steps(model, curve.points[i], MAX_COUNTED)
             if bands[i].too_long:
-                return False
-        return True
+                return
 
-    if not march(first):
-        return FlankMotions(too_long=True)
+    march(first)
     best = _highest(bands)
     if best is not None and bands[best].highest > given:
         at = places.index(best)
-        beside = [i for i in places[max(0, at - 1) : at + 2] if i not in bands]
-        march(beside)
+        march([i for i in places[max(0, at - 1) : at + 2] if i not in bands])
         best = _highest(bands)
-    return FlankMotions() if best is None else FlankMotions(curve.points[best], bands[best])
+    reason = next((band.reason for band in bands.values() if band.reason), "")
+    if best is None:
+        return FlankMotions(reason=reason)
+    return FlankMotions(curve.points[best], bands[best], reason)
 
 
 def _highest(bands: dict[int, KeptBand]) -> int | None:

@@ -36,8 +36,8 @@ class JudgedResonance:
     contradicted: bool = False
     # relative rise above it by marches from unstable motions beside it
     beside: float = 0.0
-    # unstable motions beside it were not marched from, since that takes too long
-    unmarched: bool = False
+    # why not all marches from unstable motions beside it are known; else ""
+    unmarched: str = ""
 
     @property
     def amplitude(self) -> float:
@@ -96,11 +96,13 @@ def _with_flanks(
     known = None if judged.kept is None else highest
     found = flank_motions(marches, curve, judged.marks, given, known)
     if found.point is None or found.highest <= given:
-        return replace(judged, unmarched=found.too_long)
+        return replace(judged, unmarched=found.reason)
     rise = found.highest / given - 1
     if judged.contradicted or rise > accuracy:
-        return JudgedResonance(found.point, judged.marks, found.kept, contradicted=True)
-    return replace(judged, beside=rise)
+        return JudgedResonance(
+            found.point, judged.marks, found.kept, contradicted=True, unmarched=found.reason
+        )
+    return replace(judged, beside=rise, unmarched=found.reason)
 
 
 def _at_the_highest(

@@ -75,9 +75,9 @@ SETTLED_BAND = 2e-3
 GROWING_RATIO = 1.1
 # of the amplitude: a width that is none, whatever it was before
 NO_WIDTH = 1e-6
-# periods at most that a march by steps goes on for while its band widens, over those that it has
-# otherwise: plane blades under 4 N, 2.1 um at 1016 Hz, keep between 1.87 and 2.28 um after 200
-# periods, between 1.15 and 3.6 um after 300 and 600
+# periods at most that a march goes on for while its band widens and its operations are not used up,
+# over those that it has otherwise: plane blades under 4 N, 2.1 um at 1016 Hz, keep between 1.87 and
+# 2.28 um after 200 periods, between 1.15 and 3.6 um after 300 and 600
 LONGER_WHILE_WIDENING = 4
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
@@ -102,6 +102,8 @@ class KeptBand:
     points: int | None = None
     # nothing was marched because it takes too long
     too_long: bool = False
+    # it went on widening to the end of the march
+    widens: bool = False
 
     def holds(self, amplitude: float, accuracy: float) -> bool:
         """It is known, and within a relative accuracy of an amplitude."""
@@ -118,9 +120,10 @@ class KeptBand:
             return (
                 f"marched in time{coarse}, it ends on a motion of {1e6 * self.highest:.4g} um there"
             )
+        more = ", and the band still widens" if self.widens else ""
         return (
             f"marched in time{coarse} over {self.periods} periods, it keeps between "
-            f"{1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um there"
+            f"{1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um there{more}"
         )
 
 
@@ -200,8 +203,9 @@ def kept_band(model: ReducedModel, point: Solution, counted: float = MAX_COUNTED
         state, marched = kept.state, marched + KEPT_PERIODS
         motion = (kept.q @ system.probe[0]).reshape(KEPT_PERIODS, SAMPLES_PER_PERIOD)
         most = min(LONGER_WHILE_WIDENING * periods, MAX_STEPS / per_period)
-        if not _widens(motion[:, None], point) or marched + KEPT_PERIODS > most:
-            return _band_of(point, motion, marched)
+        widens = _widens(motion[:, None], point)
+        if not widens or marched + KEPT_PERIODS > most:
+            return replace(_band_of(point, motion, marched), widens=widens)
 
 
 def band_by_steps(
@@ -266,18 +270,22 @@ def _band_with(
         reason = f"a march takes {march.operations:.2g} operations, at most {counted:.2g}"
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
     motion = march.motion
-    most = LONGER_WHILE_WIDENING * (left + kept)
+    usual = LEFT_BY_STEPS + KEPT_BY_STEPS
+    most = min(LONGER_WHILE_WIDENING * usual, (left + kept) * counted / march.operations)
     ended = len(motion) < left + kept
-    while not ended and march.settled and _widens(motion, point) and len(motion) < most:
+    widens = not ended and _widens(motion, point)
+    while widens and march.settled and len(motion) + kept <= most:
         if _grown_too_far(motion, point, instants):
             break
         march = march_ring(model, march.end, kept, instants)
         motion = np.concatenate([motion, march.motion])
+        widens = _widens(motion, point)
     if not (march.settled and np.isfinite(motion).all()):
         reason = "the contact forces of a step of the march were not found"
         return _unknown_band(point, reason), march.resolved
     known = len(motion) - (PERIODS_AT_ONCE if ended else kept)
-    return _band_of(point, motion[known:], len(motion)), march.resolved
+    band = _band_of(point, motion[known:], len(motion))
+    return replace(band, widens=widens), march.resolved
 
 
 def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
@@ -313,8 +321,8 @@ def _widens(motion: np.ndarray, point: Solution) -> bool:
 
 def _ends_of_parts(motion: np.ndarray, point: Solution) -> np.ndarray:
     """Lowest and highest amplitude [m] in each of the last parts of a march, three at most."""
-    amplitudes = amplitudes_of_periods(motion, point.harmonics)
-    parts = amplitudes.reshape(-1, PERIODS_AT_ONCE * amplitudes.shape[-1])[-3:]
+    amplitudes = amplitudes_of_periods(motion[-3 * PERIODS_AT_ONCE :], point.harmonics)
+    parts = amplitudes.reshape(-1, PERIODS_AT_ONCE * amplitudes.shape[-1])
     return np.column_stack([parts.min(axis=1), parts.max(axis=1)])
 
 

@@ -110,8 +110,8 @@ class Curve:
     marched_instead: bool = False
     # relative rise above the resonance by marches from unstable motions beside it
     beside: float = 0.0
-    # such motions were not marched from, since that takes too long
-    unmarched: bool = False
+    # why not all of these marches are known; else ""
+    unmarched: str = ""
     # a march from the resonance that its estimated error was taken from; None where richer balances
     # tell it
     in_time: KeptBand | None = None

@@ -179,12 +179,17 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
 
 
 def _from_a_flank(curve: Curve) -> str:
-    """That a march beside the highest motion, which lasts, gives the resonance, or ""."""
+    """That a march beside the highest motion, which is not known to be unstable, gives the
+    resonance, or "".
+    """
     if not curve.marched_instead:
         return ""
+    top = int(np.where(curve.converged, curve.amplitude, 0.0).argmax())
+    judged = "was not judged" if curve.stability[top] == UNKNOWN else "lasts"
     return (
-        f"load {curve.load:g} N: the highest motion, {1e6 * curve.amplitude.max():.4g} um, lasts, "
-        f"and motions beside it do not; {_marched_from_flank(curve)}"
+        f"load {curve.load:g} N: the highest motion, {1e6 * curve.amplitude[top]:.4g} um at "
+        f"{curve.frequency[top]:.5g} Hz, {judged}, and motions beside it do not last; "
+        f"{_marched_from_flank(curve)}"
     )
 
 
@@ -201,13 +206,13 @@ def _marched_from_flank(curve: Curve) -> str:
 
 
 def unmarched_sentence(curves: Sequence[Curve]) -> str:
-    """The resonances beside which unstable motions were not marched from, or ""."""
-    loads = ", ".join(f"{c.load:g} N" for c in curves if c.unmarched)
-    if not loads:
+    """The resonances beside which marches from unstable motions are not known, or ""."""
+    each = ", ".join(f"{c.load:g} N ({c.unmarched})" for c in curves if c.unmarched)
+    if not each:
         return ""
     return (
-        f"under {loads} motions nearly as high as the resonance are unstable, and what the blade "
-        "keeps to there was not marched, since that takes too long: it may be higher"
+        "motions nearly as high as the resonance are unstable, and what the blade keeps to after "
+        f"some of them is not known, it may be higher: {each}"
     )
 
 
