@@ -27,5 +27,10 @@ def suggestion(word: str, known: Iterable[str]) -> str:
     close.
     """
     known = sorted(known)
-    close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
-    return f"; did you mean '{close[0]}'?" if close else f"; known are {', '.join(known)}"
+    close = close_word(word, known)
+    return f"; did you mean '{close}'?" if close else f"; known are {', '.join(known)}"
+
+
+def close_word(word: str, known: Iterable[str]) -> str:
+    """The known word that is nearest to one, "" when none is close."""
+    return next(iter(difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)), "")

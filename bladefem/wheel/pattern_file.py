@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, close_word
 from ..util.arrays import RealArray
 
-# what a column deviates in, by the last word of its name; the first where none is said
+# what a column deviates in, by a word of its name; the first where none is said
 FREQUENCY = "frequency"
 STIFFNESS = "stiffness"
 MASS = "mass"
@@ -54,7 +55,7 @@ def frequency_deviations(values: np.ndarray) -> BladeDeviations:
 def read_deviations(path: str | Path, count: int, families: int) -> BladeDeviations:
     """The deviations in a CSV file; see `read_pattern` for its rows.
 
-    A column is a family's frequency, or its stiffness or its mass where its name ends in that word:
+    A column is a family's frequency, or its stiffness or its mass where its name has that word:
     "1F", "1F stiffness", "mass". Each quantity has one column for all families, or one a family.
 
     Raises:
@@ -120,9 +121,23 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
 
 
 def _quantity(name: str) -> str:
-    """What a column deviates in."""
-    words = name.lower().split()
-    return words[-1] if words and words[-1] in QUANTITIES else FREQUENCY
+    """What a column deviates in: a word of its name, be it followed by a unit.
+
+    Raises:
+        InputError: a word is nearly stiffness or mass; as a frequency it would be another wheel.
+    """
+    words = re.findall("[a-z]+", name.lower())
+    for word in words:
+        if word in QUANTITIES:
+            return word
+    for word in words:
+        close = close_word(word, QUANTITIES)
+        if close and close != FREQUENCY:
+            raise InputError(
+                f"mistuning.pattern: column '{name}': expected the name of a family, alone or with "
+                f"one of {', '.join(QUANTITIES)}; did you mean '{close}'?"
+            )
+    return FREQUENCY
 
 
 def _refuse_nothing_left(columns: np.ndarray, quantity: str) -> None:

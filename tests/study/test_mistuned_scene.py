@@ -401,6 +401,9 @@ def test_bad_pattern_file_is_refused_before_long_work(rows, message, tmp_path):
         ("1F stiffness, 2F stiffness", "0.01, 0.02", "2 families with a stiffness, expected 1"),
         ("mass", "-1.5", "-1.5 of blade 1 leaves it no mass"),
         ("1F, mass", "0.01, 0.02", "expected frequencies alone, or stiffnesses and masses"),
+        # a frequency would be another wheel
+        ("1F stifness", "0.01", "column '1F stifness'.*did you mean 'stiffness'"),
+        ("mass [1], freq", "0.01, 0.02", "expected frequencies alone, or stiffnesses and masses"),
     ],
 )
 def test_bad_columns_are_refused_before_long_work(names, row, message, tmp_path):
