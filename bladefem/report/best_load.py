@@ -8,40 +8,72 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
-from ..study.pipeline.best_load import BestLoad
+from ..study.pipeline.best_load import BestLoad, studied_load
+from ..study.pipeline.loads import Curve
 
 # share of the excitation's work that friction takes at an optimum that is one of damping; below it
 # the amplitude is low for another reason, such as a stiffer blade
 MIN_FRICTION_REDUCTION = 0.05
 # of the ends of the range of a search: a load nearer to one lies at it
 AT_END = 0.01
+# relative difference below which a best load was studied: tables have nine digits
+STUDIED_LOAD = 1e-6
 # parts of the error of a load that the balances of the search do not show: they are those of the
 # nearest load that was studied
 UNSEEN_PARTS = ("halved", "body_mesh", "layer_law")
 
 
-def best_load_table(found: Sequence[BestLoad]) -> pd.DataFrame:
-    """One row a mass of the damper, SI units; no rows where nothing was searched."""
+def best_load_table(found: Sequence[BestLoad], curves: Sequence[Curve] = ()) -> pd.DataFrame:
+    """One row a mass of the damper, SI units; no rows where nothing was searched.
+
+    The search compares balances. What the blade does under the load that it found is told by the
+    response there, as under every other load.
+
+    Args:
+        curves: responses; those under the best loads among them.
+    """
     rows = []
     for best in found:
         row = asdict(best)
+        row["searched_amplitude"] = best.amplitude
         row["lowest_searched"], row["highest_searched"] = row.pop("searched")
         row["tolerated_from"], row["tolerated_to"] = row.pop("between")
         settings = row.pop("settings")
         error = settings["error"]
         row["error"] = np.nan if error is None else error
         row["harmonics"] = settings["harmonics"]
+        studied = (c for c in curves if (c.load, c.mass) == (studied_load(best), best.mass))
+        for curve in studied:
+            row |= _judged(curve, row["error"])
         del row["tried"], row["heights"]
         rows.append(row)
     table = pd.DataFrame(rows)
     return table.drop(columns="mass") if len(table) and table["mass"].isna().all() else table
 
 
+def _judged(curve: Curve, searched: float) -> dict[str, float]:
+    """Columns of a best load by the response there.
+
+    Args:
+        searched: the estimated error of the search; where that is infinite another load may be
+            better, whatever is known of this one.
+    """
+    error = np.nan if curve.error is None else curve.error
+    return {
+        "load": curve.load,
+        "frequency": curve.peak_frequency,
+        "amplitude": curve.peak_amplitude,
+        "dissipated": curve.peak.work.dissipated,
+        "input_work": curve.peak.work.input,
+        "error": np.inf if np.isinf(searched) else error,
+    }
+
+
 def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | None:
     """The best of all masses as a row of the design table; None where no search succeeded.
 
-    Its stress is in proportion to the amplitude as under the nearest load that was studied, and
-    its error has what meshes and the layer's law change there.
+    Where its response was not studied, its stress is in proportion to the amplitude as under the
+    nearest load that was, and its error has what meshes and the layer's law change there.
     """
     good = searched[searched["amplitude"].notna()]
     if good.empty:
@@ -52,7 +84,8 @@ def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | Non
     if near is None:
         return best
     added = {name: near[name] for name in UNSEEN_PARTS if name in near}
-    if "error" in best:
+    studied = np.isclose(near["load"], best["load"], rtol=STUDIED_LOAD)
+    if "error" in best and not studied:
         unseen = sum(part for part in added.values() if np.isfinite(part))
         best["error"] = best["error"] + unseen
     if "alternating_stress" in near:

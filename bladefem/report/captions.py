@@ -33,12 +33,13 @@ CAPTIONS = {
     "modes/mac": "Modal assurance criterion against the modes of the other run.",
     "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
     "response/best_load": "The load that makes the resonance smallest, by exact search; every load "
-    "of the range in the last columns was open to it.",
+    "of the range in the last columns was open to it. The search compares balances; amplitude, "
+    "frequency and error are those of the response under this load.",
     "response/influences": "What the best load depends on: each parameter over its range, by exact "
     "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
     "response/influences_at_ends": "Best load and its resonance amplitude at both ends of each "
     "parameter's range: by the exact derivatives, and solved again for the two with the largest "
-    "effect.",
+    "effect; the amplitudes are those of balances, as the search compares them.",
     "response/influence_table": "What the best load depends on: each parameter, its range in "
     "multiples of its value, and the exact logarithmic derivatives: 0.5 means that 2 % more of the "
     "parameter give 1 % more.",

@@ -15,7 +15,6 @@ from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
     blade_nodes,
     highest_use,
-    lowest_curve,
     run_utilisation,
     wheel_utilisation,
 )
@@ -43,7 +42,7 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
         load = run.response.curves[number].load
         rows += _worst_rows(run, {"load": load}, used, highest_use(run, number, used))
     tables = {"modes/fatigue": pd.DataFrame(rows)}
-    number = lowest_curve(run)
+    number = run.response.best_curve
     rows = []
     for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
         first = {"load": response.load, "blade": response.peak.blade + 1}
@@ -90,7 +89,7 @@ def worst_utilisation(run: SolvedRun) -> list[tuple[float, float, float]]:
     tuned = known_utilisation(run)
     if not tuned:
         return []
-    number = lowest_curve(run)
+    number = run.response.best_curve
     return [
         (
             float(used.used[used.worst]),
@@ -106,7 +105,7 @@ def utilisation_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
     found = known_utilisation(run)
     if not found:
         return {}
-    number = lowest_curve(run)
+    number = run.response.best_curve
     load = run.response.curves[number].load
     field = _on_mesh(run, found[number].used)
     title = f"utilisation at the resonance under {load:.4g} N"

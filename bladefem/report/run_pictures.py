@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from ..scene.tables import Scene
@@ -42,7 +41,9 @@ def run_drawings(
     return {
         **_drawings(result, tables),
         "response/hysteresis": lambda file: draw_hysteresis(cycles, file),
-        "contact/friction_work": lambda file: draw_wear(patches, cycles[_best(result)], file),
+        "contact/friction_work": lambda file: draw_wear(
+            patches, cycles[result.response.best_curve], file
+        ),
         **utilisation_drawing(result),
         **flow_drawing(result),
         **({} if result.wheel is None else pattern_drawings(result.wheel)),
@@ -122,11 +123,6 @@ def _by_mass(points: pd.DataFrame) -> list[tuple[str, pd.DataFrame]]:
     ]
 
 
-def _best(result: SolvedRun) -> int:
-    """Number of the curve with the lowest resonance: pictures of one load show that one."""
-    return int(np.argmin([curve.peak_amplitude for curve in result.response.curves]))
-
-
 def _title(scene: Scene) -> str:
     """What shakes the blade, and where it is seen."""
     excitation = scene.excitation
@@ -143,7 +139,7 @@ def _drawings(
     """What to draw: "section/name" to a function of the file."""
     geometry = result.mesh
     excited = excited_set(result)
-    best = result.response.curves[_best(result)].load
+    best = result.response.curves[result.response.best_curve].load
     drawings: dict[str, Callable[[Path], object]] = {
         "mesh/mesh": lambda file: mesh.draw_mesh(geometry, file, title=result.scene.title),
         "modes/first_modes": lambda file: modes.draw_mode_sheet(

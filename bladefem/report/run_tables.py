@@ -151,9 +151,10 @@ def _best_load(result: SolvedRun) -> dict[str, pd.DataFrame]:
     best = result.response.best
     if not best:
         return {}
-    found = {"response/best_load": best_load_table(best)}
+    found = {"response/best_load": best_load_table(best, result.response.curves)}
     if result.response.influences:
-        lowest = min((b for b in best if not b.reason), key=lambda b: b.amplitude)
+        lowest = result.response.best_found
+        assert lowest is not None
         found["response/influences"] = influence_table(result.response.influences, lowest)
     return found
 

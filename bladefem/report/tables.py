@@ -38,6 +38,7 @@ COLUMNS = {
     "frequency": Column("frequency", "Hz"),
     "engine_order": Column("engine order"),
     "amplitude": Column("amplitude", "m", "µm", 1e6),
+    "searched_amplitude": Column("highest balance by the search", "m", "µm", 1e6),
     "tuned_amplitude": Column("tuned wheel", "m", "µm", 1e6),
     "highest_amplitude": Column("highest blade", "m", "µm", 1e6),
     "highest_amplitude_low": Column("from", "m", "µm", 1e6),

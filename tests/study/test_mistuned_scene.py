@@ -36,7 +36,6 @@ from bladefem.study.pipeline.damped_motion import damped_stress, stress_of_motio
 from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.utilisation import (
     blade_nodes,
-    lowest_curve,
     run_utilisation,
     wheel_utilisation,
 )
@@ -205,7 +204,7 @@ def test_a_second_run_finds_the_wheel(folder):
         assert any(text.startswith(f"{name}: found") for text in again.messages)
     np.testing.assert_array_equal(first.wheel[0].peak.by_blade, again.wheel[0].peak.by_blade)
     (used,) = wheel_utilisation(again)
-    number = lowest_curve(again)
+    number = again.response.best_curve
     tuned = run_utilisation(again)[number]
     assert used.used.max() > tuned.used.max()
     assert used.used.max() / tuned.used.max() == pytest.approx(again.wheel[0].factor, rel=0.1)

@@ -381,4 +381,9 @@ def chart_loads(bests: Sequence[BestLoad]) -> tuple[float, ...]:
         for factor in CHART_LOAD_FACTORS
         if factor != 1.0
     }
-    return tuple(sorted(loads | {float(f"{best.load:.4g}") for best in bests}))
+    return tuple(sorted(loads | {studied_load(best) for best in bests}))
+
+
+def studied_load(best: BestLoad) -> float:
+    """The best load [N] with the digits with which its response is studied and shown."""
+    return float(f"{best.load:.4g}")

@@ -7,7 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -28,7 +28,7 @@ from ..adaptive.resonance_curve import resonance_curve, too_large_to_follow
 from ..adaptive.settings import Settings, restarted_settings
 from ..adaptive.stiff_layer import stiff_layer_change
 from .assemble_model import LoadCase
-from .best_load import BestLoad
+from .best_load import BestLoad, studied_load
 from .body_mesh import SofterBody, softened_change
 from .error_in_time import Marches
 from .judged_resonance import judged_in_time, judged_resonance
@@ -39,6 +39,8 @@ from .load_interval import LoadInterval, load_interval
 from .resonance_in_time import ResonanceInTime, resonance_in_time
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
+# a best load, and the case of any load [N] of that damper
+Search: TypeAlias = "Callable[[], tuple[BestLoad, Callable[[float], LoadCase]]]"
 
 
 def compute_without_keeping(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
@@ -204,6 +206,14 @@ class Curve:
         return size(self.peak)
 
 
+class StudiedLoads(NamedTuple):
+    """Load cases of each mass by ascending load, the curve of each, and the best loads searched."""
+
+    cases: list[LoadCase]
+    curves: list[Curve]
+    best: list[BestLoad]
+
+
 @dataclass(frozen=True)
 class UnseenErrors:
     """Relative changes of a resonance amplitude that richer balances do not show; NaN: not
@@ -230,12 +240,14 @@ def study_loads(
     keep: Keep = compute_without_keeping,
     softer: SofterBody | None = None,
     best: float = 0.0,
-    searches: Sequence[Callable[[], BestLoad]] = (),
-) -> tuple[list[Curve], list[BestLoad]]:
+    searches: Sequence[Search] = (),
+) -> StudiedLoads:
     """One response curve a load case, and the results of searches for the best load, shared over
     the ranks; every rank returns all of them.
 
-    What takes longest comes first, and the next one goes to the rank that is free.
+    What takes longest comes first, and the next one goes to the rank that is free. A best load that
+    is not among the cases is studied like them: a search compares balances, and whether the blade
+    keeps to one of them is not known before it is judged.
 
     Args:
         family: of a load case, its models.
@@ -247,8 +259,10 @@ def study_loads(
             and kept.
         softer: the body less the error of its stiffness, for the error by its mesh.
         best: load with the smallest resonance [N]; 0 where it is not known.
-        searches: take as long as the response of a load below the best one.
+        searches: each gives a best load and the case of any load; they take as long as the response
+            of a load below the best one.
     """
+    given = {(case.load, case.mass) for case in cases}
     order = longest_first([case.load for case in cases], best)
 
     def curve_at(case: LoadCase) -> Curve:
@@ -257,10 +271,35 @@ def study_loads(
     def shown(numbers: Iterable[int]) -> Iterable[int]:
         return progress(numbers, "forced responses", total=len(tasks), delay=0.0)
 
-    tasks: list[Callable[[], Any]] = [*searches, *(partial(curve_at, cases[i]) for i in order)]
+    def searched(search: Search) -> tuple[BestLoad, tuple[LoadCase, Curve] | None]:
+        found, case_at = search()
+        if found.reason or (studied_load(found), found.mass) in given:
+            return found, None
+        case = case_at(studied_load(found))
+        return found, (case, curve_at(case))
+
+    tasks: list[Callable[[], Any]] = [
+        *(partial(searched, search) for search in searches),
+        *(partial(curve_at, cases[i]) for i in order),
+    ]
     done: list[Any] = share_work(lambda task: task(), tasks, comm, shown, on_demand=True)
     found, curves = done[: len(searches)], done[len(searches) :]
-    return [curves[order.index(i)] for i in range(len(cases))], found
+    studied = [(cases[i], curve) for i, curve in zip(order, curves, strict=True)]
+    studied += [added for _, added in found if added is not None]
+    masses = list(dict.fromkeys(case.mass for case in cases))
+    studied.sort(key=lambda pair: (masses.index(pair[0].mass), pair[0].load))
+    return StudiedLoads(
+        [case for case, _ in studied], [curve for _, curve in studied], [one for one, _ in found]
+    )
+
+
+def best_curve(curves: Sequence[Curve], best: Sequence[BestLoad]) -> int:
+    """Number of the curve that the report begins with: at the best load found, of the damper with
+    the lowest resonance there; the one with the lowest resonance where none was found.
+    """
+    found = {(studied_load(b), b.mass) for b in best if not b.reason}
+    there = [k for k, c in enumerate(curves) if (c.load, c.mass) in found]
+    return min(there or range(len(curves)), key=lambda k: curves[k].peak_amplitude)
 
 
 def longest_first(loads: Sequence[float], best: float = 0.0) -> list[int]:

@@ -10,7 +10,7 @@ from ...scene.tables import Scene
 from ...scene.units import show
 from ...util.message import method, warning
 from ..adaptive.settings import Settings
-from .best_load import BestLoad
+from .best_load import BestLoad, studied_load
 from .damped_motion import DampedStress
 from .load_interval import interval_sentence
 from .loads import Curve
@@ -235,21 +235,29 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
 def lower_studied_remarks(
     scene: Scene, best: Sequence[BestLoad], curves: Sequence[Curve]
 ) -> Iterator[str]:
-    """Loads studied whose highest motion, stable or not, is lower than under the best load."""
+    """Loads studied whose highest motion, stable or not, is lower than under the best load; or
+    under which the blade was marched to less.
+    """
     for b in (b for b in best if not b.reason):
-        tops = [(float(c.amplitude[c.converged].max()), c.load) for c in curves if c.mass == b.mass]
-        height, load = min(tops, default=(np.inf, 0.0))
-        if (1 + scene.accuracy) * height < b.amplitude:
-            yield warning(
-                f"best load: {1e6 * b.amplitude:.4g} um under {b.load:.4g} N is more than the "
-                f"{1e6 * height:.4g} um under {load:.4g} N studied: the search ended beside it"
-            )
+        own = [c for c in curves if c.mass == b.mass]
+        tops = [(float(c.amplitude[c.converged].max()), c.load) for c in own]
+        kept = [(c.peak_amplitude, c.load) for c in own]
+        there = next((c.peak_amplitude for c in own if c.load == studied_load(b)), 0.0)
+        for heights, found, why in (
+            (tops, b.amplitude, "the search ended beside it"),
+            (kept, there, "the search compares balances, to which the blade does not keep"),
+        ):
+            height, load = min(heights, default=(np.inf, 0.0))
+            if (1 + scene.accuracy) * height < found:
+                yield warning(
+                    f"best load: {1e6 * found:.4g} um under {b.load:.4g} N is more than the "
+                    f"{1e6 * height:.4g} um under {load:.4g} N studied: {why}"
+                )
+                break
 
 
-def stress_message(curves: list[Curve], stressed: dict[int, DampedStress]) -> str:
-    """The stress of the lowest resonance, and how far it can be trusted."""
-    best = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
-    found = stressed[best]
+def stress_message(found: DampedStress) -> str:
+    """The stress at the best load, and how far it can be trusted."""
     place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
     text = (
         f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "

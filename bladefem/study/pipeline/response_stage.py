@@ -28,7 +28,7 @@ from .changed_cases import cases_of, changed_cases
 from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
 from .linear_limits import linear_limits
-from .loads import Curve, study_loads
+from .loads import Curve, Search, best_curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
 from .response_remarks import (
@@ -39,7 +39,7 @@ from .response_remarks import (
     stress_message,
 )
 from .run_records import ReducedRun, Response, Seating, SolvedRun
-from .seated_loads import seat_at_loads, studied_loads
+from .seated_loads import seat_at_loads, studied_loads, with_more_loads
 from .stability_remarks import Disturbances, judged_disturbances
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
@@ -71,7 +71,7 @@ def run_response(
     best: list[BestLoad] = []
     if scene.study.loads is None:
         with clock("best load"):
-            best = share_work(_done, searches, keep.comm, on_demand=True)
+            best = share_work(_best_of, searches, keep.comm, on_demand=True)
         searches = []
     if best and not any(b.reason for b in best):
         loads = studied_loads(scene, before.contact.own, chart_loads(best))
@@ -84,20 +84,22 @@ def run_response(
             "those of the stage, or its elements are far too large"
         )
     sectors = sector_of(mesh).count if is_wheel(mesh) else 0
-    response = _load_responses(
+    response, cases = _load_responses(
         scene, cases, family, settings, keep, softer, sectors, best, searches
     )
+    loads = [case.load for case in cases]
+    before = replace(before, contact=with_more_loads(scene, before.contact, loads, clock.messages))
     clock.messages.extend(lower_studied_remarks(scene, response.best, response.curves))
     with clock("influences"):
-        found = _influences(scene, mesh, before.contact, family, response.best, keep)
+        found = _influences(scene, mesh, before.contact, family, response.best_found, keep)
     curves = response.curves
     with clock("stresses"):
         damped = keep(
             "damped_stress",
             stage_key("damped motion", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
-            lambda: _stresses(before, bodies, patches, curves, cases),
+            lambda: _stresses(before, bodies, patches, response, cases),
         )
-        clock.messages.append(stress_message(curves, damped))
+        clock.messages.append(stress_message(damped[response.best_curve]))
     response = replace(response, influences=found)
     result = SolvedRun(**vars(before), response=response, damped=damped)
     clock.messages.extend(filter(None, [utilisation_message(result)]))
@@ -108,15 +110,16 @@ def _stresses(
     before: ReducedRun,
     bodies: Bodies,
     patches: list[Patch],
-    curves: Sequence[Curve],
+    response: Response,
     cases: Sequence[LoadCase],
 ) -> dict[int, DampedStress]:
-    """The stress at the lowest resonance and at that of the damper's own load, by number of the
-    curve: one on each rank where a rank has the bodies for itself, which share one factorisation
-    over the nodal diameters; else both on rank 0.
+    """The stress under the best load and under the damper's own one, by number of the curve: one on
+    each rank where a rank has the bodies for itself, which share one factorisation over the nodal
+    diameters; else both on rank 0.
     """
     own = before.contact.own
-    wanted = {min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)}
+    curves = response.curves
+    wanted = {response.best_curve}
     if own is not None:
         wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
     factorised = lru_cache(maxsize=None)(lambda n: bodies.alone.factorised(n))
@@ -152,9 +155,10 @@ def _load_responses(
     softer: SofterBody | None,
     sectors: int,
     best: Sequence[BestLoad],
-    searches: Sequence[Callable[[], BestLoad]],
-) -> Response:
-    """Curves of all loads, the best loads, and what is left without friction.
+    searches: Sequence[Search],
+) -> tuple[Response, list[LoadCase]]:
+    """Curves of all loads, the best loads, and what is left without friction; and the load cases of
+    the curves, which are more where a best load was found that was not given.
 
     Args:
         sectors: of the wheel; 0 without one.
@@ -163,7 +167,7 @@ def _load_responses(
     """
     clock = keep.clock
     with clock("response"):
-        curves, found = study_loads(
+        cases, curves, found = study_loads(
             scene,
             cases,
             family,
@@ -192,12 +196,11 @@ def _load_responses(
         order = scene.excitation.engine_order
         judged = judged_disturbances(models, settings, order, sectors, has_flow(scene))
         with clock("response"):
-            # of the lowest resonance, which the report begins with
-            k = min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+            k = best_curve(curves, best)
             others[k] = _class_verdicts(scene, family(cases[k]), curves[k], sectors, keep)
     clock.messages.extend(response_remarks(scene, settings, curves, nodes, judged))
     clock.messages.extend(_class_remarks(curves, others, judged))
-    return Response(settings, curves, limits, best, others=others)
+    return Response(settings, curves, limits, best, others=others), cases
 
 
 def _class_verdicts(
@@ -246,26 +249,24 @@ def _best_load_searches(
     family: Callable[[LoadCase], Family],
     settings: Settings,
     keep: StageRunner,
-) -> list[Callable[[], BestLoad]]:
+) -> list[Search]:
     """The search for the best load of each mass of the damper, on one rank; none where a single
     load was asked for.
     """
     if scene.study.loads is not None and len(scene.study.loads) == 1:
         return []
 
-    def search(mass: float | None) -> BestLoad:
+    def search(mass: float | None) -> tuple[BestLoad, Callable[[float], LoadCase]]:
         case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass, contact.rough)
-        return find_best_load(scene, case_at, family, settings, mass)
-
-    def kept(mass: float | None) -> BestLoad:
         key = stage_key("response", scene, "best load", mass, replace(settings, error=None))
-        return keep.alone(f"best_load{_mass_label(mass)}", key, partial(search, mass))
+        find = partial(find_best_load, scene, case_at, family, settings, mass)
+        return keep.alone(f"best_load{_mass_label(mass)}", key, find), case_at
 
-    return [partial(kept, mass) for mass in scene.study.masses or (None,)]
+    return [partial(search, mass) for mass in scene.study.masses or (None,)]
 
 
-def _done(search: Callable[[], BestLoad]) -> BestLoad:
-    return search()
+def _best_of(search: Search) -> BestLoad:
+    return search()[0]
 
 
 def _influences(
@@ -273,15 +274,13 @@ def _influences(
     mesh: Mesh,
     contact: Seating,
     family: Callable[[LoadCase], Family],
-    best: Sequence[BestLoad],
+    best: BestLoad | None,
     keep: StageRunner,
 ) -> tuple[Influence, ...]:
-    """What the lowest of the best loads depends on; none where it was not found or not wanted."""
-    found = [b for b in best if not b.reason]
-    if not found or not scene.study.influences:
+    """What the best load depends on; none where it was not found or not wanted."""
+    if best is None or not scene.study.influences:
         return ()
-    lowest = min(found, key=lambda b: b.amplitude)
-    changed = changed_cases(scene, contact.problem, mesh.dimension - 1, lowest.mass, contact.rough)
+    changed = changed_cases(scene, contact.problem, mesh.dimension - 1, best.mass, contact.rough)
     # a history of the seating has its friction already
     frictionless = scene.contact.history == FRICTIONLESS
     flank_angles = kind_named(scene.kind).flank_angles
@@ -289,9 +288,9 @@ def _influences(
     parameters = parameters_of(scene, angles)
 
     def compute() -> list[Influence]:
-        return influences(scene, lowest, family, changed, parameters, keep.comm)
+        return influences(scene, best, family, changed, parameters, keep.comm)
 
-    key = stage_key("response", scene, "influences", lowest)
+    key = stage_key("response", scene, "influences", best)
     try:
         return tuple(keep("influences", key, compute))
     except NotSolvedError as error:

@@ -26,7 +26,7 @@ from .body_mesh import ModeErrors
 from .damped_motion import DampedStress
 from .history import DamperMass
 from .linear_limits import Limit
-from .loads import Curve
+from .loads import Curve, best_curve
 from .other_diameters import ClassVerdict
 from .reduced_sector import Reduced
 
@@ -87,6 +87,18 @@ class Response:
     def free_peak(self) -> tuple[float, float]:
         """Resonance without damper: [Hz], [m]."""
         return self.limits[0].peak_frequency, self.limits[0].peak_amplitude
+
+    @property
+    def best_curve(self) -> int:
+        """Number of the curve that the report begins with."""
+        return best_curve(self.curves, self.best)
+
+    @property
+    def best_found(self) -> BestLoad | None:
+        """The best load there, where it was searched and found."""
+        there = self.curves[self.best_curve]
+        found = (b for b in self.best if not b.reason and b.mass == there.mass)
+        return next(found, None)
 
     def __repr__(self) -> str:
         best = min(self.curves, key=lambda curve: curve.peak_amplitude)

@@ -68,6 +68,36 @@ def seat_at_loads(
     clock: StageClock,
 ) -> Seating:
     """The seats under some loads."""
+    found = _seated(scene, seating, loads, clock.messages)
+    if found.masses:
+        clock.messages.append(history_sentence(found.masses))
+    return found
+
+
+def with_more_loads(
+    scene: Scene,
+    seating: Seating,
+    loads: Iterable[float],
+    messages: list[str],
+) -> Seating:
+    """The same with the seats under more loads."""
+    new = sorted(set(loads) - set(seating.maps))
+    if not new:
+        return seating
+    added = _seated(scene, seating, new, messages)
+    return replace(
+        seating,
+        maps=dict(sorted({**seating.maps, **added.maps}.items())),
+        masses=tuple(sorted((*seating.masses, *added.masses), key=lambda made: made.load)),
+    )
+
+
+def _seated(
+    scene: Scene,
+    seating: Seating,
+    loads: Iterable[float],
+    messages: list[str],
+) -> Seating:
     rough = seating.rough
     if rough is None:
         speed = scene.operation.speed
@@ -75,11 +105,9 @@ def seat_at_loads(
         maps = {load: seat(seating.problem, speed, normal=load, bedded=bedded) for load in loads}
         return replace(seating, maps=maps)
     seated = {load: seat_by_history(scene, rough, load) for load in loads}
-    masses = damper_masses(scene, rough, seated)
-    clock.messages.append(history_sentence(masses))
-    clock.messages.extend(map(warning, coarse_history(seated)))
+    messages.extend(map(warning, coarse_history(seated)))
     maps = {load: found.maps for load, found in seated.items()}
-    return replace(seating, maps=maps, masses=tuple(masses))
+    return replace(seating, maps=maps, masses=tuple(damper_masses(scene, rough, seated)))
 
 
 def _own_load(

@@ -66,7 +66,7 @@ def utilisation_message(run: SolvedRun) -> str:
         return warning(f"the utilisation is not known: {error}")
     if not found:
         return ""
-    number = lowest_curve(run)
+    number = run.response.best_curve
     used = found[number]
     return (
         f"utilisation at the best load, {run.response.curves[number].load:.4g} N: "
@@ -96,7 +96,7 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
         return ""
     if not found or run.wheel is None:
         return ""
-    number = lowest_curve(run)
+    number = run.response.best_curve
     response, used = run.wheel[0], found[0]
     return (
         f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
@@ -105,12 +105,6 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
         f"{highest_use(run, number, used, response.stress):.3g} with the upper ends "
         "of the error of the mesh and of the loading history"
     )
-
-
-def lowest_curve(run: SolvedRun) -> int:
-    """Number of the curve with the lowest resonance."""
-    curves = run.response.curves
-    return min(range(len(curves)), key=lambda k: curves[k].peak_amplitude)
 
 
 def highest_use(
