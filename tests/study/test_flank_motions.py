@@ -71,6 +71,24 @@ def test_the_highest_the_fastest_and_both_ends_are_marched_from(curve, marks, ke
     assert found.point is curve.points[3] and not found.reason
 
 
+def test_each_hump_of_a_flat_top_is_marched_from(marks, kept):
+    heights = (0.95, 1.0, 0.97, 0.98, 0.96, 0.95, 0.6)
+    points = [point_at(float(k), height) for k, height in enumerate(heights)]
+    every = replace(marks, verdict=np.full(7, UNSTABLE), multiplier=np.linspace(1.2, 1.1, 7))
+    kept[0].update({3.0: (0.9, 1.2)})
+    found = flank_motions(
+        MARCHES, SimpleNamespace(points=points, settings=None), every, 0.9, points[1]
+    )
+    assert 3.0 in kept[1] and found.point is points[3]
+
+
+def test_neighbours_are_marched_from_as_long_as_one_is_better(curve, marks, kept):
+    kept[0].update({3.0: (0.5, 1.1), 2.0: (0.5, 1.2), 1.0: (0.5, 1.3), 0.0: (0.5, 1.0)})
+    found = flank_motions(MARCHES, curve, marks, 1.0)
+    assert kept[1] == [3.0, 2.0, 0.0, 5.0, 1.0]
+    assert found.point is curve.points[1]
+
+
 def test_neighbours_of_a_motion_beyond_the_resonance_are_marched_too(curve, marks, kept):
     kept[0].update({0.0: (0.5, 1.6), 1.0: (0.5, 1.7)})
     found = flank_motions(MARCHES, curve, marks, 1.0)

@@ -118,17 +118,25 @@ def test_a_best_load_above_a_load_studied_is_told():
     best = SimpleNamespace(reason="", mass=0.02, load=50.0, amplitude=198e-6)
     studied = [
         SimpleNamespace(
-            mass=mass, load=load, amplitude=1e-6 * np.array(sizes), converged=np.array([True, True])
+            mass=mass,
+            load=load,
+            amplitude=1e-6 * np.array(sizes),
+            converged=np.array([True, True]),
+            peak_amplitude=1e-6 * given,
         )
-        for mass, load, sizes in (
-            (0.02, 80.0, (150, 180)),
-            (0.02, 40.0, (570, 608)),
-            (0.01, 9.0, (1, 2)),
+        for mass, load, sizes, given in (
+            (0.02, 80.0, (150, 180), 175),
+            (0.02, 40.0, (570, 608), 608),
+            (0.02, 50.0, (190, 198), 198),
+            (0.01, 9.0, (1, 2), 2),
         )
     ]
     (said,) = lower_studied_remarks(scene, [best], studied)
     assert "198 um under 50 N is more than the 180 um under 80 N studied" in said
     assert said.level == "warning"
     assert not list(lower_studied_remarks(scene, [best], studied[1:]))
+    studied[1].peak_amplitude = 150e-6
+    (said,) = lower_studied_remarks(scene, [best], studied[1:])
+    assert "150 um under 40 N studied: the search compares balances" in said
     best = SimpleNamespace(reason="no peak", mass=0.02, load=np.nan, amplitude=np.nan)
     assert not list(lower_studied_remarks(scene, [best], studied))

@@ -1,0 +1,129 @@
+"""The best load is studied like those that were given, and the answer is what its response tells."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bladefem.report.best_load import best_load_table, found_best
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline import loads as module
+from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.best_load import BestLoad
+from bladefem.study.pipeline.loads import best_curve, study_loads
+
+
+def best(load: float, mass: float | None = None, reason: str = "") -> BestLoad:
+    """A search that ended at 150 um."""
+    return BestLoad(
+        mass, load, 382.6, 150e-6, 6e-4, 7e-4, 1e-3, (60.0, 87.0), Settings(10, 3, 64, "rigid", 4, error=0.027),
+        np.array([load]), np.array([150e-6]), (0.5, 5e4), 100, reason,
+    )  # fmt: skip
+
+
+def case(load: float, mass: float | None = None) -> LoadCase:
+    return LoadCase(load, None, None, mass)
+
+
+def curve(load: float, amplitude: float, mass: float | None = None) -> SimpleNamespace:
+    work = SimpleNamespace(dissipated=5e-4, input=6e-4)
+    return SimpleNamespace(
+        load=load,
+        mass=mass,
+        peak_amplitude=amplitude,
+        peak_frequency=386.9,
+        error=0.04,
+        peak=SimpleNamespace(work=work),
+    )
+
+
+@pytest.fixture
+def studied(monkeypatch):
+    """Curves of the given cases with searches that end at these best loads."""
+    monkeypatch.setattr(
+        module, "curve_of", lambda scene, case, *_: curve(case.load, 1e-6, case.mass)
+    )
+
+    def study(cases, found):
+        searches = [lambda b=b: (b, lambda load: case(load, b.mass)) for b in found]
+        return study_loads(None, cases, None, None, searches=searches)
+
+    return study
+
+
+def test_a_best_load_that_was_not_given_takes_its_place(studied):
+    found = studied([case(150.0), case(9.0)], [best(78.9107)])
+    assert [c.load for c in found.curves] == [9.0, 78.91, 150.0]
+    assert [c.load for c in found.cases] == [9.0, 78.91, 150.0]
+    assert [b.load for b in found.best] == [78.9107]
+
+
+def test_each_mass_has_its_own(studied):
+    cases = [case(load, mass) for mass in (0.02, 0.01) for load in (9.0, 150.0)]
+    found = studied(cases, [best(80.0, 0.02), best(60.0, 0.01)])
+    assert [(c.mass, c.load) for c in found.curves] == [
+        (0.02, 9.0), (0.02, 80.0), (0.02, 150.0), (0.01, 9.0), (0.01, 60.0), (0.01, 150.0),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("found", [best(78.9107), best(np.nan, reason="no peak")])
+def test_nothing_is_added_where_it_was_given_or_not_found(studied, found):
+    given = studied([case(9.0), case(78.91)], [found])
+    assert [c.load for c in given.curves] == [9.0, 78.91]
+
+
+def test_the_report_begins_with_the_curve_at_the_best_load():
+    """Not with one that happens to be lower: the best load may be off by the search's accuracy."""
+    curves = [curve(73.0, 145e-6), curve(78.91, 147e-6), curve(9.0, 2e-3)]
+    assert best_curve(curves, [best(78.9107)]) == 1
+    assert best_curve(curves, [best(np.nan, reason="no peak")]) == 0
+    assert best_curve(curves, []) == 0
+
+
+def test_its_row_is_that_of_its_response():
+    """The balance of the shipped wedge is 150 um high there; the blade keeps to 147.5."""
+    (row,) = best_load_table([best(78.9107)], [curve(78.91, 147.5e-6)]).to_dict("records")
+    assert (row["load"], row["amplitude"], row["frequency"]) == (78.91, 147.5e-6, 386.9)
+    assert row["searched_amplitude"] == 150e-6 and row["error"] == 0.04
+    (alone,) = best_load_table([best(78.9107)]).to_dict("records")
+    assert alone["amplitude"] == alone["searched_amplitude"]
+
+
+def test_meshes_are_not_counted_twice():
+    summary = pd.DataFrame(
+        {
+            "load": [0.0, 78.91, 150.0, np.inf],
+            "peak_amplitude": [1e-3, 147.5e-6, 2e-4, 1e-3],
+            "error": [0.0, 0.04, 0.05, 0.0],
+            "body_mesh": [0.0, 0.01, 0.02, 0.0],
+        }
+    )
+    table = best_load_table([best(78.9107)], [curve(78.91, 147.5e-6)])
+    assert found_best(table, summary)["error"] == 0.04
+    elsewhere = found_best(best_load_table([best(78.9107)]), summary.drop(index=1))
+    assert elsewhere["error"] == pytest.approx(0.027 + 0.02)
+
+
+def test_a_run_studies_it(tmp_path):
+    """A coarse wedge, not judged in time: the same in curves, pressure maps and stresses."""
+    coarse = ["mesh.size=14 mm", "mesh.seat_elements=2", "aerofoil.fillet=0 mm"]
+    study = ['loads=["50 N", "200 N"]', "own_load=false", "influences=false", "stability=false"]
+    scene = load_scene("scenes/wedge.toml", [*coarse, *(f"study.{one}" for one in study)])
+    run = pipeline.run(scene, tmp_path, until="response")
+    (found,) = run.response.best
+    curves = run.response.curves
+    there = curves[run.response.best_curve]
+    assert [c.load for c in curves] == sorted({50.0, 200.0, there.load})
+    assert there.load == pytest.approx(found.load, rel=1e-3)
+    assert list(run.contact.maps) == [c.load for c in curves]
+    assert run.damped[run.response.best_curve].load == there.load
+    assert there.peak_amplitude == pytest.approx(found.amplitude, rel=2 * scene.accuracy)
+    # nothing is computed again
+    again = pipeline.run(scene, tmp_path, until="response")
+    assert [c.load for c in again.response.curves] == [c.load for c in curves]
+    assert again.response.best_found.load == found.load
