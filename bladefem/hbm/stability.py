@@ -110,10 +110,10 @@ def has_one_motion(model: ReducedModel) -> bool:
 
 
 def verdict_operations(model: ReducedModel, solution: Solution) -> float:
-    """Operations of a verdict with the fewest instants, roughly; 0 where none are needed or it
-    cannot be made.
+    """Operations of a verdict with the fewest instants, roughly; 0 where none are needed, as in
+    full stick, or it cannot be made.
     """
-    if not solution.converged or has_one_motion(model):
+    if not solution.converged or has_one_motion(model) or _sticks(solution):
         return 0.0
     system = _system(model)
     if isinstance(system, InputError):
@@ -149,6 +149,9 @@ def _leading(
     most: float,
 ) -> complex | None:
     """The multiplier of largest modulus; None where it would take too many operations."""
+    if _sticks(solution):
+        rate = model.once("rate in full stick", lambda: _rate_in_full_stick(model, system))
+        return complex(np.exp(rate * 2 * np.pi / solution.omega))
     S = max(instants, 16 * (solution.harmonics + 1))
     S = system.blades * -(-S // system.blades)
     if _operations_from_states(model, solution, system, S) > most:
@@ -159,6 +162,22 @@ def _leading(
     part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // system.blades)
     values = linalg.eigvals(_handed_on(system, part), check_finite=False) ** system.blades
     return complex(values[np.argmax(abs(values))])
+
+
+def _sticks(solution: Solution) -> bool:
+    """No node ever slips or lifts off: disturbances are those of a linear system."""
+    return not any(solution.states[state] for state in ("slip", "lift", "open"))
+
+
+def _rate_in_full_stick(model: ReducedModel, system: SectorModes) -> complex:
+    """The rate [1/s] at which disturbances decay slowest, or grow, where all nodes stick."""
+    springs = np.tile(model.springs, (system.blades, 1))
+    every = np.ones(len(springs), dtype=bool)
+    stuck = open_contacts(system, every, every, springs)
+    M = len(stuck.stiffness)
+    zero, one = np.zeros((M, M)), np.eye(M)
+    rates = linalg.eigvals(np.block([[zero, one], [-stuck.stiffness, -stuck.damping]]))
+    return complex(rates[rates.real.argmax()])
 
 
 def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:

@@ -10,10 +10,19 @@ from models import bouncing, bouncing_wave, single_mass
 
 from bladefem.damper.branch import inclined_contact, state_of
 from bladefem.hbm.continuation import follow
+from bladefem.hbm.flow_map import flow_map
 from bladefem.hbm.model import Damping
 from bladefem.hbm.sector_modes import blades_of_wave, sector_modes
 from bladefem.hbm.solve import solve
-from bladefem.hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE, stability_verdict
+from bladefem.hbm.stability import (
+    STABLE,
+    UNIQUE,
+    UNKNOWN,
+    UNSTABLE,
+    linearised_contacts,
+    stability_verdict,
+    verdict_operations,
+)
 from bladefem.hbm.time_model import time_system
 from bladefem.time.shooting import floquet_multipliers, periodic_solution
 
@@ -101,6 +110,26 @@ def test_two_tangents_that_lift_off(omega):
     seen = marched(model, point, 40)
     change = abs(seen[-1] - seen[0]).max() / abs(seen[0]).max()
     assert found.verdict == (STABLE if change < 0.02 else UNSTABLE)
+
+
+@pytest.mark.parametrize("made", [bouncing, bouncing_wave])
+def test_in_full_stick_the_multiplier_is_that_of_the_linear_system(made):
+    """Against the map of disturbances over a period, which steps through the instants."""
+    model = made()
+    model = replace(model, excitation={h: 1e-3 * force for h, force in model.excitation.items()})
+    point = solve(model, 1.3, 3, 128)
+    assert point.converged and point.states["stick"] == len(point.w)
+    assert verdict_operations(model, point) == 0
+    found = stability_verdict(model, point)
+    system = sector_modes(model)
+    S = 2048
+    contacts, nodes = linearised_contacts(model, point, system, S)
+    part = flow_map(contacts, nodes, 2 * np.pi / point.omega / S, S // system.blades)
+    M = len(system.stiffness)
+    handed = np.concatenate([system.turn @ part[:M], system.turn @ part[M:]])
+    seen = abs(np.linalg.eigvals(handed if system.blades > 1 else part)).max() ** system.blades
+    assert found.verdict == STABLE
+    assert found.multiplier == pytest.approx(seen, rel=1e-9)
 
 
 def test_a_wave_is_judged_on_the_blades_after_which_it_repeats():
