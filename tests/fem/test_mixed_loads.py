@@ -10,7 +10,7 @@ import decks
 import numpy as np
 import pytest
 from mixed import chequered, cut, row
-from structured import box, pair, sector
+from structured import box, pair, sector, turn
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
@@ -24,6 +24,7 @@ from bladefem.fem.stiffness_error import stiffness_error
 from bladefem.fem.stress import gauss_stress, nodal_stress, stress_jumps, von_mises
 from bladefem.fem.stress_error import mesh_error
 from bladefem.fem.supports import AreaSpring, supported
+from bladefem.fem.temperature import Temperatures
 from bladefem.scene.tables import Material
 from geometry.raw_mesh import RawMesh
 from geometry.solid_cells import solid_cells
@@ -334,3 +335,20 @@ def test_a_quadrilateral_of_first_order_that_faces_triangles_is_refused():
     for how in ("keep", "promote"):
         with pytest.raises(InputError, match="quadrilateral faces .*triangles"):
             solid_cells(raw, "a.inp", how, np.array([0, 0, 1.0]))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_free_expansion_and_rotation_have_no_stress(order):
+    """Of hot curved cells, and after a large rigid rotation; complex fields are real ones turned."""
+    mesh = row(order=order, map=bend)
+    warm = replace(STEEL, expansion=1e-5)
+    hot = Temperatures(np.full(len(mesh.points), 400.0), 300.0)
+    body = assemble(mesh, "blade", warm, MPI.COMM_SELF, heat=hot)
+    free = 1e-3 * mesh.points
+    assert abs(gauss_stress(body, free, heated=True).stress).max() < 1e-9 * warm.E * 1e-3
+    vibrating = nodal_stress(body, free)
+    expected = warm.E / (1 - 2 * warm.nu) * 1e-3
+    np.testing.assert_allclose(vibrating[:, :3], expected, rtol=1e-9)
+    np.testing.assert_allclose(nodal_stress(body, 1j * free), 1j * vibrating, atol=1e-12 * expected)
+    turned = mesh.points @ turn(1.0) - mesh.points
+    assert abs(nodal_stress(body, turned, large=True)).max() < 1e-9 * warm.E
