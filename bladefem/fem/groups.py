@@ -28,9 +28,9 @@ MIN_DOFS_OF_FURTHER_RANKS = 30_000
 MAX_UNGROUPED_TASKS = 3
 # where nothing but a few nodal diameters is wanted: the common part, which ranks apart do once
 # each, is half of the work or more, and three diameters are no even share. On the shipped wedge
-# (74 000) two ranks take 10.3 s of processor time for three apart and 8.4 s together, for two 9.6
-# and 8.0, for five 12.4 and 10.6 (one rank 10.6 s for three), with half of the memory; on 41 000
-# for three 5.0 and 4.7
+# (74 000), beside other work, processor time of the slower of two ranks apart and together [s]:
+# three 10.3 and 8.4, 10.1 and 8.5, 10.5 and 10.4, 10.1 and 9.6; two 9.6 and 8.0; five 12.4 and 10.6
+# (one rank 10.6 and 11.5 for three), with 0.56 of the memory; on 41 000 it gains nothing sure
 MIN_DOFS_PER_RANK_FEW_TASKS = 35_000
 # tasks a group up to which they are few
 FEW_TASKS = 2.5
