@@ -3,7 +3,8 @@
     python benchmarks/fem_decks.py          writes tests/fem/ccx_decks.json
 
 Modes of three nodal diameters of a ring sector, one of twelve: C3D20, C3D20R, C3D15 with C3D20,
-C3D10, and C3D4 promoted to C3D10; clamped bars of a cubic crystal and an orthotropic solid; a bar
+C3D10, and C3D4 promoted to C3D10; displacements and stresses of C3D15 with C3D20 under pressure;
+clamped bars of a cubic crystal and an orthotropic solid; a bar
 that turns about its axis, with Coriolis forces; and a bar between walls whose properties are tables
 of temperature, heated evenly and unevenly.
 """
@@ -16,6 +17,10 @@ import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import numpy as np
 
 HERE = Path(__file__).resolve().parent
 TESTS = HERE.parent / "tests" / "fem"
@@ -140,6 +145,74 @@ def turning(folder: Path) -> dict[str, list[float]]:
     return out
 
 
+def halved(folder: Path) -> list[float]:
+    """Frequencies [Hz] of nodal diameter 2 of a coarse sector of C3D15 and C3D20, halved twice."""
+    import decks
+    from fem_ccx import ccx_frequencies
+
+    from geometry.imported import read_mesh
+
+    coarse = decks.model("c3d15_c3d20", (4, 3, 2))
+    (folder / "coarse.inp").write_text("\n".join(decks.flat_deck(coarse, {})))
+    mesh = read_mesh(folder / "coarse.inp", sectors=decks.SECTORS)
+    (folder / "job.inp").write_text(decks.ccx_job(decks.halved_model(mesh, 2), (2, 2), COUNT))
+    environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+    subprocess.run(
+        ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+    )
+    found = ccx_frequencies((folder / "job.dat").read_text())[2][:COUNT]
+    return [float(f) for f in found]
+
+
+def pressed(folder: Path) -> list[dict[str, object]]:
+    """An open sector of C3D20 and C3D15 under pressure, as it is and halved: places [m] of some
+    nodes away from the clamp, their displacements [m] and stresses [Pa] (xx, yy, zz, xy, yz, zx).
+    """
+    import decks
+    import numpy as np
+
+    out: list[dict[str, object]] = []
+    for halvings in (0, 1):
+        mesh = decks.pressed_mesh(halvings)
+        used, job = decks.pressed_job(mesh)
+        (folder / "job.inp").write_text(job)
+        environment = {**os.environ, "OMP_NUM_THREADS": "1"}
+        subprocess.run(
+            ["ccx", "-i", "job"], cwd=folder, check=True, capture_output=True, env=environment
+        )
+        found = nodal_results((folder / "job.frd").read_text(), len(used))
+        points = mesh.points[used]
+        away = np.flatnonzero(np.hypot(points[:, 0], points[:, 1]) > 0.17)
+        chosen = away[:: len(away) // 20]
+        out.append(
+            {
+                "points": points[chosen].tolist(),
+                "displacements": found["DISP"][chosen, :3].tolist(),
+                "stresses": found["STRESS"][chosen].tolist(),
+            }
+        )
+    return out
+
+
+def nodal_results(text: str, nodes: int) -> dict[str, np.ndarray]:
+    """(nodes, 6) values of each field of a file ``.frd``."""
+    import numpy as np
+
+    out: dict[str, np.ndarray] = {}
+    values = np.empty((0, 6))
+    inside = False
+    for line in text.splitlines():
+        if line.startswith(" -4"):
+            values = out[line.split()[1]] = np.zeros((nodes, 6))
+            inside = True
+        elif line.startswith(" -3"):
+            inside = False
+        elif line.startswith(" -1") and inside:
+            row = [float(line[i : i + 12]) for i in range(13, len(line) - 11, 12)]
+            values[int(line[3:13]) - 1, : len(row)] = row
+    return out
+
+
 def main() -> None:
     """Write the reference file."""
     sys.path[:0] = [str(TESTS), str(HERE), str(HERE.parent)]
@@ -155,6 +228,8 @@ def main() -> None:
         out["crystals"] = {kind: crystal(kind, Path(name)) for kind in ("cubic", "orthotropic")}
         out["heated_crystal"] = heated_crystal(Path(name))
         out["turning"] = turning(Path(name))
+        out["pressed"] = pressed(Path(name))
+        out["halved"] = halved(Path(name))
         out["heated"] = {kind: heated(kind, Path(name)) for kind in ("uniform", "field")}
     GOLDEN.write_text(json.dumps(out, indent=1) + "\n")
 

@@ -79,8 +79,9 @@ class Mesh:
     # (n,) numbers of the nodes in the user's file, NO_NUMBER of added ones; None without such
     numbers: IntegerArray | None = None
     # name of a body -> (nc, 27) nodes of the cell of another shape that each of its tetrahedra is a
-    # piece of, second order in gmsh's order, -1 beyond its own (10, 14, 18 or 27). Such a body is
-    # solved with the cells themselves; its tetrahedra serve for all that is done to results.
+    # piece of, gmsh's order, -1 beyond its own (4, 5, 6 or 8 of first order, 10, 14, 18 or 27 of
+    # second). Such a body is solved with the cells themselves, and so are its loads, stresses and
+    # halved meshes (`whole_cells`); contacts and pictures see its tetrahedra.
     whole: dict[str, IntegerArray] = field(default_factory=dict)
 
     def __repr__(self) -> str:

@@ -17,7 +17,8 @@ from bladefem.util.arrays import IntegerArray, RealArray
 from .raw_mesh import RawMesh
 from .second_order_cells import completed_cells
 from .split_cells import split_cells, vertex_order
-from .topology import CORNERS, DIMENSION, EDGES, FAMILY, NODES
+from .topology import CORNERS, DIMENSION, EDGES, FACETS, FAMILY, NODES
+from .whole_cells import padded_cells
 
 # what becomes of linear solids
 LINEAR_SOLID_CHOICES = ("refuse", "promote", "keep")
@@ -37,8 +38,8 @@ class SolidCells:
     row: IntegerArray
     # what was done to the cells, one sentence each
     notes: tuple[str, ...]
-    # (nc, 27) nodes of the second-order cell that each one is a piece of, -1 beyond its own; None
-    # where cells are what they were
+    # (nc, 27) nodes of the cell that each one is a piece of, -1 beyond its own; None where cells
+    # are what they were
     whole: IntegerArray | None = None
 
 
@@ -83,14 +84,15 @@ def solid_cells(
         rank = vertex_order(points, axis)
         parts = [split_cells(word, cells, rank, points) for word, cells in blocks]
         quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word in words)
-        if quadratic:
-            whole = _padded_cells(blocks, [rows for _, rows in parts])
-            notes += (
-                f"{_count_text(blocks)} are solved as they are; contacts, stresses and pictures "
-                "see them split into tetrahedra",
-            )
-        else:
-            notes += (f"{_count_text(blocks)} were split into tetrahedra: shapes are mixed",)
+        whole = padded_cells(
+            [(cells, rows) for (_, cells), (_, rows) in zip(blocks, parts, strict=True)]
+        )
+        notes += (
+            f"{_count_text(blocks)} are solved as they are; contacts and pictures see them split "
+            "into tetrahedra",
+        )
+        if not quadratic:
+            _check_facets(points, blocks, source)
         words = {"tetra10" if quadratic else "tetra"}
         blocks = [("tetra", cells) for cells, _ in parts]
         owner = [some[rows] for some, (_, rows) in zip(owner, parts, strict=True)]
@@ -107,19 +109,6 @@ def solid_cells(
         notes,
         whole,
     )
-
-
-def _padded_cells(
-    blocks: list[tuple[str, np.ndarray]],
-    rows: list[np.ndarray],
-) -> IntegerArray:
-    """(sum of all rows, 27) chosen rows of each block, -1 beyond a cell's nodes."""
-    width = NODES["hexahedron27"]
-    padded = [
-        np.pad(cells, [(0, 0), (0, width - cells.shape[1])], constant_values=-1)[some]
-        for (_, cells), some in zip(blocks, rows, strict=True)
-    ]
-    return np.vstack(padded)
 
 
 _HEXAHEDRA = ("hexahedron", "hexahedron27")
@@ -191,6 +180,30 @@ def _check_middles(
         raise InputError(
             f"imported.file = '{source}': the node at {x:.6g}, {y:.6g}, {z:.6g} is in the middle "
             "of two edges, or at a corner too, expected a node of its own for each edge"
+        )
+
+
+def _check_facets(points: np.ndarray, blocks: list[tuple[str, np.ndarray]], source: str) -> None:
+    """Refuse a quadrilateral that faces triangles, of cells that have no nodes in their middles."""
+    triangles = []
+    halves = []
+    for word, cells in blocks:
+        for facet in FACETS[FAMILY[word]]:
+            corners = np.sort(cells[:, facet], axis=1)
+            if len(facet) == 3:
+                triangles.append(corners)
+            else:
+                halves += [np.delete(corners, out, axis=1) for out in range(4)]
+    if not triangles or not halves:
+        return
+    first, second = (np.unique(np.vstack(rows), axis=0) for rows in (triangles, halves))
+    both, count = np.unique(np.vstack([first, second]), axis=0, return_counts=True)
+    bad = both[count == 2]
+    if len(bad):
+        x, y, z = points[bad[0]].mean(axis=0)
+        raise InputError(
+            f"imported.file = '{source}': a quadrilateral faces triangles near {x:.6g}, {y:.6g}, "
+            f"{z:.6g}, expected a conforming mesh"
         )
 
 

@@ -1,13 +1,12 @@
 """Hexahedra, wedges and pyramids split into tetrahedra that conform across all faces.
 
-Contacts, stresses and pictures know meshes of one cell shape; for them a mixed mesh is one of
-tetrahedra, and one of first order is solved so, too. Each cell
-is a cone from its first vertex in a global order over the faces that do not touch that vertex, and
-each quadrilateral is split through its own first vertex (Dompierre et al., How to subdivide
-pyramids, prisms and hexahedra into tetrahedra, 8th Int. Meshing Roundtable 1999). The order is by
-radius, then by place along the engine axis, then by angle, so that both cut faces of a sector are
-split alike. The mid-side nodes of the tetrahedra are the nodes of the complete second-order cells:
-no node is added or moved.
+Contacts and pictures know meshes of one cell shape; for them a mixed mesh is one of tetrahedra.
+Each cell is a cone from its first vertex in a global order over the faces that do not touch that
+vertex, and each quadrilateral is split through its own first vertex (Dompierre et al., How to
+subdivide pyramids, prisms and hexahedra into tetrahedra, 8th Int. Meshing Roundtable 1999). The
+order is by radius, then by place along the engine axis, then by angle, so that both cut faces of a
+sector are split alike. The mid-side nodes of the tetrahedra are the nodes of the complete
+second-order cells: no node is added or moved.
 """
 
 from __future__ import annotations

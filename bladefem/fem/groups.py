@@ -26,6 +26,14 @@ MIN_DOFS_PER_RANK = 40_000
 MIN_DOFS_OF_FURTHER_RANKS = 30_000
 # tasks of a group up to which none of them helps another
 MAX_UNGROUPED_TASKS = 3
+# where nothing but a few nodal diameters is wanted: the common part, which ranks apart do once
+# each, is half of the work or more, and three diameters are no even share. On the shipped wedge
+# (74 000), beside other work, processor time of the slower of two ranks apart and together [s]:
+# three 10.3 and 8.4, 10.1 and 8.5, 10.5 and 10.4, 10.1 and 9.6; two 9.6 and 8.0; five 12.4 and 10.6
+# (one rank 10.6 and 11.5 for three), with 0.56 of the memory; on 41 000 it gains nothing sure
+MIN_DOFS_PER_RANK_FEW_TASKS = 35_000
+# tasks a group up to which they are few
+FEW_TASKS = 2.5
 # share of the free memory that groups may fill
 USABLE_MEMORY_SHARE = 0.8
 
@@ -58,6 +66,20 @@ def group_size(
         if size >= least and memory < USABLE_MEMORY_SHARE * free:
             return size
     return comm.size
+
+
+def size_for_few(size: int, ranks: int, tasks: int, dofs: int) -> int:
+    """Ranks in a group where only the modes of some nodal diameters are wanted: all ranks for few.
+
+    Args:
+        size: ranks of a group otherwise, see `group_size`.
+        ranks: all of them.
+        tasks: number of nodal diameters.
+        dofs: degrees of freedom of one sector.
+    """
+    few = tasks <= FEW_TASKS * (ranks // size)
+    large = dofs >= ranks * MIN_DOFS_PER_RANK_FEW_TASKS
+    return ranks if few and large and ranks <= MAX_RANKS_PER_SECTOR else size
 
 
 def fits_one_rank(comm: MPI.Comm, dofs: int, cut: int = 0) -> bool:

@@ -8,9 +8,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from geometry.mesh import Mesh
+from geometry.whole_cells import own_cells, own_facets
 
 from ..errors import InputError, suggestion
 from . import shape_functions as shape
+from .cell_functions import geometry
 from .temperature import density_at, point_temperatures
 
 if TYPE_CHECKING:
@@ -30,8 +32,8 @@ def body_volume(mesh: Mesh, name: str) -> float:
     """
     if name not in mesh.bodies:
         raise InputError(f"the mesh has no body '{name}'{suggestion(name, mesh.bodies)}")
-    _, weight, _ = _quadrature_measure(mesh, mesh.bodies[name], 6)
-    return float(weight.sum())
+    parts = [_quadrature_measure(mesh, own.word, own.cells, 6) for own in own_cells(mesh, (name,))]
+    return float(sum(weight.sum() for _, weight, _ in parts))
 
 
 def body_mass(body: Body) -> float:
@@ -41,7 +43,7 @@ def body_mass(body: Body) -> float:
     total = 0.0
     for name, material in body.material.items():
         cells = body.mesh.bodies[name]
-        values, weight, _ = _quadrature_measure(body.mesh, cells, 6)
+        values, weight, _ = _quadrature_measure(body.mesh, body.mesh.cell_type, cells, 6)
         rho = density_at(material, point_temperatures(body.heat, cells, values))
         total += float((rho * weight).sum())
     return total
@@ -69,7 +71,7 @@ def centrifugal(
         cells = body.mesh.bodies[name]
         simplex = body.mesh.cell_type.startswith(("tri", "tet"))
         degree = SIMPLEX_DEGREE if simplex else TENSOR_DEGREE
-        values, weight, x = _quadrature_measure(body.mesh, cells, degree)
+        values, weight, x = _quadrature_measure(body.mesh, body.mesh.cell_type, cells, degree)
         rho = density_at(material, point_temperatures(body.heat, cells, values))
         field = ((x - centre) @ across)[:, :, : body.dim] * (rho[..., None] * speed**2)
         # (nc, d, k)
@@ -95,19 +97,28 @@ def surface_load(
     """
     if (traction is None) == (pressure is None):
         raise InputError("surface_load needs traction or pressure, expected exactly one of them")
-    facets = _face_facets(body, face)
     d = body.dim
-    kind = shape.FACET_OF[body.mesh.cell_type]
-    values, tangents, w = shape.geometry(kind, body.mesh.points[facets][:, :, :d], 8)
-    normal = _outward_normals(body, facets, _area_normals(tangents))
     depth = body.mesh.depth if d == 2 else 1.0
-    if pressure is not None:
-        field = -pressure * normal
-    else:
-        field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
     force = np.zeros((len(body.mesh.points), d))
-    np.add.at(force, facets, depth * np.einsum("qk,q,cqd->ckd", values, w, field))
+    for word, facets in facets_by_shape(body, _face_facets(body, face)):
+        values, tangents, w = shape.geometry(word, body.mesh.points[facets][:, :, :d], 8)
+        normal = _outward_normals(body, word, facets, _area_normals(tangents))
+        if pressure is not None:
+            field = -pressure * normal
+        else:
+            field = np.linalg.norm(normal, axis=2)[:, :, None] * np.asarray(traction, float)[:d]
+        np.add.at(force, facets, depth * np.einsum("qk,q,cqd->ckd", values, w, field))
     return force.ravel()
+
+
+def facets_by_shape(body: Body, facets: np.ndarray) -> list[tuple[str, np.ndarray]]:
+    """Facets (nf, k) of the mesh as those of the cells that are solved: meshio's word and nodes.
+
+    A triangle that is half of a quadrilateral, without the other half, is a triangle.
+    """
+    own, halves = own_facets(body.mesh, tuple(body.material), facets)
+    found = list(own.items())
+    return [*found, (shape.FACET_OF[body.mesh.cell_type], halves)] if len(halves) else found
 
 
 def face_areas(body: Body, face: str) -> np.ndarray:
@@ -118,12 +129,13 @@ def face_areas(body: Body, face: str) -> np.ndarray:
 
 def _quadrature_measure(
     mesh: Mesh,
+    word: str,
     cells: np.ndarray,
     degree: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Shape values (q, k), volumes (nc, q) and places (nc, q, 3) of the quadrature points."""
     d = mesh.dimension
-    values, tangents, w = shape.geometry(mesh.cell_type, mesh.points[cells][:, :, :d], degree)
+    values, tangents, w = geometry(word, mesh.points[cells][:, :, :d], degree)
     weight = np.abs(_determinants(tangents)) * w * (mesh.depth if d == 2 else 1.0)
     places = np.tensordot(mesh.points[cells], values, axes=([1], [1])).transpose(0, 2, 1)
     return values, weight, places
@@ -157,6 +169,7 @@ def _area_normals(tangents: np.ndarray) -> np.ndarray:
 
 def _outward_normals(
     body: Body,
+    word: str,
     facets: np.ndarray,
     normal: np.ndarray,
 ) -> np.ndarray:
@@ -164,7 +177,7 @@ def _outward_normals(
     mesh = body.mesh
     d = body.dim
     cells = np.concatenate([mesh.bodies[n] for n in body.material])
-    corner = facets[:, : shape.corner_count(shape.FACET_OF[mesh.cell_type])]
+    corner = facets[:, : shape.corner_count(word)]
     shared = _cell_incidence(corner, len(mesh.points)) @ _cell_incidence(cells, len(mesh.points)).T
     behind = np.asarray(shared.argmax(axis=1)).ravel()
     inward = mesh.points[cells[behind]].mean(1) - mesh.points[corner].mean(1)

@@ -3,7 +3,7 @@
 dolfinx 0.5 to 0.11 assembles meshes of one cell shape; ffcx 0.5 has no pyramids and refuses prisms
 of second order, whose faces carry different numbers of nodes. Here a wedge is a hexahedron of 27
 nodes with an edge of each triangle drawn together to a point, a pyramid one with its top drawn
-together. Their 27 displacements follow from their own 18 or 14,
+together. Their 27 displacements follow from their own 18 or 14 (of first order, the 8 from 6 or 5),
 
     u_27 = T u_own,     x_27 = T x_own,     K_own = T^T K_27 T,
 
@@ -25,6 +25,7 @@ import scipy.sparse as sp
 
 from geometry.mesh import Mesh
 from geometry.topology import CORNERS, EDGES, NODES
+from geometry.whole_cells import own_cells
 
 from ..util.arrays import IntegerArray, RealArray
 from . import shape_functions as shape
@@ -32,20 +33,13 @@ from .compat import PETSc
 
 # pairs of nodes of the cells of one piece: its stiffness takes some 200 MB
 ENTRIES_AT_ONCE = 2_000_000
-HEXAHEDRON = "hexahedron27"
-
-
-def cells_by_shape(whole: IntegerArray) -> dict[str, IntegerArray]:
-    """Second-order cells of each shape, gmsh's order of nodes, without repetition.
-
-    Args:
-        whole: (nt, 27) nodes of a cell, -1 beyond its own, once or more.
-    """
-    distinct = np.unique(whole, axis=0)
-    count = (distinct >= 0).sum(axis=1)
-    words = ("tetra10", "pyramid14", "wedge18", HEXAHEDRON)
-    found = {word: distinct[count == NODES[word], : NODES[word]] for word in words}
-    return {word: cells for word, cells in found.items() if len(cells)}
+# the hexahedron whose nodes are drawn together
+HEXAHEDRON_OF = {
+    "wedge": "hexahedron",
+    "pyramid": "hexahedron",
+    "wedge18": "hexahedron27",
+    "pyramid14": "hexahedron27",
+}
 
 
 def pieces_of_one_shape(mesh: Mesh, names: tuple[str, ...]) -> Iterator[tuple[Mesh, sp.csr_matrix]]:
@@ -59,15 +53,11 @@ def pieces_of_one_shape(mesh: Mesh, names: tuple[str, ...]) -> Iterator[tuple[Me
         given mesh) that interpolates fields onto its nodes.
     """
     plain = replace(mesh, whole={}, faces={}, nodes={}, pairs={}, parts={}, numbers=None)
-    for name in names:
-        # cells that are no pieces of others are there as tetrahedra
-        found = {"tetra10": mesh.bodies[name]}
-        if name in mesh.whole:
-            found = cells_by_shape(mesh.whole[name])
-        for word, cells in found.items():
-            entries = len(drawn_nodes(word)) ** 2
-            for some in np.array_split(cells, -(-len(cells) * entries // ENTRIES_AT_ONCE)):
-                yield _with_own_nodes(plain, word, some, name)
+    for own in own_cells(mesh, names):
+        entries = len(drawn_nodes(own.word)) ** 2
+        blocks = -(-len(own.cells) * entries // ENTRIES_AT_ONCE)
+        for some in np.array_split(own.cells, blocks):
+            yield _with_own_nodes(plain, own.word, some, own.name)
 
 
 def _with_own_nodes(
@@ -91,7 +81,7 @@ def _with_own_nodes(
     alone = replace(
         mesh,
         points=np.asarray(spread @ mesh.points),
-        cell_type=word if word == "tetra10" else HEXAHEDRON,
+        cell_type=HEXAHEDRON_OF.get(word, word),
         bodies={name: np.arange(count * len(T)).reshape(count, len(T))},
     )
     return alone, spread
@@ -99,24 +89,28 @@ def _with_own_nodes(
 
 @cache
 def drawn_nodes(word: str) -> RealArray:
-    """(m, k) matrix T of nodes from those of a second-order cell: the 27 of a hexahedron drawn
-    together for a wedge or a pyramid, of hexahedra and tetrahedra their own.
+    """(m, k) matrix T of nodes from those of a cell: those of a hexahedron drawn together for a
+    wedge or a pyramid, of hexahedra and tetrahedra their own.
     """
-    if word == "wedge18":
-        return _wedge_nodes()
+    if word in ("wedge", "wedge18"):
+        return _wedge_nodes(word)
+    if word == "pyramid":
+        # the four upper corners are the apex
+        return np.eye(NODES[word])[[0, 1, 2, 3, 4, 4, 4, 4]]
     return _pyramid_nodes() if word == "pyramid14" else np.eye(NODES[word])
 
 
-def _wedge_nodes() -> RealArray:
-    """Triangles of six nodes times lines of three; the sides y = 1 of the square layers are the
-    third corners.
+def _wedge_nodes(word: str) -> RealArray:
+    """Triangles of three or six nodes times lines of two or three; the sides y = 1 of the square
+    layers are the third corners.
     """
-    x, y, z = shape.reference_nodes(HEXAHEDRON).T
-    triangle, _ = shape.tabulate("triangle6", np.column_stack([x * (1 - y), y]))
-    line, _ = shape.tabulate("line3", z[:, None])
-    own = _wedge_places()
-    flat = _numbers_of(own[:, :2], shape.reference_nodes("triangle6"))
-    high = _numbers_of(own[:, 2:], shape.reference_nodes("line3"))
+    flat_word, high_word = ("triangle", "line") if word == "wedge" else ("triangle6", "line3")
+    x, y, z = shape.reference_nodes(HEXAHEDRON_OF[word]).T
+    triangle, _ = shape.tabulate(flat_word, np.column_stack([x * (1 - y), y]))
+    line, _ = shape.tabulate(high_word, z[:, None])
+    own = _wedge_places()[: NODES[word]]
+    flat = _numbers_of(own[:, :2], shape.reference_nodes(flat_word))
+    high = _numbers_of(own[:, 2:], shape.reference_nodes(high_word))
     return np.asarray(triangle[:, flat] * line[:, high])
 
 
@@ -142,7 +136,7 @@ def _pyramid_nodes() -> RealArray:
     the base's value by nine nodes and by its four corners, the bilinear mean of the middles and
     (B - L) / 4.
     """
-    x, y, z = shape.reference_nodes(HEXAHEDRON).T
+    x, y, z = shape.reference_nodes(HEXAHEDRON_OF["pyramid14"]).T
     level = np.column_stack([x, y])
     nine, _ = shape.tabulate("quad9", level)
     four, _ = shape.tabulate("quad", level)

@@ -66,7 +66,34 @@ def entries_of_sum(
     B: OpenMatrix,
 ) -> sp.csr_matrix:
     """A + factor B."""
+    if isinstance(A, Selected) and isinstance(B, Repeated):
+        total = entries(A)
+        if _added_to_blocks(total, factor, B):
+            return total
+        return (total + factor * entries(B)).tocsr()
     return (entries(A) + factor * entries(B)).tocsr()
+
+
+def _added_to_blocks(A: sp.csr_matrix, factor: float, B: Repeated) -> bool:
+    """Whether factor B could be added in the place of A: a block of dim by dim numbers for each of
+    B's nodal ones, as stiffness and mass of the same nodes have. A third of the time of a sum.
+    """
+    nodal, dim = B.nodal, B.dim
+    if A.nnz != dim**2 * nodal.nnz:
+        return False
+    A.sort_indices()
+    nodal.sort_indices()
+    within = np.arange(nodal.nnz) - np.repeat(nodal.indptr[:-1], np.diff(nodal.indptr))
+    places = []
+    for i in range(dim):
+        start = np.repeat(A.indptr[:-1][i::dim], np.diff(nodal.indptr))
+        place = start + dim * within + i
+        if place.max(initial=-1) >= A.nnz or (A.indices[place] != dim * nodal.indices + i).any():
+            return False
+        places.append(place)
+    for place in places:
+        A.data[place] += factor * nodal.data
+    return True
 
 
 def chosen_rows(A: OpenMatrix, places: np.ndarray) -> sp.csr_matrix:

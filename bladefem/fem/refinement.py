@@ -6,7 +6,7 @@ volume of the given one: curved boundaries stay as curved, and as faceted, as th
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from typing import TypeAlias
@@ -16,113 +16,254 @@ from numpy.typing import NDArray
 
 from geometry.matching import match_faces
 from geometry.mesh import Mesh, Pair
-from geometry.topology import boundary_facets
+from geometry.second_order_cells import COMPLETE_CELL as SECOND_ORDER
+from geometry.split_cells import split_cells, vertex_order
+from geometry.topology import FAMILY, NODES, boundary_facets
+from geometry.whole_cells import OwnCells, own_cells, own_facets, padded_cells
 
+from ..errors import InputError
 from ..util.arrays import IntegerArray, RealArray
 from . import shape_functions as shape
+from .cell_functions import order_of, reference_nodes, straight_nodes, tabulate
 
 HashArray: TypeAlias = NDArray[np.uint64]
+Corners: TypeAlias = tuple[tuple[int, ...], ...]
 # corners of the children in the unit cell, in halves; the octahedron left in a tetrahedron is cut
 # along one of its diagonals
-TRIANGLES: list[list[tuple[int, ...]]] = [
-    [(0, 0), (1, 0), (0, 1)],
-    [(1, 0), (2, 0), (1, 1)],
-    [(0, 1), (1, 1), (0, 2)],
-    [(1, 1), (0, 1), (1, 0)],
-]
-TETRAHEDRA: list[list[tuple[int, ...]]] = [
-    [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)],
-    [(1, 0, 0), (2, 0, 0), (1, 1, 0), (1, 0, 1)],
-    [(0, 1, 0), (1, 1, 0), (0, 2, 0), (0, 1, 1)],
-    [(0, 0, 1), (1, 0, 1), (0, 1, 1), (0, 0, 2)],
-    [(0, 1, 0), (1, 0, 1), (1, 0, 0), (1, 1, 0)],
-    [(0, 1, 0), (1, 0, 1), (1, 1, 0), (0, 1, 1)],
-    [(0, 1, 0), (1, 0, 1), (0, 1, 1), (0, 0, 1)],
-    [(0, 1, 0), (1, 0, 1), (0, 0, 1), (1, 0, 0)],
-]
+TRIANGLES: tuple[Corners, ...] = (
+    ((0, 0), (1, 0), (0, 1)),
+    ((1, 0), (2, 0), (1, 1)),
+    ((0, 1), (1, 1), (0, 2)),
+    ((1, 1), (0, 1), (1, 0)),
+)
+TETRAHEDRA: tuple[Corners, ...] = (
+    ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    ((1, 0, 0), (2, 0, 0), (1, 1, 0), (1, 0, 1)),
+    ((0, 1, 0), (1, 1, 0), (0, 2, 0), (0, 1, 1)),
+    ((0, 0, 1), (1, 0, 1), (0, 1, 1), (0, 0, 2)),
+    ((0, 1, 0), (1, 0, 1), (1, 0, 0), (1, 1, 0)),
+    ((0, 1, 0), (1, 0, 1), (1, 1, 0), (0, 1, 1)),
+    ((0, 1, 0), (1, 0, 1), (0, 1, 1), (0, 0, 1)),
+    ((0, 1, 0), (1, 0, 1), (0, 0, 1), (1, 0, 0)),
+)
+# four on the base, one on top, one upside down between them
+PYRAMIDS: tuple[Corners, ...] = (
+    ((0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)),
+    ((1, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0), (1, 0, 1)),
+    ((1, 1, 0), (2, 1, 0), (2, 2, 0), (1, 2, 0), (1, 1, 1)),
+    ((0, 1, 0), (1, 1, 0), (1, 2, 0), (0, 2, 0), (0, 1, 1)),
+    ((0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1), (0, 0, 2)),
+    ((0, 0, 1), (0, 1, 1), (1, 1, 1), (1, 0, 1), (1, 1, 0)),
+)
+# and what is left on the sides
+PYRAMIDS_TETRAHEDRA: tuple[Corners, ...] = (
+    ((1, 0, 0), (1, 0, 1), (0, 0, 1), (1, 1, 0)),
+    ((2, 1, 0), (1, 1, 1), (1, 0, 1), (1, 1, 0)),
+    ((1, 2, 0), (0, 1, 1), (1, 1, 1), (1, 1, 0)),
+    ((0, 1, 0), (0, 0, 1), (0, 1, 1), (1, 1, 0)),
+)
+# new nodes whose places are worked out at a time
+NODES_AT_ONCE = 200_000
+# of all weights of corners at places in quarters: 64ths in a hexahedron, 48ths in a pyramid
+WHOLE_WEIGHTS = 192
 # partners of refined faces, as a share of the face's size
 MATCH_TOLERANCE = 1e-6
+# of the wheel, in whose direction both cut faces are split alike
+AXIS = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class _Children:
+    """The children of all cells of one shape of a body."""
+
+    name: str
+    word: str
+    # (nc, k) nodes
+    cells: IntegerArray
+    # (nc,) number of the parent in the body's cells
+    parent: IntegerArray
 
 
 def refine_uniformly(mesh: Mesh) -> Mesh:
     """The mesh with all cells halved; named faces, node sets, volumes and pairs go along.
 
-    A node set takes the new nodes of the outer facets whose nodes it holds. Of cells of mixed
-    shapes their tetrahedra are refined, and nothing but these is left.
+    A node set takes the new nodes of the outer facets whose nodes it holds. A pyramid becomes six
+    pyramids and four tetrahedra, a cell of any other shape eight of its own.
+
+    Raises:
+        InputError: a face that holds half of a quadrilateral.
     """
-    cells = np.concatenate(list(mesh.bodies.values()))
+    own = own_cells(mesh, tuple(mesh.bodies))
     hashes = np.random.default_rng(0).integers(0, 2**64, len(mesh.points), dtype=np.uint64)
-    sets = {name: _facets_inside(mesh, cells, nodes) for name, nodes in mesh.nodes.items()}
-    own = _child_keys(mesh.cell_type, cells, hashes)
-    keys, first, number = np.unique(own, return_index=True, return_inverse=True)
-    points = _child_points(mesh, cells, first)
-    children = shape.reference_nodes(mesh.cell_type).shape[0]
-    new_cells = number.reshape(-1, children)
-    # the parent's nodes are corners of children or in the middle of their edges
-    old = np.searchsorted(keys, _node_keys(mesh.cell_type, cells, hashes))
+    keys, points, children = _halved(mesh, own, hashes)
+    # the parents' nodes are corners of children or in the middle of their edges
     kept = np.full(len(mesh.points), -1)
-    kept[cells] = old
-    facet_type = shape.FACET_OF[mesh.cell_type]
+    for some in own:
+        at = reference_nodes(some.word)
+        kept[some.cells] = np.searchsorted(keys, _keys(some.word, some.cells, hashes, at))
+    rank = vertex_order(points, AXIS) if mesh.whole else np.empty(0, int)
+    bodies, whole, parent = _bodies(mesh, points, children, rank)
 
-    def facets(some: IntegerArray) -> IntegerArray:
-        found = np.searchsorted(keys, _child_keys(facet_type, some, hashes))
-        return found.reshape(-1, some.shape[1])
+    def facets(some: IntegerArray, name: str) -> IntegerArray:
+        by_shape, halves = own_facets(mesh, tuple(mesh.bodies), some)
+        if len(halves):
+            raise InputError(
+                f"face '{name}': {len(halves)} of its triangles are half of a quadrilateral, "
+                "expected whole faces of the cells where elements are halved"
+            )
+        found = []
+        for word, own in by_shape.items():
+            kind = FAMILY[word]
+            at = _child_nodes(word, kind)
+            new = np.searchsorted(keys, _keys(word, own, hashes, at)).reshape(-1, own.shape[1])
+            found.append(_triangles(new, rank) if kind == "quad" and mesh.whole else new)
+        return np.vstack(found) if found else some
 
-    per_cell = len(_child_corners(shape.SHAPES[mesh.cell_type][0]))
-    ends = per_cell * np.cumsum([len(some) for some in mesh.bodies.values()])[:-1]
     refined = replace(
         mesh,
         points=points,
         # most nodes are new ones
         numbers=None,
-        whole={},
-        bodies=dict(zip(mesh.bodies, np.split(new_cells, ends), strict=True)),
-        faces={name: facets(some) for name, some in mesh.faces.items()},
+        whole=whole,
+        bodies=bodies,
+        faces={name: facets(some, name) for name, some in mesh.faces.items()},
         nodes={
-            name: np.union1d(kept[nodes], np.unique(facets(sets[name])))
+            name: np.union1d(kept[nodes], np.unique(facets(_facets_inside(mesh, nodes), name)))
             for name, nodes in mesh.nodes.items()
         },
-        parts={
-            name: (per_cell * rows[:, None] + np.arange(per_cell)).ravel()
-            for name, rows in mesh.parts.items()
-        },
+        parts={name: _part_rows(mesh, rows, parent) for name, rows in mesh.parts.items()},
     )
     return replace(
         refined, pairs={name: _matched(refined, pair) for name, pair in mesh.pairs.items()}
     )
 
 
+def _halved(
+    mesh: Mesh,
+    own: list[OwnCells],
+    hashes: HashArray,
+) -> tuple[HashArray, RealArray, list[_Children]]:
+    """Sorted keys of the new nodes, their places (n, 3) [m], and the new cells."""
+    made = []
+    start = dict.fromkeys(mesh.bodies, 0)
+    for some in own:
+        for kind in _children_of(FAMILY[some.word]):
+            at = _child_nodes(some.word, kind)
+            own_keys = _keys(some.word, some.cells, hashes, at)
+            made.append((some, kind, at, own_keys, start[some.name]))
+        start[some.name] += len(some.cells)
+    keys, first, number = np.unique(
+        np.concatenate([own_keys.ravel() for *_, own_keys, _ in made]),
+        return_index=True,
+        return_inverse=True,
+    )
+    points = np.empty((len(keys), 3))
+    children = []
+    begin = 0
+    for some, kind, at, own_keys, before in made:
+        count = own_keys.size
+        word = _same_order(kind, some.word)
+        cells = number.ravel()[begin : begin + count].reshape(-1, NODES[word])
+        parent = before + np.repeat(np.arange(len(some.cells)), len(cells) // len(some.cells))
+        children.append(_Children(some.name, word, cells, parent))
+        new = np.flatnonzero((first >= begin) & (first < begin + count))
+        cell, place = np.divmod(first[new] - begin, len(at))
+        values, _ = tabulate(some.word, at)
+        for part in np.array_split(np.arange(len(new)), len(new) // NODES_AT_ONCE + 1):
+            corners = mesh.points[some.cells[cell[part]]]
+            points[new[part]] = np.einsum("nk,nkd->nd", values[place[part]], corners)
+        begin += count
+    return keys, points, children
+
+
+def _bodies(
+    mesh: Mesh,
+    points: RealArray,
+    children: list[_Children],
+    rank: IntegerArray,
+) -> tuple[dict[str, IntegerArray], dict[str, IntegerArray], dict[str, IntegerArray]]:
+    """Cells of each body's mesh, what `Mesh.whole` is of them, and (np,) which of the body's parent
+    cells, in the order of `own_cells`, each is in.
+    """
+    bodies = {}
+    whole = {}
+    parent = {}
+    for name in mesh.bodies:
+        own = [some for some in children if some.name == name]
+        if name not in mesh.whole:
+            (only,) = own
+            bodies[name], parent[name] = only.cells, only.parent
+            continue
+        parts = [split_cells(some.word, some.cells, rank, points) for some in own]
+        bodies[name] = np.vstack([cells for cells, _ in parts])
+        pairs = list(zip(own, parts, strict=True))
+        whole[name] = padded_cells([(some.cells, rows) for some, (_, rows) in pairs])
+        parent[name] = np.concatenate([some.parent[rows] for some, (_, rows) in pairs])
+    return bodies, whole, parent
+
+
+def _part_rows(mesh: Mesh, rows: IntegerArray, parent: dict[str, IntegerArray]) -> IntegerArray:
+    """Rows of the new blade that are in a volume, of which ``rows`` were the old blade's."""
+    chosen = []
+    before = 0
+    for some in own_cells(mesh, ("blade",)):
+        inside = np.isin(some.pieces, rows)
+        chosen.append(before + np.unique(some.owner[inside]))
+        before += len(some.cells)
+    return np.flatnonzero(np.isin(parent["blade"], np.concatenate(chosen)))
+
+
+def _triangles(quads: IntegerArray, rank: IntegerArray) -> IntegerArray:
+    """Quadrilaterals (nf, 4 or 9) as the triangles (2 nf, 3 or 6) of the tetrahedra behind them:
+    each is split through its first vertex.
+    """
+    ring = (rank[quads[:, :4]].argmin(axis=1)[:, None] + np.arange(4)) % 4
+    corner = np.take_along_axis(quads[:, :4], ring, axis=1)
+    if quads.shape[1] == 4:
+        return np.vstack([corner[:, [0, 1, 2]], corner[:, [0, 2, 3]]])
+    middle = np.take_along_axis(quads[:, 4:8], ring, axis=1)
+    centre = quads[:, 8:]
+    first = [corner[:, [0, 1, 2]], middle[:, [0, 1]], centre]
+    second = [corner[:, [0, 2, 3]], centre, middle[:, [2, 3]]]
+    return np.vstack([np.hstack(first), np.hstack(second)])
+
+
+def _same_order(family: str, word: str) -> str:
+    """meshio's word of a cell of a family and of the order of another one."""
+    if order_of(word) == 1:
+        return family
+    return {**SECOND_ORDER, "line": "line3"}[family]
+
+
 @cache
-def _child_corners(kind: str) -> list[list[tuple[int, ...]]]:
-    """Corners of the children in a unit cell, in halves, in the order of the cell's own."""
-    if kind in ("line", "quad", "hexahedron"):
-        corners = shape.reference_nodes(kind).astype(int)
+def _children_of(family: str) -> dict[str, tuple[Corners, ...]]:
+    """Corners of the children in a unit cell, in halves, in the order of the cell's own, by
+    shape.
+    """
+    if family in ("line", "quad", "hexahedron"):
+        corners = shape.reference_nodes(family).astype(int)
         steps = product((0, 1), repeat=corners.shape[1])
-        return [[tuple(corner + step) for corner in corners] for step in steps]
-    return TRIANGLES if kind == "triangle" else TETRAHEDRA
+        return {family: tuple(tuple(tuple(c + step) for c in corners) for step in steps)}
+    if family == "wedge":
+        sides = [[(*a, z) for z in (low, low + 1) for a in t] for t in TRIANGLES for low in (0, 1)]
+        return {family: tuple(map(tuple, sides))}
+    if family == "pyramid":
+        return {"pyramid": PYRAMIDS, "tetra": PYRAMIDS_TETRAHEDRA}
+    return {family: TRIANGLES if family == "triangle" else TETRAHEDRA}
 
 
 @cache
-def _child_nodes(cell_type: str) -> RealArray:
-    """(children * k, d) nodes of the children in the unit cell."""
-    kind = shape.SHAPES[cell_type][0]
-    linear, _ = shape.tabulate(kind, shape.reference_nodes(cell_type))
-    parts = [linear @ (np.array(corners) / 2) for corners in _child_corners(kind)]
+def _child_nodes(word: str, kind: str) -> RealArray:
+    """(children * k, d) nodes of the children of one shape in the unit cell."""
+    child = _same_order(kind, word)
+    parts = [
+        straight_nodes(child, np.array(corners) / 2) for corners in _children_of(FAMILY[word])[kind]
+    ]
     return np.concatenate(parts)
 
 
-def _child_keys(cell_type: str, cells: IntegerArray, hashes: HashArray) -> HashArray:
-    """(nc * children * k,) keys of the children's nodes: the same for all cells that share one."""
-    return _keys(cell_type, cells, hashes, _child_nodes(cell_type)).ravel()
-
-
-def _node_keys(cell_type: str, cells: IntegerArray, hashes: HashArray) -> HashArray:
-    """(nc, k) keys of the cells' own nodes."""
-    return _keys(cell_type, cells, hashes, shape.reference_nodes(cell_type))
-
-
 def _keys(
-    cell_type: str,
+    word: str,
     cells: IntegerArray,
     hashes: HashArray,
     at: RealArray,
@@ -130,10 +271,8 @@ def _keys(
     """(nc, q) sums of the corners' hashes with their whole-number weights at places (q, d) of the
     unit cell; a place on a facet knows its corners alone.
     """
-    kind = shape.SHAPES[cell_type][0]
-    weights, _ = shape.tabulate(kind, at)
-    # weights of places in quarters are 64ths at most
-    whole = np.rint(64 * weights).astype(np.uint64)
+    weights, _ = tabulate(FAMILY[word], at)
+    whole = np.rint(WHOLE_WEIGHTS * weights).astype(np.uint64)
     corner = hashes[cells[:, : weights.shape[1]]]
     total = np.zeros((len(cells), len(at)), np.uint64)
     for i in range(weights.shape[1]):
@@ -141,19 +280,17 @@ def _keys(
     return total
 
 
-def _child_points(mesh: Mesh, cells: IntegerArray, first: IntegerArray) -> RealArray:
-    """(n, 3) places of new nodes [m], of which ``first`` are numbers among the children's nodes of
-    all cells.
-    """
-    values, _ = shape.tabulate(mesh.cell_type, _child_nodes(mesh.cell_type))
-    cell, place = np.divmod(first, len(values))
-    return np.asarray(np.einsum("nk,nkd->nd", values[place], mesh.points[cells[cell]]))
-
-
-def _facets_inside(mesh: Mesh, cells: IntegerArray, nodes: IntegerArray) -> IntegerArray:
-    """Outer facets (m, k) all of whose nodes are in a set."""
+def _facets_inside(mesh: Mesh, nodes: IntegerArray) -> IntegerArray:
+    """Outer facets (m, k) all of whose nodes are in a set; of quadrilaterals whole ones alone."""
+    cells = np.concatenate(list(mesh.bodies.values()))
     outer = boundary_facets(cells, mesh.cell_type)
-    return np.asarray(outer[np.isin(outer, nodes).all(axis=1)])
+    inside = np.asarray(outer[np.isin(outer, nodes).all(axis=1)])
+    if not mesh.whole:
+        return inside
+    _, halves = own_facets(mesh, tuple(mesh.bodies), inside)
+    half = set(map(tuple, np.sort(halves, axis=1).tolist()))
+    whole = [tuple(row) not in half for row in np.sort(inside, axis=1).tolist()]
+    return np.asarray(inside[np.array(whole, bool)])
 
 
 def _matched(mesh: Mesh, pair: Pair) -> Pair:

@@ -111,7 +111,7 @@ def quadrature(shape: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     d = len(_CORNERS[shape][0])
     n = degree // 2 + 1
     simplex = shape in ("triangle", "tetra")
-    lines = [_jacobi_rule(n, d - 1 - i if simplex else 0) for i in range(d)]
+    lines = [gauss_rule(n, d - 1 - i if simplex else 0) for i in range(d)]
     x = np.array(list(product(*[line[0] for line in lines])))
     w = np.array([np.prod(c) for c in product(*[line[1] for line in lines])])
     if simplex:
@@ -122,7 +122,7 @@ def quadrature(shape: str, degree: int) -> tuple[np.ndarray, np.ndarray]:
     return x, w
 
 
-def _jacobi_rule(n: int, power: int) -> tuple[np.ndarray, np.ndarray]:
+def gauss_rule(n: int, power: int) -> tuple[np.ndarray, np.ndarray]:
     """Gauss rule on (0, 1) for the weight (1 - x)^power."""
     x, w = roots_jacobi(n, power, 0)
     return (x + 1) / 2, w / 2 ** (power + 1)

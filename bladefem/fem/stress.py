@@ -11,9 +11,13 @@ from functools import cache
 
 import numpy as np
 
+from geometry.topology import FAMILY
+from geometry.whole_cells import OwnCells, own_cells
+
 from ..errors import InputError
 from . import shape_functions as shape
 from .body import Body
+from .cell_functions import order_of, pyramid_rule, quadrature, reference_nodes, tabulate
 from .elasticity import lame_parameters, stress_of
 from .temperature import point_temperatures, strain_tensor_at
 
@@ -28,7 +32,11 @@ MIN_SQUARED_DISTANCE = 0.01
 
 @dataclass(frozen=True)
 class GaussStress:
-    """Stresses at the Gauss points of reduced integration, where they are best."""
+    """Stresses at the Gauss points of reduced integration, where they are best.
+
+    A tetrahedron that is a piece of a cell of another shape has all points of that cell, and its
+    share of their volume.
+    """
 
     # (nc, q, 3) [m]
     points: np.ndarray
@@ -57,6 +65,32 @@ def gauss_stress(
     Raises:
         InputError: the field does not fit the mesh, or a complex one with large displacements.
     """
+    _check_field(body, u, large)
+    own = solved_cells(body)
+    width = max(len(best_points(some.word)[0]) for some in own)
+    starts = dict(zip(body.material, np.cumsum([0, *_piece_counts(body)])[:-1], strict=True))
+    columns: list[np.ndarray] = []
+    for some in own:
+        rows = starts[some.name] + some.pieces
+        found = _all_cells(body, u, some, large, heated)
+        for i, values in enumerate(_for_pieces(some, found, width)):
+            if i == len(columns):
+                shape_of = (sum(_piece_counts(body)), *values.shape[1:])
+                columns.append(np.zeros(shape_of, values.dtype))
+            columns[i][rows] = values
+    return GaussStress(*columns)
+
+
+def solved_cells(body: Body) -> list[OwnCells]:
+    """The cells that the body's matrices are of, by material and shape."""
+    return own_cells(body.mesh, tuple(body.material))
+
+
+def _piece_counts(body: Body) -> list[int]:
+    return [len(body.mesh.bodies[name]) for name in body.material]
+
+
+def _check_field(body: Body, u: np.ndarray, large: bool) -> None:
     mesh = body.mesh
     if np.shape(u)[0] != len(mesh.points) or np.shape(u)[1] < body.dim:
         raise InputError(
@@ -66,14 +100,34 @@ def gauss_stress(
         raise InputError("displacement is complex, expected a real one for large displacements")
     if not np.isfinite(u).all():
         raise InputError("displacement has values that are not finite")
-    parts = [
-        _of_cells(body, np.asarray(u)[:, : body.dim], name, block, large, heated)
-        for name in body.material
-        for block in np.array_split(
-            mesh.bodies[name], len(mesh.bodies[name]) // CELLS_PER_BLOCK + 1
-        )
+
+
+def _all_cells(
+    body: Body,
+    u: np.ndarray,
+    own: OwnCells,
+    large: bool,
+    heated: bool,
+) -> list[np.ndarray]:
+    """Places, volumes and stresses at the Gauss points of all cells of a shape, some at a time."""
+    blocks = np.array_split(own.cells, len(own.cells) // CELLS_PER_BLOCK + 1)
+    u = np.asarray(u)[:, : body.dim]
+    parts = [_of_cells(body, u, own.name, own.word, some, large, heated) for some in blocks]
+    return [np.concatenate(column) for column in zip(*parts, strict=True)]
+
+
+def _for_pieces(own: OwnCells, found: list[np.ndarray], width: int) -> list[np.ndarray]:
+    """What was found in cells (nc, q, ...), for their pieces (np, width, ...): points are repeated
+    up to the width, and their volumes shared.
+    """
+    places, volume, stress = found
+    again = np.arange(width) % volume.shape[1]
+    share = np.bincount(own.owner)[own.owner][:, None] * np.bincount(again)[again]
+    return [
+        places[own.owner][:, again],
+        volume[own.owner][:, again] / share,
+        stress[own.owner][:, again],
     ]
-    return GaussStress(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 
 def nodal_stress(
@@ -88,19 +142,23 @@ def nodal_stress(
     A node between two materials takes the mean of the material with the larger von Mises stress
     there.
     """
-    found = gauss_stress(body, u, large, heated)
-    out = np.zeros((len(body.mesh.points), 6), found.stress.dtype)
-    largest = np.full(len(out), -1.0)
-    start = 0
+    _check_field(body, u, large)
+    n = len(body.mesh.points)
+    out = np.zeros((n, 6), np.result_type(u, float))
+    largest = np.full(n, -1.0)
     for name in body.material:
-        cells = body.mesh.bodies[name]
-        part = slice(start, start + len(cells))
-        start += len(cells)
-        at_nodes = np.einsum(
-            "kq,cqs->cks", extrapolation_matrix(body.mesh.cell_type), found.stress[part]
-        )
-        mean = _average_at_nodes(cells, at_nodes, found.volume[part].sum(1), len(out))
-        size = np.where(np.bincount(cells.ravel(), minlength=len(out)) > 0, von_mises(mean), -1.0)
+        weight = np.zeros(n)
+        total = np.zeros_like(out)
+        for own in solved_cells(body):
+            if own.name != name:
+                continue
+            _, volume, stress = _all_cells(body, u, own, large, heated)
+            at_nodes = np.einsum("kq,cqs->cks", extrapolation_matrix(own.word), stress)
+            size = volume.sum(axis=1)
+            weight += np.bincount(own.cells.ravel(), np.repeat(size, own.cells.shape[1]), n)
+            np.add.at(total, own.cells, at_nodes * size[:, None, None])
+        mean = total / np.maximum(weight, np.finfo(float).tiny)[:, None]
+        size = np.where(weight > 0, von_mises(mean), -1.0)
         better = size > largest
         out[better], largest[better] = mean[better], size[better]
     return out
@@ -114,13 +172,15 @@ def stress_jumps(
     """(n_points,) largest von Mises stress of the differences between the cells at a node and the
     recovered stress there [Pa].
     """
-    found = gauss_stress(body, u)
-    matrix = extrapolation_matrix(body.mesh.cell_type)
+    _check_field(body, u, False)
+    u = np.asarray(u)[:, : body.dim]
     jumps = np.zeros(len(body.mesh.points))
-    cells = np.vstack([body.mesh.bodies[name] for name in body.material])
-    for some in np.array_split(np.arange(len(cells)), len(cells) // CELLS_PER_BLOCK + 1):
-        at_nodes = np.einsum("kq,cqs->cks", matrix, found.stress[some])
-        np.maximum.at(jumps, cells[some], von_mises(at_nodes - recovered[cells[some]]))
+    for own in solved_cells(body):
+        matrix = extrapolation_matrix(own.word)
+        for cells in np.array_split(own.cells, len(own.cells) // CELLS_PER_BLOCK + 1):
+            *_, stress = _of_cells(body, u, own.name, own.word, cells, False)
+            at_nodes = np.einsum("kq,cqs->cks", matrix, stress)
+            np.maximum.at(jumps, cells, von_mises(at_nodes - recovered[cells]))
     return jumps
 
 
@@ -139,25 +199,30 @@ def patch_stress(
     places = []
     stresses = []
     at_node = []
-    for name in body.material:
-        cells = mesh.bodies[name]
-        near = cells[(cells == node).any(axis=1)]
-        if not len(near):
+    own = solved_cells(body)
+    near = {
+        name: np.concatenate(
+            [o.cells[(o.cells == node).any(axis=1)].ravel() for o in own if o.name == name]
+        )
+        for name in body.material
+    }
+    for o in own:
+        some = o.cells[np.isin(o.cells, near[o.name]).any(axis=1)]
+        if not len(some):
             continue
-        some = cells[np.isin(cells, near).any(axis=1)]
-        at, _, stress = _of_cells(body, np.asarray(u)[:, : body.dim], name, some, False)
+        at, _, stress = _of_cells(body, np.asarray(u)[:, : body.dim], o.name, o.word, some, False)
         places.append(at.reshape(-1, 3)[:, : body.dim])
         stresses.append(stress.reshape(-1, 6))
         at_node.append(np.repeat((some == node).any(axis=1), at.shape[1]))
     x = np.concatenate(places) - mesh.points[node, : body.dim]
     x = x / np.abs(x).max()
     values = np.concatenate(stresses)
-    own = np.concatenate(at_node)
+    here = np.concatenate(at_node)
     linear = np.column_stack([np.ones(len(x)), x])
     squares = [x[:, i] * x[:, j] for i in range(body.dim) for j in range(i, body.dim)]
     quadratic = np.column_stack([linear, *squares])
     weight = 1 / (MIN_SQUARED_DISTANCE + (x**2).sum(axis=1))[:, None]
-    first = np.linalg.lstsq(linear[own], values[own], rcond=None)[0][0]
+    first = np.linalg.lstsq(linear[here], values[here], rcond=None)[0][0]
     second = np.linalg.lstsq(quadratic * weight, values * weight, rcond=None)[0][0]
     return first, second
 
@@ -233,6 +298,7 @@ def _of_cells(
     body: Body,
     u: np.ndarray,
     name: str,
+    word: str,
     cells: np.ndarray,
     large: bool,
     heated: bool = False,
@@ -240,8 +306,8 @@ def _of_cells(
     """Places, volumes and stresses at the Gauss points of some cells of one material."""
     mesh = body.mesh
     d = body.dim
-    at, w = _best_points(mesh.cell_type)
-    values, gradients = shape.tabulate(mesh.cell_type, at)
+    at, w = best_points(word)
+    values, gradients = tabulate(word, at)
     tangents = np.einsum("ckg,qkd->cqgd", mesh.points[cells][:, :, :d], gradients)
     volume = np.abs(np.linalg.det(tangents)) * w * (mesh.depth if d == 2 else 1.0)
     slope = np.einsum(
@@ -276,23 +342,27 @@ def element_stress(
     body: Body,
     u: np.ndarray,
     name: str,
+    word: str,
     cells: np.ndarray,
+    rule: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Stresses of several real displacement fields at once, in some cells of one material.
 
     Args:
         u: (n_points, dim, m) displacements [m].
-        cells: (nc, k) of the body's material ``name``.
+        cells: (nc, k) of the body's material ``name``, of the shape ``word``.
+        rule: places (q, d) and weights (q,) in the unit cell; those of `gauss_stress` when left
+            out.
 
     Returns:
-        volumes (nc,) [m^3], and stresses (nc, q, m, 6) at the points of `gauss_stress` [Pa].
+        volumes (nc, q) [m^3] and stresses (nc, q, m, 6) [Pa] at the points.
     """
     d = body.dim
-    at, weight = _best_points(body.mesh.cell_type)
-    values, gradients = shape.tabulate(body.mesh.cell_type, at)
+    at, weight = rule or best_points(word)
+    values, gradients = tabulate(word, at)
     tangents = np.einsum("ckg,qkd->cqgd", body.mesh.points[cells][:, :, :d], gradients)
     depth = body.mesh.depth if d == 2 else 1.0
-    volume = (np.abs(np.linalg.det(tangents)) * weight * depth).sum(axis=1)
+    volume = np.abs(np.linalg.det(tangents)) * weight * depth
     # (nc, q, k, d) gradients of the shape functions in space
     spatial = gradients @ np.linalg.inv(tangents)
     slope = np.einsum("ckim,cqkj->cqmij", u[cells], spatial, optimize=True)
@@ -319,15 +389,22 @@ def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
 
 
 @cache
-def _best_points(cell_type: str) -> tuple[np.ndarray, np.ndarray]:
-    """Gauss points of degree 2 (p - 1): one for first-order simplices, four in a tetra10, eight in
-    a hexahedron27.
+def best_points(word: str) -> tuple[np.ndarray, np.ndarray]:
+    """Gauss points of degree 2 (p - 1): one for cells of first order, four in a tetra10, eight in a
+    hexahedron27 and a pyramid14, six in a wedge18.
     """
-    kind, degree = shape.SHAPES[cell_type]
-    if kind in ("tetra", "triangle") and degree == 2:
+    kind, degree = FAMILY[word], order_of(word)
+    if degree == 2 and kind in ("tetra", "triangle"):
         return _four_points(len(shape.reference_nodes(kind)))
-    return shape.quadrature(
-        kind, 2 * (degree - 1) if kind in ("tetra", "triangle") else 2 * degree - 1
+    if kind == "wedge" and degree == 2:
+        flat, area = _four_points(3)
+        line, length = shape.quadrature("line", 2)
+        at = np.array([(*a, *z) for a in flat for z in line])
+        return at, np.outer(area, length).ravel()
+    if kind == "pyramid":
+        return pyramid_rule(degree)
+    return quadrature(
+        kind, 2 * (degree - 1) if kind in ("tetra", "triangle", "wedge") else 2 * degree - 1
     )
 
 
@@ -344,27 +421,14 @@ def _four_points(corners: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def extrapolation_matrix(cell_type: str) -> np.ndarray:
+def extrapolation_matrix(word: str) -> np.ndarray:
     """(k, q) from the points of `gauss_stress` to the nodes of a cell, by the polynomial that the
     points determine.
     """
-    kind = shape.SHAPES[cell_type][0]
-    at, _ = _best_points(cell_type)
-    target = shape.reference_nodes(cell_type)
+    kind = FAMILY[word]
+    at, _ = best_points(word)
+    target = reference_nodes(word)
     if len(at) == 1:
         return np.ones((len(target), 1))
-    lower, _ = shape.tabulate(kind, at)
-    return shape.tabulate(kind, target)[0] @ np.linalg.pinv(lower)
-
-
-def _average_at_nodes(
-    cells: np.ndarray,
-    values: np.ndarray,
-    weight: np.ndarray,
-    n: int,
-) -> np.ndarray:
-    """(n, s) weighted mean of what the cells (nc, k) say about their nodes (nc, k, s)."""
-    total = np.bincount(cells.ravel(), np.repeat(weight, cells.shape[1]), n)
-    out = np.zeros((n, values.shape[2]), values.dtype)
-    np.add.at(out, cells, values * weight[:, None, None])
-    return out / np.maximum(total, 1e-300)[:, None]
+    lower, _ = tabulate(kind, at)
+    return np.asarray(tabulate(kind, target)[0] @ np.linalg.pinv(lower))

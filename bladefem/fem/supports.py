@@ -14,6 +14,7 @@ from ..errors import InputError, suggestion
 from . import shape_functions as shape
 from .body import Body
 from .compat import PETSc
+from .loads import facets_by_shape
 
 # directions along fixed axes
 FIXED_DIRECTIONS = {"x": 0, "y": 1, "z": 2, "a": 2}
@@ -188,10 +189,19 @@ def _of_face(body: Body, spring: AreaSpring) -> sp.csr_matrix:
         )
     facets = mesh.faces[spring.face]
     facets = facets[(body.rows[facets] >= 0).all(axis=1)]
+    n = body.rows.size * body.dim
+    total = sp.csr_matrix((n, n))
+    for word, some in facets_by_shape(body, facets):
+        total = total + _of_facets(body, spring, word, some)
+    return total
+
+
+def _of_facets(body: Body, spring: AreaSpring, word: str, facets: np.ndarray) -> sp.csr_matrix:
+    """The part of facets (nf, k) of one shape."""
+    mesh = body.mesh
     d = body.dim
-    kind = shape.FACET_OF[mesh.cell_type]
     values, tangents, weights = shape.geometry(
-        kind, mesh.points[facets][:, :, :d], QUADRATURE_DEGREE
+        word, mesh.points[facets][:, :, :d], QUADRATURE_DEGREE
     )
     if d == 3:
         normal = np.cross(tangents[..., 0], tangents[..., 1])

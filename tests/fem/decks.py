@@ -2,12 +2,15 @@
 them are solved by CalculiX too (``benchmarks/fem_decks.py``).
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import mixed
 import numpy as np
 from structured import box, sector
 
+from bladefem.fem.refinement import refine_uniformly
 from geometry.topology import EDGES, FAMILY, facet_nodes
+from geometry.whole_cells import own_cells
 
 SECTORS = 12
 ABAQUS = {
@@ -39,9 +42,9 @@ class Model:
     faces: dict
 
 
-def model(kind):
+def model(kind, divisions=None):
     """ "c3d20", "c3d15_c3d20" (every second column of hexahedra cut in wedges), "c3d10" or
-    "c3d4".
+    "c3d4"; ``divisions`` are those of hexahedra.
     """
     if kind in ("c3d10", "c3d4"):
         mesh = sector(SECTORS, (4, 3, 2), "tetra10", bump=0.2, straight=kind == "c3d4")
@@ -49,7 +52,7 @@ def model(kind):
         if kind == "c3d4":
             return _model(mesh, [("tetra", cells[:, :4])])
         return _model(mesh, [("tetra10", cells)])
-    divisions = (5, 4, 2) if kind == "c3d20" else (9, 6, 4)
+    divisions = divisions or ((5, 4, 2) if kind == "c3d20" else (9, 6, 4))
     mesh = sector(SECTORS, divisions, "hexahedron27", bump=0.1)
     cells = mesh.bodies["blade"]
     if kind == "c3d20":
@@ -336,3 +339,66 @@ def facets_on(m, nodes):
     word, cells = m.blocks[0]
     every = cells[:, np.array(facet_nodes(word))].reshape(-1, len(facet_nodes(word)[0]))
     return every[np.isin(every, nodes).all(axis=1)]
+
+
+# corners of the faces that a pressure P1, P2, ... is on in CalculiX
+PRESSED_FACES = {
+    "hexahedron": [
+        *[(0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0)]
+    ],
+    "wedge": [(0, 1, 2), (3, 4, 5), (0, 1, 4, 3), (1, 2, 5, 4), (2, 0, 3, 5)],
+}
+PRESSURE = 1e6
+
+
+def pressed_mesh(halvings):
+    """An open sector of hexahedra and wedges, clamped at its bore, in halves."""
+    divisions = (4, 3, 2)
+    cubes = sector(SECTORS, divisions, "hexahedron27", bump=0.1)
+    mesh = mixed.cut(cubes, divisions, lambda i, j: "hw"[(i + j) % 2])
+    mesh = replace(mesh, pairs={}, sector=None)
+    for _ in range(halvings):
+        mesh = refine_uniformly(mesh)
+    return mesh
+
+
+def serendipity_blocks(mesh):
+    """Hexahedra and wedges of a mixed mesh as C3D20 and C3D15 on the same nodes."""
+    return [
+        ("hexahedron20", own.cells[:, :20])
+        if own.word == "hexahedron27"
+        else ("wedge15", own.cells[:, :15])
+        for own in own_cells(mesh, ("blade",))
+    ]
+
+
+def halved_model(mesh, halvings):
+    """A sector of hexahedra and wedges in halves, for CalculiX."""
+    for _ in range(halvings):
+        mesh = refine_uniformly(mesh)
+    return _model(mesh, serendipity_blocks(mesh))
+
+
+def pressed_job(mesh):
+    """The nodes of C3D20 and C3D15 in the same places, and a deck of them under pressure outside."""
+    blocks = serendipity_blocks(mesh)
+    used = np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+    number = np.full(len(mesh.points), -1)
+    number[used] = np.arange(len(used))
+    clamp, outside = (number[np.intersect1d(mesh.faces[name], used)] for name in ("clamp", "x1"))
+    m = Model(mesh.points[used], [(w, number[c]) for w, c in blocks], {"clamp": clamp}, {})
+    loads = []
+    first = 1
+    for word, cells in m.blocks:
+        for i, corners in enumerate(PRESSED_FACES[FAMILY[word]], 1):
+            rows = np.flatnonzero(np.isin(cells[:, corners], outside).all(axis=1))
+            loads += [f"{first + row}, P{i}, {PRESSURE}" for row in rows]
+        first += len(cells)
+    lines = [
+        *flat_deck(m, {}),
+        *["*MATERIAL, NAME=STEEL", "*ELASTIC", "2.1e11, 0.3"],
+        *["*SOLID SECTION, ELSET=EALL, MATERIAL=STEEL", "*BOUNDARY", "clamp, 1, 3"],
+        *["*STEP", "*STATIC", "*DLOAD", *loads],
+        *["*NODE FILE", "U", "*EL FILE", "S", "*END STEP\n"],
+    ]
+    return used, "\n".join(lines)

@@ -1,5 +1,6 @@
 """Meshes of mixed shapes without a mesher, and CalculiX's own elements assembled in NumPy."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
@@ -9,14 +10,16 @@ from bladefem.fem import shape_functions as shape
 from geometry.mesh import Mesh
 from geometry.raw_mesh import RawMesh
 from geometry.solid_cells import solid_cells
-from geometry.topology import EDGES
+from geometry.topology import EDGES, QUADS, boundary_facets, outward_faces
 
 HEXAHEDRON = shape.reference_nodes("hexahedron").astype(int)
 
 
-def row(size=(0.5, 0.1, 0.1), map=None):
-    """Five cubes in a row along x, of second order: a hexahedron, two wedges, five pyramids with
-    two tetrahedra, a hexahedron, two wedges. Faces "clamp" (x = 0) and "end".
+def row(size=(0.5, 0.1, 0.1), map=None, order=2, corners_to=None):
+    """Five cubes in a row along x: a hexahedron, two wedges, five pyramids with two tetrahedra, a
+    hexahedron, two wedges. Node sets "clamp" (x = 0) and "end", faces x0, x1, y0, ...
+
+    ``map`` moves all nodes, ``corners_to`` the corners, and leaves edges straight (x -> x).
     """
     grid = list(product(range(6), (0, 1), (0, 1)))
     points = np.array([*grid, (2.5, 0.5, 0.5)], float)
@@ -40,16 +43,87 @@ def row(size=(0.5, 0.1, 0.1), map=None):
         ("pyramid", np.array([[*(h[k] for k in side), apex] for side in sides])),
         ("tetra", np.array([[top[0], top[2], top[1], apex], [top[0], top[3], top[2], apex]])),
     ]
-    solids = solid_cells(RawMesh(points, blocks, {}, {}), "row", "promote", np.array([0, 0, 1.0]))
-    points = solids.points / [5, 1, 1] * size
+    how = "promote" if order == 2 else "keep"
+    solids = solid_cells(RawMesh(points, blocks, {}, {}), "row", how, np.array([0, 0, 1.0]))
+    points = places = solids.points / [5, 1, 1] * size
+    if corners_to is not None:
+        moved = RawMesh(corners_to(points[: len(grid) + 1]), blocks, {}, {})
+        solids = solid_cells(moved, "row", how, np.array([0, 0, 1.0]))
+        places = solids.points
     on = {"clamp": points[:, 0] == 0, "end": points[:, 0] == size[0]}
+    skin = boundary_facets(solids.cells, solids.cell_type)
+    faces = {
+        f"{'xyz'[i]}{side}": skin[(points[skin, i] == side * size[i]).all(axis=1)]
+        for i in range(3)
+        for side in (0, 1)
+    }
     return Mesh(
-        points if map is None else map(points),
+        places if map is None else map(places),
         solids.cell_type,
         {"blade": _positive(solids.points, solids.cells)},
+        {n: outward_faces(places, solids.cells, solids.cell_type, f) for n, f in faces.items()},
         nodes={name: np.flatnonzero(there) for name, there in on.items()},
         whole={"blade": solids.whole},
     )
+
+
+def cut(mesh, divisions, pattern):
+    """A mesh of hexahedra of 27 nodes whose columns (i, j), all along the last direction, stay "h",
+    become two wedges "w" or six pyramids "p" each, by ``pattern(i, j)``. Geometry stays.
+    """
+    cells = mesh.bodies["blade"]
+    i, j, _ = np.unravel_index(np.arange(len(cells)), divisions)
+    kind = np.array([pattern(a, b) for a, b in zip(i, j, strict=True)])
+    low = {frozenset(pair): 8 + n for n, pair in enumerate(EDGES["hexahedron"])}
+    low |= {frozenset(quad): 20 + n for n, quad in enumerate(QUADS["hexahedron"])}
+    low |= {frozenset((0, 2)): 20, frozenset((4, 6)): 25}
+    # the middle of what a wedge's third quadrilateral is
+    low |= {frozenset((0, 2, 6, 4)): 26}
+    wedges = []
+    for half in ((0, 1, 2), (0, 2, 3)):
+        corners = [*half, *(c + 4 for c in half)]
+        groups = [*EDGES["wedge"], *QUADS["wedge"]]
+        local = [*corners, *(low[frozenset(corners[c] for c in group)] for group in groups)]
+        wedges.append(cells[kind == "w"][:, local])
+    points, pyramids = mesh.points, []
+    some = cells[kind == "p"]
+    values, _ = shape.tabulate("hexahedron27", (HEXAHEDRON + 0.5) / 2)
+    new = np.einsum("qk,ckd->cqd", values, points[some])
+    number = len(points) + np.arange(8 * len(some)).reshape(-1, 8)
+    points = np.vstack([points, new.reshape(-1, 3)])
+    for quad in QUADS["hexahedron"]:
+        columns = [some[:, c] for c in quad] + [some[:, 26]]
+        for a, b in EDGES["pyramid"]:
+            columns.append(
+                number[:, quad[a]] if b == 4 else some[:, low[frozenset((quad[a], quad[b]))]]
+            )
+        columns.append(some[:, low[frozenset(quad)]])
+        pyramids.append(np.column_stack(columns))
+    blocks = [
+        ("hexahedron27", cells[kind == "h"]),
+        ("wedge18", np.vstack(wedges)),
+        ("pyramid14", np.vstack(pyramids)),
+    ]
+    blocks = [(word, found) for word, found in blocks if len(found)]
+    solids = solid_cells(RawMesh(points, blocks, {}, {}), "cut", "refuse", np.array([0, 0, 1.0]))
+    skin = boundary_facets(solids.cells, solids.cell_type)
+    faces = {}
+    for name, facets in mesh.faces.items():
+        found = skin[np.isin(skin, facets).all(axis=1)]
+        faces[name] = outward_faces(points, solids.cells, solids.cell_type, found)
+    return replace(
+        mesh,
+        points=points,
+        cell_type=solids.cell_type,
+        bodies={"blade": _positive(points, solids.cells)},
+        faces=faces,
+        whole={"blade": solids.whole},
+    )
+
+
+def chequered(i, j):
+    """All three shapes beside each other."""
+    return "hwp"[(i + 2 * j) % 3]
 
 
 def _positive(points, cells):

@@ -6,7 +6,7 @@ from structured import sector
 
 from bladefem.errors import InputError
 from bladefem.fem.compat import MPI
-from bladefem.fem.groups import group_size, shared_out
+from bladefem.fem.groups import group_size, shared_out, size_for_few
 from bladefem.fem.memory import modal_solve_memory
 from bladefem.scene.tables import Scene
 from bladefem.study.pipeline.bodies import Bodies
@@ -57,6 +57,17 @@ def test_ranks_share_a_sector_that_is_large_enough():
     assert group_size(comm, 139_341, free=1e12) == several
     # two whole sectors before two halves
     assert group_size(comm, 78_000, free=1e12) == 1
+
+
+def test_few_diameters_are_solved_by_all_ranks_of_a_large_sector():
+    """Three are no even share of two ranks; many are, and small sectors are better whole."""
+    assert size_for_few(1, 2, 3, 74_000) == 2
+    assert size_for_few(1, 2, 5, 74_000) == 2
+    assert size_for_few(1, 2, 6, 74_000) == 1
+    assert size_for_few(1, 2, 3, 40_000) == 1
+    assert size_for_few(1, 4, 3, 74_000) == 1
+    assert size_for_few(2, 4, 3, 200_000) == 4
+    assert size_for_few(1, 1, 1, 74_000) == 1
 
 
 def test_results_of_groups_come_one_by_one_and_in_order():

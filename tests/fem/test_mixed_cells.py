@@ -20,9 +20,8 @@ from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.held_part import part_above
 from bladefem.fem.loads import body_mass, centrifugal
-from bladefem.fem.mixed_cells import cells_by_shape, drawn_nodes
+from bladefem.fem.mixed_cells import drawn_nodes
 from bladefem.fem.modes import modes
-from bladefem.fem.refinement import refine_uniformly
 from bladefem.fem.rotation import (
     body_under_rotation,
     linear_tangent,
@@ -32,6 +31,7 @@ from bladefem.fem.rotation import (
 from bladefem.fem.temperature import Temperatures
 from bladefem.scene.tables import Material
 from geometry.imported import read_mesh
+from geometry.whole_cells import own_cells
 
 GOLDEN = json.loads((Path(__file__).parent / "ccx_decks.json").read_text())
 STEEL = Material()
@@ -50,9 +50,13 @@ def dense(body, matrix):
     return sp.csr_matrix((values, columns, starts), matrix.getSize())[rows][:, rows]
 
 
+def cells_by_shape(mesh):
+    return {own.word: own.cells for own in own_cells(mesh, ("blade",))}
+
+
 def test_all_shapes_are_there():
     mesh = row()
-    count = {word: len(cells) for word, cells in cells_by_shape(mesh.whole["blade"]).items()}
+    count = {word: len(cells) for word, cells in cells_by_shape(mesh).items()}
     assert count == {"hexahedron27": 2, "wedge18": 4, "pyramid14": 5, "tetra10": 2}
     body = assemble(mesh, "blade", STEEL)
     assert len(body.pieces) == 4 and (body.rows >= 0).all()
@@ -62,7 +66,7 @@ def test_all_shapes_are_there():
 def test_nodes_drawn_together_hold_quadratic_fields(word):
     """In each straight cell, at the places where its nodes lie."""
     body = assemble(row(map=skew), "blade", STEEL)
-    cells = cells_by_shape(body.mesh.whole["blade"])[word]
+    cells = cells_by_shape(body.mesh)[word]
     x = body.mesh.points[cells] / 0.1
     T = drawn_nodes(word)
     at = np.einsum("nk,ckd->cnd", T, x)
@@ -224,10 +228,8 @@ def test_parts_keep_whole_cells():
     part, held = part_above(mesh, 0.15)
     assert len(part.whole["blade"]) == len(part.bodies["blade"]) < len(mesh.bodies["blade"])
     # the wedges that reach across it are there with all their pieces
-    count = {word: len(cells) for word, cells in cells_by_shape(part.whole["blade"]).items()}
+    count = {word: len(cells) for word, cells in cells_by_shape(part).items()}
     assert count["wedge18"] == 4 and len(held)
-    fine = refine_uniformly(mesh)
-    assert not fine.whole and len(fine.bodies["blade"]) == 8 * len(mesh.bodies["blade"])
 
 
 def test_a_wedge_that_is_turned_over():

@@ -105,3 +105,18 @@ def test_a_block_is_recombined_in_its_own_memory(dtype):
     np.testing.assert_allclose(out, expected, atol=1e-13)
     assert np.shares_memory(out, W)
     assert out.flags.f_contiguous
+
+
+def test_a_shifted_stiffness_is_the_sum(body):
+    """Mass is added in the place of the stiffness; where its pattern is another one, as a sum."""
+    opened = transformation(body, cyclic=True).opened
+    found = entries_of_sum(opened.K, -3e7, opened.M)
+    expected = entries(opened.K) - 3e7 * entries(opened.M)
+    assert found.nnz == entries(opened.K).nnz
+    assert abs(found - expected).max() <= 1e-14 * abs(expected).max()
+    assert abs(entries(opened.K) - opened.K.whole[opened.K.chosen][:, opened.K.chosen]).max() == 0
+    few, _ = KINDS["selected"]
+    several, dense = KINDS["repeated"]
+    np.testing.assert_allclose(
+        entries_of_sum(few, -2.0, several).toarray(), entries(few).toarray() - 2 * dense
+    )

@@ -2,8 +2,11 @@
 mass.
 """
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
+import decks
 import numpy as np
 import pandas as pd
 import pytest
@@ -162,6 +165,31 @@ def test_a_mesh_of_a_file_is_halved(tmp_path):
     assert (true > 1e-3).all() and (true < 1.2 * row["given_error"]).all()
     assert (row["given_error"] < 4 * true).all()
     assert (row["error"] < row["given_error"]).all()
+
+
+def test_cells_of_mixed_shapes_are_halved(tmp_path):
+    """As what they are: the finest mesh has CalculiX's frequencies on the same nodes (C3D15 and
+    C3D20, ``python benchmarks/fem_decks.py``).
+    """
+    model = decks.model("c3d15_c3d20", (4, 3, 2))
+    tip = np.flatnonzero(np.hypot(*model.points[:, :2].T) > 0.2499)
+    model.node_sets["tip"] = tip
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(model, {})))
+    tables = {
+        "kind": "imported",
+        "imported": {"file": str(tmp_path / "a.inp"), "sectors": decks.SECTORS},
+        "operation": {"stiffening": False},
+        "excitation": {"at": "tip"},
+    }
+    found = mesh_convergence(scene_of(tables), [], [2], count=5)
+    assert list(found.points["cells"].unique()) == [36, 288, 2304]
+    assert found.points["size"].unique()[0] == pytest.approx(4 * found.points["size"].unique()[2])
+    row = found.summary
+    golden = json.loads((Path(decks.__file__).parent / "ccx_decks.json").read_text())["halved"]
+    np.testing.assert_allclose(row["frequency"], golden[:5], rtol=2e-4)
+    assert (row["reason"] == "").all() and row["order"].between(1.5, 4.5).all()
+    # coarse elements are too stiff, and the finest ones by less
+    assert (row["given_error"] > 5 * row["error"]).all()
 
 
 def test_two_meshes_show_no_order():

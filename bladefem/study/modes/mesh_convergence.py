@@ -25,6 +25,7 @@ import pandas as pd
 from scipy.optimize import brentq, linear_sum_assignment, minimize_scalar
 
 from geometry.mesh import Mesh
+from geometry.whole_cells import own_cells
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -125,14 +126,10 @@ def _halved_mesh_convergence(
     comm: Communicator | None,
     progress: Progress,
 ) -> Convergence:
-    """A given mesh, its half, and the half of that where this is small enough.
-
-    Cells of mixed shapes stand as the tetrahedra into which they are split: refined meshes know no
-    others, and differences of two kinds of elements would tell nothing of either.
-    """
+    """A given mesh, its half, and the half of that where this is small enough."""
     from ...fem.refinement import refine_uniformly
 
-    meshes = [replace(build_mesh(scene, comm), whole={})]
+    meshes = [build_mesh(scene, comm)]
     while len(meshes) < MAX_HALVED_MESHES and (
         len(meshes) == 1 or blade_dofs(meshes[-1]) <= MAX_DOFS_HALVED_AGAIN
     ):
@@ -208,7 +205,7 @@ def _mesh_rows(
     return pd.DataFrame(
         {
             "size": element_size(mesh, "blade"),
-            "cells": len(mesh.bodies["blade"]),
+            "cells": sum(len(own.cells) for own in own_cells(mesh, ("blade",))),
             "dofs": mesh.dimension * len(np.unique(mesh.bodies["blade"])),
             **diameter,
             "mode": np.arange(1, len(numbers) + 1),
@@ -228,7 +225,9 @@ def default_sizes(scene: Scene) -> list[float]:
 
 
 def element_size(mesh: Mesh, body: str) -> float:
-    """Side of a cube (square) as large as the mean cell [m]."""
+    """Side of a cube (square) as large as the mean cell [m]; of cells of mixed shapes, whose number
+    a halved mesh does not tell, the mean piece: a halved mesh has half the size.
+    """
     from ...fem.loads import body_volume
 
     d = mesh.dimension

@@ -11,7 +11,7 @@ from ...data import ModeSet
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
-from .bodies import Bodies, is_wheel, on_one_rank
+from .bodies import Bodies, blade_dofs, is_wheel, on_one_rank
 
 # dolfinx is slow to load: the functions below import it when they run
 if TYPE_CHECKING:
@@ -96,13 +96,14 @@ def wheel_modes(
     Args:
         diameters: 0 to N/2 when left out.
         direct: solve every nodal diameter from scratch.
-        group: ranks in a group; as many as share a sector well when left out.
+        group: ranks in a group; as many as share a sector well when left out, all ranks for few
+            nodal diameters.
         reduced: modes that a reduction will need, kept with the bodies where these have the ranks
             that the reduction will have.
     """
     from ...fem.all_diameters import KeptPairs, all_diameters
     from ...fem.compat import MPI
-    from ...fem.groups import shared_out
+    from ...fem.groups import shared_out, size_for_few
 
     comm = bodies.comm or MPI.COMM_WORLD
     sectors = sector_of(bodies.mesh).count
@@ -119,6 +120,9 @@ def wheel_modes(
         return found
 
     size = group or bodies.ranks_of_sector
+    if group is None and not reduced:
+        # a reduction wants what its own groups have solved
+        size = size_for_few(size, comm.size, len(wanted), blade_dofs(bodies.mesh))
     if size == comm.size:
         # one group: each rank has the results already
         return of_some(comm, wanted)

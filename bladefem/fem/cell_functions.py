@@ -1,0 +1,114 @@
+"""Shape functions and quadrature of the cells as they are solved: `shape_functions`, and those of
+wedges and pyramids, which are hexahedra with nodes drawn together (`mixed_cells`).
+
+Unit cells: a wedge is the triangle x, y >= 0, x + y <= 1 times 0 <= z <= 1, a pyramid 0 <= x, y <=
+1 - z. The hexahedron whose nodes are drawn together has the coordinates x / (1 - y), y, z and
+x / (1 - z), y / (1 - z), z.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import product
+
+import numpy as np
+
+from geometry.topology import CORNERS, EDGES, FAMILY, NODES, QUADS
+
+from ..util.arrays import RealArray
+from . import shape_functions as shape
+from .mixed_cells import HEXAHEDRON_OF, drawn_nodes
+
+UNIT_CORNERS: dict[str, list[tuple[int, int, int]]] = {
+    "wedge": [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (0, 1, 1)],
+    "pyramid": [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1)],
+}
+
+
+def is_drawn(word: str) -> bool:
+    """Whether a cell's nodes are those of a hexahedron drawn together."""
+    return word in HEXAHEDRON_OF
+
+
+def order_of(word: str) -> int:
+    """1 or 2, of a cell given by meshio's word."""
+    return 1 if NODES[word] == CORNERS[FAMILY[word]] else 2
+
+
+@cache
+def reference_nodes(word: str) -> RealArray:
+    """(k, d) nodes in the unit cell."""
+    if not is_drawn(word):
+        return np.asarray(shape.reference_nodes(word))
+    family = FAMILY[word]
+    return straight_nodes(word, np.array(UNIT_CORNERS[family], float))
+
+
+def straight_nodes(word: str, corner: RealArray) -> RealArray:
+    """(k, d) nodes of a straight cell by its corners; quadrilaterals are parallelograms."""
+    family = FAMILY[word]
+    if order_of(word) == 1:
+        return corner
+    groups = [*EDGES[family], *QUADS.get(family, [])]
+    middle = [corner[list(group)].mean(axis=0) for group in groups]
+    centre = [corner.mean(axis=0)] if family == "hexahedron" else []
+    return np.array([*corner, *middle, *centre])
+
+
+def tabulate(word: str, at: RealArray) -> tuple[RealArray, RealArray]:
+    """Values (q, k) and gradients (q, k, d) of the shape functions at places (q, d) of the unit
+    cell; gradients where nodes are drawn together are not defined.
+    """
+    if not is_drawn(word):
+        return shape.tabulate(word, at)
+    x, y, z = at.T
+    # the coordinate that shrinks the others; at its end these are zero as well
+    shrinking = 1 if FAMILY[word] == "wedge" else 2
+    left = 1 - at[:, shrinking]
+    safe = np.where(left > 0, left, 1.0)
+    drawn = [x / safe, y, z] if shrinking == 1 else [x / safe, y / safe, z]
+    cube, slope = shape.tabulate(HEXAHEDRON_OF[word], np.column_stack(drawn))
+    # (q, 3, 3) of the hexahedron's coordinates by the unit cell's
+    change = np.tile(np.eye(3), (len(at), 1, 1))
+    for i in range(shrinking):
+        change[:, i, i] = 1 / safe
+        change[:, i, shrinking] = drawn[i] / safe
+    T = drawn_nodes(word)
+    return cube @ T, np.einsum("qmi,mk,qij->qkj", slope, T, change, optimize=True)
+
+
+@cache
+def quadrature(family: str, degree: int) -> tuple[RealArray, RealArray]:
+    """Places (q, d) and weights (q,) exact for polynomials of the degree on the unit cell."""
+    if family == "wedge":
+        flat, area = shape.quadrature("triangle", degree)
+        line, length = shape.quadrature("line", degree)
+        at = np.array([(*a, *z) for a, z in product(flat, line)])
+        return at, np.outer(area, length).ravel()
+    if family == "pyramid":
+        return pyramid_rule(degree // 2 + 1)
+    return shape.quadrature(family, degree)
+
+
+def pyramid_rule(n: int) -> tuple[RealArray, RealArray]:
+    """n**3 places and weights exact for polynomials of degree 2 n - 1 on the unit pyramid."""
+    side, width = shape.gauss_rule(n, 0)
+    high, height = shape.gauss_rule(n, 2)
+    at = np.array([(x * (1 - z), y * (1 - z), z) for z, y, x in product(high, side, side)])
+    return at, np.array([np.prod(w) for w in product(height, width, width)])
+
+
+def geometry(word: str, x: RealArray, degree: int) -> tuple[RealArray, RealArray, RealArray]:
+    """Quadrature on curved cells, see `shape_functions.geometry`.
+
+    Args:
+        x: (nc, k, g) node coordinates.
+
+    Returns:
+        values (q, k), tangents (nc, q, g, d), reference weights (q,).
+    """
+    at, w = quadrature(FAMILY[word], degree)
+    values, gradients = tabulate(word, at)
+    # (nc, g, q, d)
+    tangents = np.asarray(np.tensordot(x, gradients, axes=([1], [1])), float)
+    return values, tangents.transpose(0, 2, 1, 3), w
