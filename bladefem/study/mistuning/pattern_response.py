@@ -220,9 +220,11 @@ def chosen_peak(
     harmonic: int,
     options: Options,
     wanted: float | None,
+    most: int = MOST_HARMONICS,
 ) -> ChosenPeak:
     """The peak with as many harmonics and samples as its error asks for; the arguments are those of
-    `pattern_response`, `first` the harmonics and samples to begin with.
+    `pattern_response`, `first` the harmonics and samples to begin with, `most` harmonics of the
+    engine order.
     """
     H, samples = first
     while True:
@@ -232,7 +234,7 @@ def chosen_peak(
         # of NaN nothing says that richer settings are solved
         enough = wanted is None or not any(change > wanted for change in changes)
         more = richer_balance(wheel, H, samples)
-        if enough or more[0] > MOST_HARMONICS * harmonic:
+        if enough or more[0] > most * harmonic:
             return ChosenPeak(peak, solution, H, samples, changes[-1])
         H, samples = more
 
@@ -262,11 +264,13 @@ def _peak_of_pattern(
     peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
     omega = peak.omega / harmonic
     solution = solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
-    changes = []
+    changes: list[float] = []
     point = solution
     for more in judging_balances(wheel, H, samples):
         if point.converged:
-            point = solve_wheel(wheel, omega, *more, pattern=pattern, start=point, options=options)
+            # where the poorer balance is no start for the richer one nothing else is likely to be
+            own = options if not changes else replace(options, fallbacks=False)
+            point = solve_wheel(wheel, omega, *more, pattern=pattern, start=point, options=own)
         change = abs(point.size().max() / solution.size().max() - 1)
         changes.append(float(change) if point.converged else float("nan"))
     return peak, solution, changes

@@ -60,6 +60,10 @@ from .scatter_use import ScatteredUse, scattered_use
 from .validate import LAW_LEVEL, refuse_scatter, scene_deviations, scene_scatter
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
 
+# harmonics of the engine order that many wheels take at most: what these leave is told, and most of
+# it is the tuned wheel's too, over which amplifications are counted
+SCATTER_HARMONICS = 3
+
 
 def with_whole_wheel(
     run: SolvedRun,
@@ -288,6 +292,7 @@ def _kept_statistics(
             harmonic,
             options,
             wanted_truncation(scene),
+            SCATTER_HARMONICS,
         )
 
     def compute() -> Amplification:
