@@ -134,6 +134,8 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
             row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
         if found.checked.shape[1]:
             row["law_error"] = abs(found.check_errors[i]).max()
+        if len(found.harmonics):
+            row |= {"harmonics": int(found.harmonics[i]), "truncation": found.truncation[i]}
         row |= {
             "worst": found.factor[i].max(),
             "highest_amplitude": found.peak[i].max(),
@@ -284,6 +286,15 @@ def scatter_sentences(found: Amplification) -> list[str]:
             f"wheels by the law of one damper; {found.checked.size} of them solved in full, from "
             f"the lowest to the highest of each load, are off by {errors.min():+.2g} to "
             f"{errors.max():+.2g} % in amplification"
+        )
+    if len(found.harmonics):
+        parts = [
+            f"{load:g} N: {H} ({'unknown' if np.isnan(error) else f'{100 * error:.2g} %'})"
+            for load, H, error in zip(found.loads, found.harmonics, found.truncation, strict=True)
+        ]
+        sentences.append(
+            "harmonics of whole wheels, and the estimated error that these and the samples leave "
+            f"in the amplitude of the first wheel drawn: {', '.join(parts)}"
         )
     lost = int(found.unsolved.sum())
     sentences.append(f"{lost} of {int(found.points.sum())} points not solved")

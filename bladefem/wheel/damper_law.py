@@ -58,7 +58,12 @@ class Family:
     # (m, m) flexibility of everything else at the contacts [m/N]
     flexibility: ComplexArray
     # (q,) readings of the blade over the one that is followed, in the order's diameter
-    readings: RealArray
+    readings: RealOrComplex
+    # (q, q) what all other modes and the residual flexibility read for forces on the readings, at
+    # the frequency of `flexibility`, without contacts
+    reading_flexibility: ComplexArray
+    # circular frequency of both [rad/s]
+    at: float
 
 
 @dataclass(frozen=True)
@@ -128,7 +133,9 @@ def family_of_modes(wheel: Wheel, omega: float, mode: int = 0) -> Family:
         before,
         after,
         G,
-        (readings / readings[read]).real,
+        (readings.conj() if mirrored else readings) / abs(readings[read]),
+        _other_modes(wheel, body, ports["blade"], left_out, omega, mirrored),
+        omega,
     )
 
 
@@ -205,15 +212,7 @@ def _everything_else(
 ) -> np.ndarray:
     """(m, m) flexibility at the contacts of all modes but one, and of the damper [m/N]."""
     rows = np.arange(len(body.residual))[body.ports["contact"]][wheel.rows]
-    own = wheel.damping.viscous(body.omega) + _own_damping(body, mirrored)
-    Z = body.omega**2 - omega**2 + 1j * omega * own
-    others = np.arange(len(Z)) != left_out
-    shapes = body.shapes[rows][:, others]
-    residual = body.residual[np.ix_(rows, rows)]
-    if mirrored:
-        # the conjugate wave, in time as before
-        shapes, residual = shapes.conj(), residual.conj()
-    G = (shapes / Z[others]) @ shapes.conj().T + residual
+    G = _other_modes(wheel, body, rows, left_out, omega, mirrored)
     damper = wheel.damper
     if isinstance(damper, RigidBody):
         B = damper.B[wheel.rows]
@@ -225,6 +224,26 @@ def _everything_else(
         shapes = damper.shapes[own]
         return G + (shapes / Z) @ shapes.conj().T + damper.residual[np.ix_(own, own)]
     return G
+
+
+def _other_modes(
+    wheel: Wheel,
+    body: PortModel,
+    rows: slice | np.ndarray,
+    left_out: int,
+    omega: float,
+    mirrored: bool,
+) -> np.ndarray:
+    """(m, m) flexibility of all modes but one, without damper, at some rows of the ports [m/N]."""
+    own = wheel.damping.viscous(body.omega) + _own_damping(body, mirrored)
+    Z = body.omega**2 - omega**2 + 1j * omega * own
+    others = np.arange(len(Z)) != left_out
+    shapes = body.shapes[rows][:, others]
+    residual = body.residual[rows][:, rows]
+    if mirrored:
+        # the conjugate wave, in time as before
+        shapes, residual = shapes.conj(), residual.conj()
+    return (shapes / Z[others]) @ shapes.conj().T + residual
 
 
 def damper_law(

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import InputError
 from ..util.arrays import RealArray
 from ..util.curve_extremum import parabola_at_middle
 from .damper_law import DamperLaw, Family
@@ -71,28 +70,49 @@ class LawWheels:
 
     family: Family
     law: ScatteredLaw
-    # (B, N) stiffness of each blade's deviation in the family's reading [1/s^2]
+    # (B, N) dynamic stiffness of each blade's deviation in the family's reading at the frequency
+    # `Family.at` [1/s^2]
     deviation: RealArray
     # parameter to factors (B, N) of each damper
     factors: Mapping[str, RealArray]
+    # (B, N) mass of each blade's deviation in that reading [1]; none when None
+    mass: RealArray | None = None
+
+    def stiffness(self, omega: np.ndarray) -> np.ndarray:
+        """(B, N) dynamic stiffness of the deviations at circular frequencies (B,)."""
+        if self.mass is None:
+            return self.deviation
+        return self.deviation + (self.family.at**2 - omega[:, None] ** 2) * self.mass
 
     def part(self, chosen: slice) -> LawWheels:
         """Some of the wheels."""
         factors = {name: value[chosen] for name, value in self.factors.items()}
-        return LawWheels(self.family, self.law, self.deviation[chosen], factors)
+        mass = None if self.mass is None else self.mass[chosen]
+        return LawWheels(self.family, self.law, self.deviation[chosen], factors, mass)
 
 
-def pattern_deviations(patterns: Sequence[Pattern], family: Family, count: int) -> np.ndarray:
-    """(B, N) deviations of the family's reading.
-
-    Raises:
-        InputError: a pattern changes masses.
+def pattern_deviations(
+    patterns: Sequence[Pattern], family: Family, count: int
+) -> tuple[np.ndarray, np.ndarray | None]:
+    """(B, N) dynamic stiffness of the deviations in the family's reading at the frequency
+    `Family.at`, to whose forces all other modes of the blade give way, and their mass there; None
+    where no mass deviates.
     """
-    if any(p.mass is not None and np.any(p.mass) for p in patterns):
-        raise InputError("damper law: expected deviations of stiffness, not of mass")
-    none = np.zeros(count)
     y = family.readings
-    return np.array([none if p.stiffness is None else y @ p.stiffness @ y for p in patterns])
+    found = np.zeros((len(patterns), count))
+    mass = np.zeros((len(patterns), count))
+    for own, own_mass, pattern in zip(found, mass, patterns, strict=True):
+        if pattern.tuned:
+            continue
+        change = pattern.change(family.at, len(y), 0)
+        # (1 + D A)^-1 D y: the forces of the deviation
+        forces = np.linalg.solve(
+            np.eye(len(y)) + change @ family.reading_flexibility, change @ y[:, None]
+        )
+        own[:] = (y.conj() @ forces[..., 0].T).real
+        if pattern.mass is not None:
+            own_mass[:] = (y.conj() @ pattern.mass @ y).real
+    return found, mass if mass.any() else None
 
 
 def solve_law_wheels(
@@ -121,9 +141,10 @@ def _solve_batch(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Newton for one batch; wheels that are solved stay where they are."""
     z = _impedance(wheels.family, omega)
-    linear = _linear_matrix(z, wheels.deviation)
+    deviation = wheels.stiffness(omega)
+    linear = _linear_matrix(z, deviation)
     a = start
-    r, derivative = _residual(wheels, z, a)
+    r, derivative = _residual(wheels, z, deviation, a)
     for _ in range(MAX_NEWTON_STEPS):
         error = _error(z, r, a)
         if error.max() <= RESIDUAL_TOLERANCE:
@@ -135,7 +156,7 @@ def _solve_batch(
         share = active.astype(float)
         for _ in range(MAX_HALVINGS):
             trial = a - share[:, None] * step
-            r, derivative = _residual(wheels, z, trial)
+            r, derivative = _residual(wheels, z, deviation, trial)
             worse = active & (_error(z, r, trial) > error)
             if not worse.any():
                 break
@@ -154,6 +175,7 @@ def _impedance(family: Family, omega: np.ndarray) -> np.ndarray:
 def _residual(
     wheels: LawWheels,
     z: np.ndarray,
+    deviation: np.ndarray,
     a: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residual (B, N) and derivatives (B, N, 4, 4) of the dampers' forces."""
@@ -162,7 +184,7 @@ def _residual(
     (own, other), derivative = wheels.law.forces(a.ravel(), following.ravel(), factors)
     g = own.reshape(a.shape) + np.roll(other.reshape(a.shape), 1, axis=1)
     linear = np.fft.ifft(z * np.fft.fft(a, axis=1) - wheels.family.force, axis=1)
-    return linear + wheels.deviation * a + g, derivative.reshape(*a.shape, 4, 4)
+    return linear + deviation * a + g, derivative.reshape(*a.shape, 4, 4)
 
 
 def _error(z: np.ndarray, r: np.ndarray, a: np.ndarray) -> np.ndarray:

@@ -20,6 +20,8 @@ from .contact_forces import ContactForces, contact_forces
 from .flexibility import WheelFlexibility
 from .model import Wheel
 from .preconditioner import Preconditioner, make_preconditioner
+from .tuned import travelling_order
+from .wave_preconditioner import WavePreconditioner, make_wave_preconditioner
 
 # vectors kept by GMRES, and restarts
 GMRES_BASIS = 60
@@ -29,14 +31,18 @@ LOOSE_STEP_TOLERANCE = 1e-2
 TIGHT_STEP_TOLERANCE = 1e-6
 # relative accuracy of the step that only measures a trial
 TRIAL_TOLERANCE = 0.1
+# coefficients of a displacement up to which one harmonic moves, and none are to be coupled
+FEW_COEFFICIENTS = 3
 # reduction of the residual by one step that needs no further test
 QUADRATIC_REDUCTION = 1e-2
 # weight of the mean in the residual that the line search lowers
 MEAN_WEIGHT = 1e-2
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-8
-# products of one solve from which a new preconditioner pays
+# products of one solve from which a new preconditioner pays, and from which one of the other kind
+# is tried
 SLOW_SOLVE_PRODUCTS = 12
+MANY_PRODUCTS = 40
 
 
 @dataclass(frozen=True)
@@ -90,8 +96,19 @@ def evaluate_wheel(
         balance.wheel, balance.elements, w, balance.start, balance.samples, jacobian
     )
     residual = w - balance.stuck + contact_motions(balance.flex, forces.p)
-    size = max(np.linalg.norm(w), np.linalg.norm(balance.stuck), np.finfo(float).tiny)
-    return WheelState(w, forces, residual, float(np.linalg.norm(residual) / size))
+    return WheelState(w, forces, residual, _error(w, residual, balance.stuck))
+
+
+def _error(w: np.ndarray, residual: np.ndarray, stuck: np.ndarray) -> float:
+    """Of the mean over the displacements, of the motion over the motion: means of dampers that
+    drift are larger by orders, and would hide a motion that is not found.
+    """
+    tiny = np.finfo(float).tiny
+    mean = np.linalg.norm(residual[..., 0])
+    moving = np.linalg.norm(residual[..., 1:])
+    mean /= max(np.linalg.norm(w), np.linalg.norm(stuck), tiny)
+    moving /= max(np.linalg.norm(w[..., 1:]), np.linalg.norm(stuck[..., 1:]), tiny)
+    return float(np.hypot(mean, moving))
 
 
 def contact_motions(flex: WheelFlexibility, p: np.ndarray) -> np.ndarray:
@@ -128,27 +145,53 @@ def newton_wheel(
 
 
 class _Steps:
-    """Newton steps of one run; the preconditioner is renewed where GMRES takes long."""
+    """Newton steps of one run; the preconditioner is renewed where GMRES takes long.
+
+    Of its two kinds that by waves couples the harmonics, that by harmonics what is mistuned: the
+    first is taken where there are harmonics to couple, and the other where that takes long.
+    """
 
     def __init__(self, balance: WheelBalance) -> None:
         self.balance = balance
-        self.preconditioner: Preconditioner | None = None
+        self.preconditioner: Preconditioner | WavePreconditioner | None = None
         self.stale = True
         self.products = 0
+        self.order = _wave_order(balance.wheel)
+        self.by_waves = self.order is not None and balance.stuck.shape[3] > FEW_COEFFICIENTS
+        # products that a new preconditioner of each kind took last
+        self.took: dict[bool, int] = {}
 
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
         accuracy = float(np.clip(0.1 * state.error, TIGHT_STEP_TOLERANCE, LOOSE_STEP_TOLERANCE))
         goal = accuracy * float(np.linalg.norm(state.residual))
-        if self.stale:
+        new = self.stale
+        if new:
+            self._choose_kind()
             self._renew(state)
         before = self.products
         found, failed = self._solve(state, state.residual, goal)
         if failed:
+            if new and self.order is not None:
+                self.took[self.by_waves] = self.products - before
+                self.by_waves = not self.by_waves
             self._renew(state)
+            before = self.products
             found, failed = self._solve(state, state.residual, goal)
-        self.stale = self.products - before > SLOW_SOLVE_PRODUCTS
+            new = True
+        taken = self.products - before
+        if new:
+            self.took[self.by_waves] = taken
+        self.stale = taken > SLOW_SOLVE_PRODUCTS
         return found, not failed
+
+    def _choose_kind(self) -> None:
+        """Where the present kind took long, the other one unless that took longer."""
+        taken = self.took.get(self.by_waves, 0)
+        if self.order is not None and taken > max(
+            MANY_PRODUCTS, self.took.get(not self.by_waves, 0)
+        ):
+            self.by_waves = not self.by_waves
 
     def next_length(
         self,
@@ -159,8 +202,16 @@ class _Steps:
         found, _ = self._solve(state, residual, TRIAL_TOLERANCE * float(np.linalg.norm(residual)))
         return float(np.linalg.norm(found))
 
-    def _renew(self, state: WheelState) -> Preconditioner:
-        self.preconditioner = make_preconditioner(self.balance.flex, state.forces.jacobian)
+    def _renew(self, state: WheelState) -> Preconditioner | WavePreconditioner:
+        flex = self.balance.flex
+        change = state.forces.jacobian
+        made: Preconditioner | WavePreconditioner | None = None
+        if self.by_waves and self.order is not None:
+            made = make_wave_preconditioner(flex, change, self.order)
+            if made is None:
+                # too many unknowns: nor will there be fewer in another step
+                self.by_waves, self.order = False, None
+        self.preconditioner = made or make_preconditioner(flex, change)
         self.stale = False
         return self.preconditioner
 
@@ -190,6 +241,13 @@ class _Steps:
             operator, residual.ravel(), atol=goal, restart=GMRES_BASIS, maxiter=GMRES_RESTARTS
         )
         return prepare(y.reshape(flat)).reshape(shape), failed != 0
+
+
+def _wave_order(wheel: Wheel) -> int | None:
+    """The engine order with which all harmonics travel, found once; None for other forces."""
+    if "wave order" not in wheel.kept:
+        wheel.kept["wave order"] = travelling_order(wheel)
+    return wheel.kept["wave order"]
 
 
 def _line_search(

@@ -6,7 +6,7 @@ all wheels.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from scipy import stats
@@ -74,6 +74,10 @@ class Amplification:
     # it; C = 0 where all wheels are whole
     checked: IntegerArray
     whole: RealArray
+    # (L,) harmonics of the balance of whole wheels, and the relative error that they and the
+    # samples leave in a peak's height; empty where nothing chose them
+    harmonics: IntegerArray = field(default_factory=lambda: np.zeros(0, dtype=int))
+    truncation: RealArray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def check_errors(self) -> np.ndarray:

@@ -52,8 +52,8 @@ def law_level(
     law = _scattered_law(wheel, family, scatter, curve, mode)
     draws = drawn_deviations(wheel.count, scatter, len(patterns))
     factors = draws.factors(scatter)
-    deviation = pattern_deviations(patterns, family, wheel.count)
-    return law_statistics(LawWheels(family, law, deviation, factors), curve.load, band)
+    deviation, mass = pattern_deviations(patterns, family, wheel.count)
+    return law_statistics(LawWheels(family, law, deviation, factors, mass), curve.load, band)
 
 
 def _scattered_law(

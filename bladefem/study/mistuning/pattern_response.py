@@ -28,6 +28,9 @@ LINEAR_POINTS = 300
 MAX_RESONANCES = 8
 # harmonics of the engine order beyond which the indicator asks for no more
 MOST_HARMONICS = 15
+# harmonics that judge the error at least where one is excited: a higher one may meet a lightly
+# damped mode, of which the next one alone knows nothing
+JUDGING_HARMONICS = 7
 # relative error of a peak's height by the search over frequencies
 SEARCH_TOLERANCE = 0.01
 
@@ -52,7 +55,7 @@ class PatternResponse:
     solution: WheelSolution
     # amplification of the same pattern without dampers
     free_factor: float
-    # relative change of the peak's height with twice the harmonics and samples; NaN: not solved
+    # relative change of the peak's height by `judging_balances`; NaN: not solved
     truncation: float
     # relative difference of the tuned peak from that of the sector's own curve, whose means are
     # free; NaN where that curve knows fewer engine orders
@@ -158,20 +161,11 @@ def pattern_response(
         wanted: estimated error by harmonics and samples above which there are more of them; None:
             those of the curve.
     """
-    settings = curve.settings
-    H = max(harmonic * settings.harmonics, *wheel.excitation)
-    samples = max(harmonic * settings.samples, 8 * (H + 1))
+    H, samples = first_balance(wheel, curve, harmonic)
     grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
-    while True:
-        peak, solution, truncation = _peak_of_pattern(
-            wheel, pattern, grid, H, samples, harmonic, options
-        )
-        # of NaN nothing says that richer settings are solved
-        enough = wanted is None or not truncation > wanted
-        more = richer_balance(wheel, H, samples)
-        if enough or more[0] > MOST_HARMONICS * harmonic:
-            break
-        H, samples = more
+    found = chosen_peak(wheel, pattern, grid, (H, samples), harmonic, options, wanted)
+    peak, solution = found.peak, found.solution
+    H, samples = found.harmonics, found.samples
     # the same way to the tuned one, so that the factor compares like with like
     tuned = find_wheel_peak(
         in_common_period(wheel_respond(wheel, Pattern(), H, samples, options), harmonic),
@@ -190,12 +184,59 @@ def pattern_response(
         peak,
         solution,
         _free_factor(wheel, pattern, grid, harmonic),
-        truncation,
+        found.truncation,
         tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
         alternating,
         others,
         own,
     )
+
+
+@dataclass(frozen=True)
+class ChosenPeak:
+    """A peak with the harmonics and samples that were taken for it."""
+
+    peak: WheelPeak
+    # there, in harmonics of the common period
+    solution: WheelSolution
+    harmonics: int
+    samples: int
+    # relative change of the height by `judging_balances`; NaN: not solved
+    truncation: float
+
+
+def first_balance(wheel: Wheel, curve: Curve, harmonic: int) -> tuple[int, int]:
+    """Harmonics and samples of the common period that the settings of a curve mean."""
+    settings = curve.settings
+    H = max(harmonic * settings.harmonics, *wheel.excitation)
+    return H, max(harmonic * settings.samples, 8 * (H + 1))
+
+
+def chosen_peak(
+    wheel: Wheel,
+    pattern: Pattern,
+    grid: np.ndarray,
+    first: tuple[int, int],
+    harmonic: int,
+    options: Options,
+    wanted: float | None,
+    most: int = MOST_HARMONICS,
+) -> ChosenPeak:
+    """The peak with as many harmonics and samples as its error asks for; the arguments are those of
+    `pattern_response`, `first` the harmonics and samples to begin with, `most` harmonics of the
+    engine order.
+    """
+    H, samples = first
+    while True:
+        peak, solution, changes = _peak_of_pattern(
+            wheel, pattern, grid, H, samples, harmonic, options
+        )
+        # of NaN nothing says that richer settings are solved
+        enough = wanted is None or not any(change > wanted for change in changes)
+        more = richer_balance(wheel, H, samples)
+        if enough or more[0] > most * harmonic:
+            return ChosenPeak(peak, solution, H, samples, changes[-1])
+        H, samples = more
 
 
 def richer_balance(wheel: Wheel, H: int, samples: int) -> tuple[int, int]:
@@ -215,25 +256,34 @@ def _peak_of_pattern(
     samples: int,
     harmonic: int,
     options: Options,
-) -> tuple[WheelPeak, WheelSolution, float]:
-    """The peak, its solution, and the relative change of its height there with twice the harmonics
-    and samples; NaN: not solved.
+) -> tuple[WheelPeak, WheelSolution, list[float]]:
+    """The peak, its solution, and the relative changes of its height there with the harmonics and
+    samples of `judging_balances`, from the first one not solved on NaN.
     """
     solved = in_common_period(wheel_respond(wheel, pattern, H, samples, options), harmonic)
     peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
     omega = peak.omega / harmonic
     solution = solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
-    richer = solve_wheel(
-        wheel,
-        omega,
-        *richer_balance(wheel, H, samples),
-        pattern=pattern,
-        start=solution,
-        options=options,
-    )
-    change = abs(richer.size().max() / solution.size().max() - 1)
-    known = richer.converged and solution.converged
-    return peak, solution, float(change) if known else float("nan")
+    changes: list[float] = []
+    point = solution
+    for more in judging_balances(wheel, H, samples):
+        if point.converged:
+            # where the poorer balance is no start for the richer one nothing else is likely to be
+            own = options if not changes else replace(options, fallbacks=False)
+            point = solve_wheel(wheel, omega, *more, pattern=pattern, start=point, options=own)
+        change = abs(point.size().max() / solution.size().max() - 1)
+        changes.append(float(change) if point.converged else float("nan"))
+    return peak, solution, changes
+
+
+def judging_balances(wheel: Wheel, H: int, samples: int) -> list[tuple[int, int]]:
+    """Harmonics and samples that judge the present ones, each started from the one before: the next
+    richer ones, and JUDGING_HARMONICS where harmonic 1 alone is excited and these are more.
+    """
+    found = [richer_balance(wheel, H, samples)]
+    if set(wheel.excitation) == {1} and found[0][0] < JUDGING_HARMONICS:
+        found.append((JUDGING_HARMONICS, max(found[0][1], 32 * (JUDGING_HARMONICS + 1))))
+    return found
 
 
 def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:

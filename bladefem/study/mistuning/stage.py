@@ -47,7 +47,10 @@ from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
 from .own_stress import OwnStress, own_stress
 from .pattern_response import (
     SEARCH_TOLERANCE,
+    ChosenPeak,
     PatternResponse,
+    chosen_peak,
+    first_balance,
     frequency_grid,
     in_common_period,
     pattern_response,
@@ -56,6 +59,10 @@ from .pattern_response import (
 from .scatter_use import ScatteredUse, scattered_use
 from .validate import LAW_LEVEL, refuse_scatter, scene_deviations, scene_scatter
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
+
+# harmonics of the engine order that many wheels take at most: what these leave is told, and most of
+# it is the tuned wheel's too, over which amplifications are counted
+SCATTER_HARMONICS = 3
 
 
 def with_whole_wheel(
@@ -154,8 +161,23 @@ def _best_response(
         others,
         solver_options(run.scene.accuracy),
         own_harmonic(run.scene),
-        # harmonics that the scene gives are kept
-        run.scene.accuracy / 2 if run.scene.model.harmonics is None else None,
+        wanted_truncation(run.scene),
+    )
+
+
+def wanted_truncation(scene: Scene) -> float | None:
+    """Estimated error by harmonics and samples above which a wheel takes more of them; None: those
+    that the scene gives are kept.
+    """
+    return scene.accuracy / 2 if scene.model.harmonics is None else None
+
+
+def with_balance(found: Amplification, chosen: ChosenPeak) -> Amplification:
+    """Statistics of one load with the harmonics of its whole wheels, and what these leave."""
+    return replace(
+        found,
+        harmonics=np.array([chosen.harmonics]),
+        truncation=np.array([chosen.truncation]),
     )
 
 
@@ -252,8 +274,6 @@ def _kept_statistics(
     scene = run.scene
     spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
     harmonic = own_harmonic(scene)
-    H = max(harmonic * curve.settings.harmonics, *wheel.excitation)
-    samples = max(harmonic * curve.settings.samples, 8 * (H + 1))
     families = len(sector.families)
     options = solver_options(scene.accuracy)
     if others is not None:
@@ -263,6 +283,18 @@ def _kept_statistics(
         pattern = frequency_pattern(sector.families, deviation)
         return pattern if others is None else others.added(pattern, wheel.count)
 
+    def chosen_for(pattern: Pattern) -> ChosenPeak:
+        return chosen_peak(
+            wheel,
+            pattern,
+            frequency_grid(wheel, curve, pattern, spread, harmonic),
+            first_balance(wheel, curve, harmonic),
+            harmonic,
+            options,
+            wanted_truncation(scene),
+            SCATTER_HARMONICS,
+        )
+
     def compute() -> Amplification:
         patterns = drawn_patterns(
             wheel,
@@ -270,6 +302,9 @@ def _kept_statistics(
             scene.mistuning.wheels,
             made,
         )
+        # by the first wheel drawn: all have the same contacts
+        chosen = on_root(comm, lambda: chosen_for(patterns[0]))
+        H, samples = chosen.harmonics, chosen.samples
         if scene.mistuning.level == LAW_LEVEL:
             grid = frequency_grid(wheel, curve, TUNED_PATTERN, spread)
             band = float(grid[0]), float(grid[-1])
@@ -284,8 +319,10 @@ def _kept_statistics(
                 ).height
 
             checks = scene.mistuning.checks
-            return with_checks(cheap, patterns, whole_peak, checks, comm, progress)
-        return scatter_statistics(
+            return with_balance(
+                with_checks(cheap, patterns, whole_peak, checks, comm, progress), chosen
+            )
+        found = scatter_statistics(
             {curve.load: wheel},
             {curve.load: patterns},
             lambda load, pattern: frequency_grid(wheel, curve, pattern, spread, harmonic),
@@ -296,6 +333,7 @@ def _kept_statistics(
             SEARCH_TOLERANCE,
             progress,
         )
+        return with_balance(found, chosen)
 
     key = stage_key("scatter", scene, curve.load, curve.peak.omega, *_blade_keys(scene))
     found, _ = cached_stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)

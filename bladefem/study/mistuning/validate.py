@@ -41,11 +41,6 @@ def check_mistuning(scene: Scene) -> None:
         raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
     scene_deviations(scene, count, scene.mistuning.families)
     other_blades(scene, count)
-    if scene.mistuning.blades and scene.mistuning.level == LAW_LEVEL:
-        raise InputError(
-            'mistuning.level = "damper law": knows the frequencies of blades alone, expected no '
-            'mistuning.blades or "whole wheel"'
-        )
     if read_orders(scene) and scene.mistuning.level == LAW_LEVEL:
         raise InputError(
             'mistuning.level = "damper law": takes one engine order, expected no mistuning.orders '
