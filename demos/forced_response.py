@@ -38,7 +38,8 @@ comm = MPI.COMM_WORLD
 result = run(scene, None if coarse else "runs/demos/forced_response", comm=comm)
 
 # %% [markdown]
-# A light load slides and dissipates little, a heavy load sticks and dissipates nothing: between them lies the optimum.
+# A light load slides and dissipates little, a heavy load sticks and dissipates nothing: between them lies the optimum. A
+# search looks for it, and it is studied like the loads that were given.
 
 # %%
 frequency, undamped = result.response.free_peak
@@ -50,5 +51,5 @@ if comm.rank == 0:
             f"{len(c.frequency)} points, {int((~c.converged).sum())} not converged, estimated "
             f"error {100 * c.error:.2g} %"
         )
-    best = min(result.response.curves, key=lambda c: c.peak_amplitude)
+    best = result.response.curves[result.response.best_curve]
     print(f"resonance amplitude at the best load [um]: {1e6 * best.peak_amplitude:.8f}")

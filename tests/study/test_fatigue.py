@@ -105,7 +105,7 @@ def run_of(scene: Scene, mean: float) -> SimpleNamespace:
         mesh=SimpleNamespace(points=nodes(3), bodies=bodies),
         strength=SimpleNamespace(mean=np.array([mean, 0.0, 0.0])),
         damped={0: damped},
-        response=SimpleNamespace(curves=[curve]),
+        response=SimpleNamespace(curves=[curve], best_curve=0),
     )
 
 
