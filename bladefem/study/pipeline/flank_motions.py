@@ -27,6 +27,9 @@ from .stability import Stability, model_in_time, settings_in_time
 NEARLY_AS_HIGH = 0.9
 # humps of a curve that are marched from
 MAX_HUMPS = 4
+# steps to better neighbours: where the blade bounces the ends of bands scatter, and one of some
+# neighbours is always a little higher
+MAX_STEPS_BESIDE = 3
 # operations that one march may need, some 2.5 s
 MAX_COUNTED = 1.5e10
 
@@ -94,7 +97,9 @@ def flank_motions(
 
     march(first)
     best = _highest(bands)
-    while best is not None and bands[best].highest > given:
+    for _ in range(MAX_STEPS_BESIDE):
+        if best is None or bands[best].highest <= given:
+            break
         at = places.index(best)
         beside = [i for i in places[max(0, at - 1) : at + 2] if i not in bands]
         if not beside or any(band.too_long for band in bands.values()):
