@@ -81,24 +81,19 @@ def solid_cells(
                 f"imported.file = '{source}': cells are {' and '.join(sorted(words))}, expected "
                 "triangles or quadrilaterals, not both"
             )
-        rank = vertex_order(points, axis)
-        parts = [split_cells(word, cells, rank, points) for word, cells in blocks]
-        quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word in words)
-        whole = padded_cells(
-            [(cells, rows) for (_, cells), (_, rows) in zip(blocks, parts, strict=True)]
-        )
+        word, parts, whole = _as_tetrahedra(points, blocks, vertex_order(points, axis))
         notes += (
             f"{_count_text(blocks)} are solved as they are; contacts and pictures see them split "
             "into tetrahedra",
         )
-        if not quadratic:
+        if word == "tetra":
             _check_facets(points, blocks, source)
-        words = {"tetra10" if quadratic else "tetra"}
-        blocks = [("tetra", cells) for cells, _ in parts]
         owner = [some[rows] for some, (_, rows) in zip(owner, parts, strict=True)]
         row = [rows for _, rows in parts]
-    word = words.pop()
-    cells = np.vstack([cells for _, cells in blocks])
+        cells = np.vstack([cells for cells, _ in parts])
+    else:
+        word = words.pop()
+        cells = np.vstack([cells for _, cells in blocks])
     _check_middles(points, word, cells, source)
     return SolidCells(
         points,
@@ -109,6 +104,28 @@ def solid_cells(
         notes,
         whole,
     )
+
+
+def _as_tetrahedra(
+    points: np.ndarray,
+    blocks: list[tuple[str, np.ndarray]],
+    rank: np.ndarray,
+) -> tuple[str, list[tuple[np.ndarray, np.ndarray]], np.ndarray]:
+    """What the cells of several kinds are split into.
+
+    Args:
+        rank: of the points; of a quadrilateral the diagonal at its lowest one is taken.
+
+    Returns:
+        Type of the parts, for each block their nodes and the row of the cell that each comes from,
+        and for each part the nodes of its whole cell.
+    """
+    parts = [split_cells(word, cells, rank, points) for word, cells in blocks]
+    whole = padded_cells(
+        [(cells, rows) for (_, cells), (_, rows) in zip(blocks, parts, strict=True)]
+    )
+    quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word, _ in blocks)
+    return "tetra10" if quadratic else "tetra", parts, whole
 
 
 _HEXAHEDRA = ("hexahedron", "hexahedron27")

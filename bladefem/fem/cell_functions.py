@@ -81,13 +81,18 @@ def tabulate(word: str, at: RealArray) -> tuple[RealArray, RealArray]:
 def quadrature(family: str, degree: int) -> tuple[RealArray, RealArray]:
     """Places (q, d) and weights (q,) exact for polynomials of the degree on the unit cell."""
     if family == "wedge":
-        flat, area = shape.quadrature("triangle", degree)
-        line, length = shape.quadrature("line", degree)
-        at = np.array([(*a, *z) for a, z in product(flat, line)])
-        return at, np.outer(area, length).ravel()
+        return product_rule(shape.quadrature("triangle", degree), shape.quadrature("line", degree))
     if family == "pyramid":
         return pyramid_rule(degree // 2 + 1)
     return shape.quadrature(family, degree)
+
+
+def product_rule(
+    flat: tuple[RealArray, RealArray], line: tuple[RealArray, RealArray]
+) -> tuple[RealArray, RealArray]:
+    """Places and weights on the unit wedge, of those on its triangle and along its height."""
+    at = np.array([(*a, *z) for a, z in product(flat[0], line[0])])
+    return at, (flat[1][:, None] * line[1]).ravel()
 
 
 def pyramid_rule(n: int) -> tuple[RealArray, RealArray]:

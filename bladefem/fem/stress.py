@@ -17,7 +17,14 @@ from geometry.whole_cells import OwnCells, own_cells
 from ..errors import InputError
 from . import shape_functions as shape
 from .body import Body
-from .cell_functions import order_of, pyramid_rule, quadrature, reference_nodes, tabulate
+from .cell_functions import (
+    order_of,
+    product_rule,
+    pyramid_rule,
+    quadrature,
+    reference_nodes,
+    tabulate,
+)
 from .elasticity import lame_parameters, stress_of
 from .temperature import point_temperatures, strain_tensor_at
 
@@ -397,10 +404,7 @@ def best_points(word: str) -> tuple[np.ndarray, np.ndarray]:
     if degree == 2 and kind in ("tetra", "triangle"):
         return _four_points(len(shape.reference_nodes(kind)))
     if kind == "wedge" and degree == 2:
-        flat, area = _four_points(3)
-        line, length = shape.quadrature("line", 2)
-        at = np.array([(*a, *z) for a in flat for z in line])
-        return at, np.outer(area, length).ravel()
+        return product_rule(_four_points(3), shape.quadrature("line", 2))
     if kind == "pyramid":
         return pyramid_rule(degree)
     return quadrature(

@@ -42,8 +42,9 @@ def best_load_table(found: Sequence[BestLoad], curves: Sequence[Curve] = ()) -> 
         error = settings["error"]
         row["error"] = np.nan if error is None else error
         row["harmonics"] = settings["harmonics"]
-        studied = (c for c in curves if (c.load, c.mass) == (studied_load(best), best.mass))
-        for curve in studied:
+        here = (studied_load(best), best.mass)
+        curve = next((c for c in curves if (c.load, c.mass) == here), None)
+        if curve is not None:
             row |= _judged(curve, row["error"])
         del row["tried"], row["heights"]
         rows.append(row)

@@ -20,6 +20,7 @@ from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.loads import body_volume, face_areas, surface_load
 from bladefem.fem.modes import modes
 from bladefem.fem.refinement import refine_uniformly
+from bladefem.fem.shape_functions import reference_nodes
 from bladefem.fem.stiffness_error import stiffness_error
 from bladefem.fem.stress import gauss_stress, nodal_stress, stress_jumps, von_mises
 from bladefem.fem.stress_error import mesh_error
@@ -316,20 +317,7 @@ def test_pressure_against_calculix(halvings):
 
 def test_a_quadrilateral_of_first_order_that_faces_triangles_is_refused():
     cube = np.array([[0, 1, 2, 3, 4, 5, 6, 7]])
-    points = np.array(
-        [
-            (0, 0, 0),
-            (1, 0, 0),
-            (1, 1, 0),
-            (0, 1, 0),
-            (0, 0, 1),
-            (1, 0, 1),
-            (1, 1, 1),
-            (0, 1, 1),
-            (0.5, 0.5, 2),
-        ],
-        float,
-    )
+    points = np.vstack([reference_nodes("hexahedron"), (0.5, 0.5, 2)])
     roof = np.array([[4, 5, 6, 8], [4, 6, 7, 8]])
     raw = RawMesh(points, [("hexahedron", cube), ("tetra", roof)], {}, {})
     for how in ("keep", "promote"):

@@ -1,6 +1,17 @@
 """The shipped mistuned wheel on a mesh that a test can afford."""
 
 from pathlib import Path
+from typing import NamedTuple
+
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import load_scene
+from bladefem.study.adaptive.settings import Settings, first_settings
+from bladefem.study.mistuning.whole_wheel import WheelSector, reduce_wheel
+from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.case_models import load_cases
+from bladefem.study.pipeline.run_records import ReducedRun
 
 MISTUNED = Path(__file__).parents[2] / "scenes" / "mistuned.toml"
 COARSE_MISTUNED = (
@@ -11,3 +22,24 @@ COARSE_MISTUNED = (
     "model.modes=6",
     "model.static=uncoupled",
 )
+
+
+class ReducedWheel(NamedTuple):
+    """The coarse wheel, reduced, and what a response begins with."""
+
+    scene: Scene
+    run: ReducedRun
+    patches: list[str]
+    sector: WheelSector
+    case: LoadCase
+    settings: Settings
+
+
+def reduced_wheel() -> ReducedWheel:
+    """Six modes of the sector in every nodal diameter, three blade-alone families."""
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    run = pipeline.run(scene, None, until="reduction")
+    patches = list(run.contact.problem.patches)
+    sector = reduce_wheel(Bodies(scene, run.mesh), patches, 6, run.clamped, 3)
+    (case,) = load_cases(scene, run.mesh, run.contact)
+    return ReducedWheel(scene, run, patches, sector, case, first_settings(scene))

@@ -8,16 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mistuned import COARSE_MISTUNED, MISTUNED
+from mistuned import reduced_wheel
 
 from bladefem.hbm.solver.newton import Options
-from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.settings import first_settings
 from bladefem.study.mistuning.validate import scene_deviations
-from bladefem.study.mistuning.whole_wheel import reduce_wheel, whole_wheel
-from bladefem.study.pipeline import pipeline
-from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.case_models import load_cases
+from bladefem.study.mistuning.whole_wheel import whole_wheel
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.resonance import find_wheel_peak
 from bladefem.wheel.solve import solve_wheel
@@ -31,13 +26,9 @@ OPTIONS = Options(tolerance=1e-6)
 
 @pytest.fixture(scope="module")
 def wheel():
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
-    run = pipeline.run(scene, None, until="reduction")
-    patches = list(run.contact.problem.patches)
-    sector = reduce_wheel(Bodies(scene, run.mesh), patches, 6, run.clamped, 3)
-    (case,) = load_cases(scene, run.mesh, run.contact)
+    scene, run, patches, sector, case, settings = reduced_wheel()
     # two modes: what the others do without inertia is in the residual flexibility
-    settings = replace(first_settings(scene), modes=2)
+    settings = replace(settings, modes=2)
     made = whole_wheel(scene, run.mesh, sector, patches, case, settings)
     deviation = scene_deviations(scene, 36, 3)
     return made, frequency_pattern(sector.families, deviation.frequency)

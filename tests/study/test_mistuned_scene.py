@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mistuned import COARSE_MISTUNED, MISTUNED
+from mistuned import COARSE_MISTUNED, MISTUNED, reduced_wheel
 
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
@@ -28,7 +28,7 @@ from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
 from bladefem.study.mistuning.pattern_response import richer_balance
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
-from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
+from bladefem.study.mistuning.whole_wheel import blade_readings, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
@@ -45,13 +45,7 @@ from bladefem.wheel.solve import free_wheel, solve_wheel
 
 @pytest.fixture(scope="module")
 def reduced():
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
-    run = pipeline.run(scene, None, until="reduction")
-    patches = list(run.contact.problem.patches)
-    sector = reduce_wheel(Bodies(scene, run.mesh), patches, 6, run.clamped, 3)
-    (case,) = load_cases(scene, run.mesh, run.contact)
-    settings = first_settings(scene)
-    return scene, run, patches, sector, case, settings
+    return reduced_wheel()
 
 
 def test_elements_that_the_scene_gives_can_be_joined(reduced):

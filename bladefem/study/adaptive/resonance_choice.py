@@ -342,12 +342,7 @@ def choose_at_peak(
             errors = _with_errors_before(errors, settings, before[2], before[0])
         settings = replace(settings, error=errors.total)
         far = errors.total > FAR_BEYOND * accuracy and _lift_off(peak, errors)
-        if (
-            far
-            and before is not None
-            and _stalled(settings, errors, before)
-            and not _few_points(settings, errors, fixed)
-        ):
+        if far and before is not None and _ends_refining(settings, errors, before, fixed):
             poorer = _seen_from(errors, before)
             return min(poorer, (settings, peak, errors), key=lambda found: found[2].total)
         before = settings, peak, errors
@@ -541,6 +536,16 @@ def _with_errors_before(
         height={**errors.height, **{name: errors_before.height[name] for name in kept}},
         frequency={**errors.frequency, **{name: errors_before.frequency[name] for name in kept}},
     )
+
+
+def _ends_refining(
+    settings: Settings,
+    errors: PeakErrors,
+    before: tuple[Settings, Peak, PeakErrors],
+    fixed: tuple[str, ...],
+) -> bool:
+    """Far beyond the accuracy richer models do not help, and there are enough contact points."""
+    return _stalled(settings, errors, before) and not _few_points(settings, errors, fixed)
 
 
 def _stalled(

@@ -135,23 +135,23 @@ def kept_of_family(models: Family, settings: Settings, point: Solution) -> KeptB
     with which it was gets as many operations as one with the fewest points.
     """
     fewer = settings
-    too_long: Settings | None = None
+    too_long: tuple[Settings, Solution] | None = None
     while True:
         most = _has_fewest_points(fewer)
         model = model_in_time(models, settings_in_time(models, fewer))
         if most or affordable_march(model):
             moved = _with_points(models, settings, point, fewer)
-            if moved is None and too_long is not None:
-                fewer, most = too_long, True
-                moved = _with_points(models, settings, point, fewer)
             if moved is None:
-                return _unknown_band(point, "its motion with fewer contact points was not solved")
+                break
             counted = MAX_COUNTED_LAST if most else MAX_COUNTED
             band = _kept_with(models, settings, point, fewer, moved, counted)
             if most or not band.too_long:
                 return band
-            too_long = fewer
+            too_long = (fewer, moved)
         fewer = replace(fewer, points=max(FEWEST_POINTS, (fewer.points or 0) // 2))
+    if too_long is None:
+        return _unknown_band(point, "its motion with fewer contact points was not solved")
+    return _kept_with(models, settings, point, *too_long, MAX_COUNTED_LAST)
 
 
 def _has_fewest_points(settings: Settings) -> bool:

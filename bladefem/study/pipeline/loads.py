@@ -13,6 +13,7 @@ import numpy as np
 
 from ...contact.interface_elements import seat_contact
 from ...hbm.history_interval import POINT
+from ...hbm.model import ReducedModel
 from ...hbm.parallel import share_work
 from ...hbm.solution import Solution, size
 from ...scene.tables import Scene
@@ -286,7 +287,7 @@ def study_loads(
     found, curves = done[: len(searches)], done[len(searches) :]
     studied = [(cases[i], curve) for i, curve in zip(order, curves, strict=True)]
     studied += [added for _, added in found if added is not None]
-    masses = list(dict.fromkeys(case.mass for case in cases))
+    masses = [case.mass for case in cases]
     studied.sort(key=lambda pair: (masses.index(pair[0].mass), pair[0].load))
     return StudiedLoads(
         [case for case, _ in studied], [curve for _, curve in studied], [one for one, _ in found]
@@ -346,9 +347,6 @@ def curve_of(
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
     # at a maximum: from a point beside it other models find the maximum
     unseen = _unseen_errors(scene, case, models, softer, curve.settings, peak_of(curve.points))
-    interval = None
-    if scene.study.interval:
-        interval = load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
     return Curve(
         load=case.load,
         mass=case.mass,
@@ -368,7 +366,7 @@ def curve_of(
         unmarched=judged.unmarched,
         in_time=in_time,
         sought=sought,
-        interval=interval,
+        interval=_interval_of(scene, model, curve, top),
         unfollowed=lifts and too_large_to_follow(models, curve.settings),
         notes=curve.notes,
         halved=unseen.halved,
@@ -376,6 +374,15 @@ def curve_of(
         layer_law=unseen.layer_law,
         layer_shift=unseen.layer_shift,
     )
+
+
+def _interval_of(
+    scene: Scene, model: ReducedModel, curve: Checked, top: Solution
+) -> LoadInterval | None:
+    """The amplitudes over all admissible friction forces, where the scene asks for them."""
+    if not scene.study.interval:
+        return None
+    return load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
 
 
 def _sought_in_time(scene: Scene, models: Family, curve: Checked) -> ResonanceInTime | None:
