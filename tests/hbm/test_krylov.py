@@ -23,7 +23,7 @@ from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver import newton_krylov
-from bladefem.hbm.solver.deflation import _leading_directions, no_level, second_level
+from bladefem.hbm.solver.deflation import _leading_directions, no_level, no_ramp, second_level
 from bladefem.hbm.solver.krylov import NOT_FOUND, conjugate_residuals
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.newton_compiled import dense_jacobian
@@ -54,11 +54,13 @@ def test_conjugate_residuals_reach_the_accuracy_or_say_no(accuracy):
     A, C = system(1.0)
     J = dense_jacobian(A, C)
     r, x = np.random.default_rng(5).normal(size=len(J)), np.empty(len(J))
-    assert conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x) > 0
+    assert conjugate_residuals(by_harmonic(A), C, no_ramp(), r, accuracy, no_level(), x) > 0
     assert np.linalg.norm(J @ x - r) <= 1.01 * accuracy * np.linalg.norm(r)
     A, C = system(100.0)
     # no 60 directions are enough there
-    assert conjugate_residuals(by_harmonic(A), C, r, accuracy, no_level(), x) == NOT_FOUND
+    assert (
+        conjugate_residuals(by_harmonic(A), C, no_ramp(), r, accuracy, no_level(), x) == NOT_FOUND
+    )
 
 
 def by_modes(nodes=6, d=2, H=4, M=3):
@@ -128,13 +130,13 @@ def test_a_second_level_needs_fewer_directions_for_the_same_step():
     Q, _ = np.linalg.qr(flex[3])
     J, x = dense_jacobian(form_matrices(flex), C), np.empty(C.shape[0] * C.shape[1])
     r = np.random.default_rng(9).normal(size=len(x))
-    level = second_level(flex, C, Q, np.arange(6), 2)
+    level = second_level(flex, C, no_ramp(), Q, np.arange(6), 2)
     Z = np.kron(Q, np.eye(9))
     np.testing.assert_allclose(level[0].T @ level[0], np.eye(3), atol=1e-12)
     M = np.linalg.inv(np.eye(len(x)) + Z @ (np.linalg.inv(Z.T @ J @ Z) - np.eye(27)) @ Z.T)
     before, after = (np.sum(abs(np.linalg.eigvals(j) - 1) > 0.5) for j in (J, J @ np.linalg.inv(M)))
     assert after < before / 2, (before, after)
-    assert conjugate_residuals(flex, C, r, 1e-10, level, x) > 0
+    assert conjugate_residuals(flex, C, no_ramp(), r, 1e-10, level, x) > 0
     np.testing.assert_allclose(J @ x, r, atol=1e-9 * np.linalg.norm(r))
 
 

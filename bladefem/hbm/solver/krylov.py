@@ -1,5 +1,6 @@
-"""Generalised conjugate residuals on  x + A C x = r: A couples contacts harmonic by harmonic, C
-harmonics node by node.
+"""Generalised conjugate residuals on  x + A (C x + f (l . x)) = r: A couples contacts harmonic by
+harmonic, C harmonics node by node, and a few vectors f and l couple everything (a damper that
+walks).
 
 Eisenstat, Elman and Schultz, SIAM J. Numer. Anal. 20 (1983), doi:10.1137/0720023. The springs of
 full stick inside A are the preconditioner already: where contacts move alike, a few directions are
@@ -24,12 +25,12 @@ NOT_FOUND = -1
 
 
 @njit(**KERNEL)
-def conjugate_residuals(flex, C, r, accuracy, level, x):
+def conjugate_residuals(flex, C, ramp, r, accuracy, level, x):
     """Fill x (N,) with the solution for r (N,), to a relative residual; the number of directions
     that took, or NOT_FOUND.
 
-    A as `flex` gives it, C (nodes, N/nodes, N/nodes) real; level as `bladefem.hbm.solver.deflation`
-    gives it.
+    A as `flex` gives it, C (nodes, N/nodes, N/nodes) real, f and l (z, N) in ``ramp``, none of them
+    mostly; level as `bladefem.hbm.solver.deflation` gives it.
     """
     N = r.size
     block = C.shape[1]
@@ -47,6 +48,8 @@ def conjugate_residuals(flex, C, r, accuracy, level, x):
         copy_vector(P[k], Q[k])
         for i in range(0, N, block):
             np.dot(C[i // block], P[k, i : i + block], forces[i : i + block])
+        for z in range(ramp[0].shape[0]):
+            forces += np.dot(ramp[1][z], P[k]) * ramp[0][z]
         apply_flexibility(flex, forces.reshape(m, N // m), Q[k].reshape(m, N // m))
         for i in range(k):
             share = np.dot(Q[i], Q[k])

@@ -27,7 +27,7 @@ from ..linear.contact_flexibility import (
     select_nodes,
 )
 from ..policy import BLOCKED_LU_UNKNOWNS, DEFLATION_UNKNOWNS, DENSE_FALLBACK_UNKNOWNS
-from .deflation import no_level, second_level
+from .deflation import no_level, no_ramp, second_level
 from .dense_lu import back_substitute, factorise_large, factorise_small
 from .krylov import conjugate_residuals
 
@@ -218,7 +218,7 @@ def _apply_inverse(r, accuracy, flex, C, factors, level):
     if (
         r.size > BLOCKED_LU_UNKNOWNS
         and factors[1].size == 0
-        and conjugate_residuals(flex, C, r, accuracy, level, x) >= 0
+        and conjugate_residuals(flex, C, no_ramp(), r, accuracy, level, x) >= 0
     ):
         return x, factors
     if factors[1].size == 0 and r.size <= DENSE_FALLBACK_UNKNOWNS:
@@ -334,7 +334,7 @@ def _linearise_nodes(J, linear, d, sticks):
     active, C = moving_nodes(J, linear.springs, d, sticks)
     few = select_nodes(linear.flex, active, d)
     wide = linear.motions.size > 0 and active.size * d * K >= DEFLATION_UNKNOWNS
-    level = second_level(few, C, linear.motions, active, d) if wide else no_level()
+    level = second_level(few, C, no_ramp(), linear.motions, active, d) if wide else no_level()
     return active, C, few, level
 
 

@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from ...friction.fourier import to_complex, to_real
 from ..linear.contact_flexibility import Flexibility, flexibility_product, sizes
-from .deflation import no_level, second_level
+from .deflation import no_level, no_ramp, second_level
 from .krylov import NOT_FOUND, conjugate_residuals
 
 # vectors kept by GMRES
@@ -55,6 +55,8 @@ class Memory:
 
 # flexibility A and change (nodes, dK, dK), in one precision
 Parts = tuple[Flexibility, np.ndarray]
+# forces and readings (z, a K)
+Ramp = tuple[np.ndarray, np.ndarray]
 
 
 def iterative_inverse(
@@ -62,6 +64,7 @@ def iterative_inverse(
     change: np.ndarray,
     memory: Memory | None = None,
     motions: np.ndarray | None = None,
+    ramp: Ramp | None = None,
 ) -> Callable[[np.ndarray, float], np.ndarray]:
     """The inverse of 1 + A change, applied to residuals (a, K) to a relative accuracy, for a =
     nodes * d dofs.
@@ -77,8 +80,11 @@ def iterative_inverse(
         memory: of the Newton run; changed in place.
         motions: (a, q) that the contacts have in common, see `bladefem.hbm.solver.deflation`; none
             when left out.
+        ramp: vectors of a walk that belong to the system too, see `bladefem.hbm.solver.krylov`;
+            then conjugate residuals alone are tried, and numpy.linalg.LinAlgError is raised where
+            they do not find the solution.
     """
-    return partial(_solve_system, _System((flex, change), memory or Memory(), motions))
+    return partial(_solve_system, _System((flex, change), memory or Memory(), motions, ramp))
 
 
 @dataclass
@@ -88,6 +94,7 @@ class _System:
     double: Parts
     memory: Memory
     motions: np.ndarray | None
+    ramp: Ramp | None = None
     count: int = 0
     # the second level belongs to this derivative
     fresh: bool = False
@@ -114,13 +121,14 @@ class _System:
             return
         d = len(self.motions) // len(change)
         nodes = np.arange(len(change))
-        self.memory.level = second_level(flex, change, self.motions, nodes, d)
+        ramp = self.ramp or no_ramp()
+        self.memory.level = second_level(flex, change, ramp, self.motions, nodes, d)
 
     def reach(self, residual: np.ndarray, accuracy: float, x: np.ndarray) -> int:
         """Fill x by conjugate residuals with the present level; the number of directions."""
         flex, change = self.double
-        found = conjugate_residuals(flex, change, residual.ravel(), accuracy, self.memory.level, x)
-        return int(found)
+        ramp, level = self.ramp or no_ramp(), self.memory.level
+        return int(conjugate_residuals(flex, change, ramp, residual.ravel(), accuracy, level, x))
 
     def directions(
         self,
@@ -188,6 +196,8 @@ def _solve_system(
     found = system.directions(residual, accuracy)
     if found is not None:
         return found
+    if system.ramp is not None:
+        raise np.linalg.LinAlgError("conjugate residuals did not solve for the Newton step")
     if fresh:
         system.renew()
     system.count, parts = 0, system.single

@@ -268,9 +268,48 @@ def linearise_balance(
     """
     if balance.walk is None:
         return _linearise_blocks(balance, state, memory)
-    base = _linearise_blocks(_held_walk(balance), state, memory)
-    left, right = _walk_terms(balance, state)
-    return _low_rank_inverse(base, left, right)
+    memory = Memory() if memory is None else memory
+    walking = _iterate_with_walk(balance, state, memory)
+    held: Inverse | None = None
+
+    def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
+        nonlocal walking, held
+        if walking is not None:
+            try:
+                return walking(residual, accuracy)
+            except np.linalg.LinAlgError:
+                walking = None
+        if held is None:
+            base = _linearise_blocks(_held_walk(balance), state, memory)
+            held = _low_rank_inverse(base, *_walk_terms(balance, state))
+        return held(residual, accuracy)
+
+    return solve
+
+
+def _iterate_with_walk(balance: Balance, state: State, memory: Memory) -> Inverse | None:
+    """The inverse with the walk among the products of the iterations, which takes one solution a
+    residual where `_low_rank_inverse` takes one more for each of its terms; None where some nodes
+    stick or the system is small.
+    """
+    n, d, K = state.w.shape
+    change, active, dofs = _active_nodes(balance, state)
+    if len(active) < n or linear_solver(len(dofs) * K) == DENSE_LU:
+        return None
+    if memory.nodes != active.tobytes():
+        memory.nodes, memory.blocks, memory.level = active.tobytes(), None, None
+    memory.solvers.add(ITERATIONS)
+    rates = walk_rates(balance, state)
+    readings = np.zeros((len(rates), n * d, K))
+    readings[:, :, 0] = (balance.linear.springs[:, None] * balance.walking).T
+    condensed = balance.linear.condensed
+    ramp = rates.reshape(len(rates), -1), readings.reshape(len(rates), -1)
+    inverse = iterative_inverse(condensed.flex, change, memory, condensed.motions, ramp)
+
+    def solve(residual: np.ndarray, accuracy: float = STEP_ACCURACY) -> np.ndarray:
+        return inverse(residual.reshape(-1, K), accuracy).reshape(residual.shape)
+
+    return solve
 
 
 def _held_walk(balance: Balance) -> Balance:
