@@ -157,16 +157,45 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
     monkeypatch.setattr(
         judged_resonance, "judged_above", lambda *args: asked.append(args[-1]) or marks
     )
-    done = SimpleNamespace(models=None, band=lambda *_: band)
+    lasting = module.KeptBand(1.0, 0.9, 0.9, 200)
+
+    def marched_from(*args):
+        return band if size(args[-1]) > 1.0 else lasting
+
+    done = SimpleNamespace(models=None, band=marched_from)
     found = judged_resonance.judged_resonance(done, curve, scene)
     assert size(found.point) == pytest.approx(given) and found.kept is band
     # motions are judged only above what the blade keeps to, where that is another amplitude
     assert asked == ([kept_to] if kept_to in (0.7, 0.95, 1.3) else [])
     # where that is not marched by steps at this size
-    monkeypatch.setattr(judged_resonance, "kept_of_family", lambda *_: band)
+    monkeypatch.setattr(judged_resonance, "kept_of_family", marched_from)
     none = SimpleNamespace(models=None, band=lambda *_: None)
     found = judged_resonance.judged_resonance(none, curve, scene)
     assert size(found.point) == pytest.approx(given) and found.kept is band
+
+
+@pytest.mark.parametrize(("held_to", "given"), [(0.88, 0.9), (0.8, 0.8), (0.6, 0.7)])
+def test_a_motion_called_stable_that_the_blade_leaves_is_not_given(monkeypatch, held_to, given):
+    """Beside an unstable motion of 1.2 that a march brings to 0.7."""
+    points = [
+        SimpleNamespace(omega=a, frequency=a, probe=np.array([[0.0], [a]]), converged=True)
+        for a in (0.5, 0.9, 1.2)
+    ]
+    marks = Stability(np.array(["stable", "stable", "unstable"]), np.ones(3))
+    curve = SimpleNamespace(points=points, settings=None)
+    scene = SimpleNamespace(accuracy=0.05)
+    for name, value in (("model_in_time", None), ("richer_models", [])):
+        monkeypatch.setattr(judged_resonance, name, lambda *_, value=value: value)
+    monkeypatch.setattr(judged_resonance, "judged_above", lambda *args: args[3])
+    ends = {1.2: 0.7, 0.9: held_to}
+
+    def marched_from(_, point):
+        return module.KeptBand(point.frequency, ends[point.omega], ends[point.omega], 200)
+
+    marches = SimpleNamespace(models=None, band=marched_from)
+    found = judged_resonance._at_the_highest(marches, curve, scene, marks, 2)
+    assert found.amplitude == pytest.approx(given)
+    assert found.contradicted == (given < 0.9)
 
 
 def marches_that_grow(point, instants_that_hold):
