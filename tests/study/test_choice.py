@@ -204,6 +204,10 @@ def test_a_light_load_alone_is_no_end_where_richer_models_of_it_are_not_solved(m
     monkeypatch.setattr(case_models, "choose_at_peak", refused)
     bodies = SimpleNamespace(mesh=None)
     settings, reduced = case_models.reduced_sector(
-        scene, bodies, None, [], lambda name, key, make: "reduced"
+        scene,
+        bodies,
+        SimpleNamespace(load=1.0, mass=None),
+        [],
+        lambda name, key, make: make() if name == "settings" else "reduced",
     )
     assert reduced == "reduced" and settings.most == 15 and settings.error is None

@@ -7,6 +7,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
+from typing import Any
 
 import numpy as np
 
@@ -173,24 +174,56 @@ def reduced_sector(
     bodies: Bodies,
     case: LoadCase,
     patches: list[Patch],
-    keep: Callable[[str, str, Callable[[], Reduced]], Reduced],
+    keep: Callable[[str, str, Callable[[], Any]], Any],
 ) -> tuple[Settings, Reduced]:
     """The sector with as many modes as the resonance of one load needs, and settings to start the
     others from; those there were where richer models of that resonance are not solved.
+
+    Args:
+        keep: keep(name, key, compute) gives the result of a stage, found from an earlier run or
+            computed and kept.
     """
-    settings = replace(first_settings(scene), most=affordable_harmonics(case))
+    start = replace(first_settings(scene), most=affordable_harmonics(case))
     diameters = harmonic_diameters(scene, bodies.mesh, EXACT_HARMONICS)
     spanned = bool(scene.study.stability) and is_wheel(bodies.mesh)
-    while True:
+    made: dict[int, Reduced] = {}
+
+    def reduced(settings: Settings) -> Reduced:
         count = judged_modes(scene, settings)
-        key = stage_key("reduction", scene, np.array(diameters), count, spanned)
-        reduce = partial(reduce_sector, bodies, patches, diameters, count, spanned=spanned)
-        reduced = with_coriolis(scene, keep("reduction", key, reduce))
-        if not settings.chosen:
-            return settings, reduced
-        family = family_of_case(scene, bodies.mesh, reduced, patches, case)
+        if count not in made:
+            key = stage_key("reduction", scene, np.array(diameters), count, spanned)
+            reduce = partial(reduce_sector, bodies, patches, diameters, count, spanned=spanned)
+            # each on its own: where modes are added both serve the next run
+            made[count] = with_coriolis(scene, keep(f"reduction_{count}_modes", key, reduce))
+        return made[count]
+
+    if not start.chosen:
+        return start, reduced(start)
+    key = stage_key("response", scene, "settings", case.load, case.mass)
+
+    def family_of(settings: Settings) -> Family:
+        return family_of_case(scene, bodies.mesh, reduced(settings), patches, case)
+
+    settings = keep("settings", key, partial(_with_modes, scene, case, start, family_of))
+    return settings, reduced(settings)
+
+
+def _with_modes(
+    scene: Scene,
+    case: LoadCase,
+    settings: Settings,
+    family_of: Callable[[Settings], Family],
+) -> Settings:
+    """Settings with as many modes as the resonance of a load needs.
+
+    Args:
+        settings: those to begin with.
+        family_of: all models with the modes of some settings, and those that judge them.
+    """
+    mode = scene.excitation.mode
+    while True:
+        family = family_of(settings)
         model = family_member(family, settings).model
-        mode = scene.excitation.mode
         with naming_the_load(case, model, mode, scene.excitation.force):
             rough = covered_band(model, settings, scene.study.band, mode, 1.0)
             settings = softened_where_lifting(family, settings, peak_of(rough))
@@ -199,10 +232,10 @@ def reduced_sector(
             enough = choose_at_peak(family, settings, peak, scene.accuracy, fixed=("modes",))
         except NotSolvedError:
             # where the damper comes off at this load; each curve judges the modes again
-            return settings, reduced
+            return settings
         settings, _, found = cheaper_settings(family, *enough, scene.accuracy)
         more = enriched_settings(settings, "modes")
         known = "modes" in settings.chosen and np.isfinite(found.height["modes"])
         if not known or found.needs["modes"] <= scene.accuracy / 10 or more is None:
-            return settings, reduced
+            return settings
         settings = more

@@ -225,10 +225,16 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         if b.reason:
             yield (f"best load{damper}: not found between {lowest} and {highest}, since {b.reason}")
             continue
+        start, end = b.between
+        tolerated = ""
+        if np.isfinite([start, end]).all():
+            share = f"{100 * scene.accuracy:.3g} %"
+            tolerated = f", and from {start:.4g} to {end:.4g} N they keep within {share} of it"
         yield (
             f"best load{damper}: {b.load:.4g} N by exact search between {lowest} and {highest}, "
-            f"{len(b.tried)} loads and {b.points} points; no load near it "
-            f"lowers the amplitude by more than {100 * b.tolerance:.2g} %; {b.settings.sentence()}"
+            f"{len(b.tried)} loads and {b.points} points; no load near it lowers the amplitude of "
+            f"these balances by more than {100 * b.tolerance:.2g} %{tolerated}; "
+            f"{b.settings.sentence()}"
         )
 
 
