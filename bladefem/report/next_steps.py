@@ -37,11 +37,11 @@ def next_steps(
     finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
     if finite.empty:
         return steps
-    best = finite.loc[finite["peak_amplitude"].idxmin()]
+    best = None if searched is None else found_best(searched, summary)
+    if best is None:
+        best = finite.loc[finite["peak_amplitude"].idxmin()]
     if not cautions:
-        exact = None if searched is None else found_best(searched, summary)
-        chosen = best if exact is None else exact
-        steps += _mass_step(chosen, own, masses, "mass" in finite)
+        steps += _mass_step(best, own, masses, "mass" in finite)
     steps += _mesh_step(best)
     if scene.contact.normal == "coupled" and not scene.study.stability:
         steps.append(
@@ -57,7 +57,7 @@ def _mass_step(
     masses: pd.DataFrame | None,
     several: bool,
 ) -> list[str]:
-    """Another mass, where the damper's own load is far from the best one: that of the headline."""
+    """Another mass, where the damper's own load is far from the best one."""
     if own is None or several:
         return []
     mass, load = own[["mass", "load"]].iloc[0]

@@ -107,9 +107,7 @@ def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:
     """
     stress = result.strength.alternating * amplitudes
     for number, found in (result.damped or {}).items():
-        curve = result.response.curves[number]
-        marched = curve.peak_amplitude / curve.balance_amplitude
-        stress[1 + number] = marched * found.largest
+        stress[1 + number] = result.response.curves[number].over_balance * found.largest
     return stress
 
 

@@ -385,6 +385,13 @@ def test_next_steps_name_the_mass_to_try():
     searched = pd.DataFrame({"load": [150.0], "amplitude": [1e-6], "frequency": [800.0]})
     exact = next_steps(Scene(), [], summary, own, None, searched)
     assert "damper.mass = '18 g'" in exact[0]
+    # and what the mesh changes is that of the same load
+    meshes = summary.assign(body_mesh=np.linspace(0.01, 0.05, len(summary)))
+    finite = meshes[(meshes["load"] > 0) & np.isfinite(meshes["load"])]
+    lightest = finite.loc[finite["load"].idxmin()]
+    there = pd.DataFrame({"load": [lightest["load"]], "amplitude": [1e-6], "frequency": [800.0]})
+    told = next_steps(Scene(), [], meshes, own, None, there)[-1]
+    assert f"changes the amplitude by {100 * lightest['body_mesh']:.2g} %" in told
     kept = next_steps(Scene(), [], summary, own.assign(load=200.0))
     assert "keep its mass" in kept[0]
     assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"

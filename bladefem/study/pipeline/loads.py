@@ -206,6 +206,13 @@ class Curve:
         """Of the periodic motion at the resonance [m]."""
         return size(self.peak)
 
+    @property
+    def over_balance(self) -> float:
+        """The amplitude given over that of the balance: what else follows from the balance's motion
+        is told in proportion.
+        """
+        return self.peak_amplitude / self.balance_amplitude
+
 
 class StudiedLoads(NamedTuple):
     """Load cases of each mass by ascending load, the curve of each, and the best loads searched."""

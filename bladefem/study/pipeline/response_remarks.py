@@ -262,11 +262,16 @@ def lower_studied_remarks(
                 break
 
 
-def stress_message(found: DampedStress) -> str:
-    """The stress at the best load, and how far it can be trusted."""
+def stress_message(found: DampedStress, over_balance: float = 1.0) -> str:
+    """The stress at the best load, and how far it can be trusted.
+
+    Args:
+        over_balance: the amplitude given over that of the motion which has this stress.
+    """
+    largest = 1e-6 * over_balance * found.largest
     place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
     text = (
-        f"alternating stress at the best load, {found.load:.4g} N: {1e-6 * found.largest:.4g} MPa "
+        f"alternating stress at the best load, {found.load:.4g} N: {largest:.4g} MPa "
         f"at ({place}) mm, of all modes, harmonics and damper forces; estimated error of the mesh "
         f"there {100 * found.mesh_error:.2g} %"
     )

@@ -99,7 +99,8 @@ def run_response(
             stage_key("damped motion", scene, [(c.load, c.mass, c.peak.f) for c in curves]),
             lambda: _stresses(before, bodies, patches, response, cases),
         )
-        clock.messages.append(stress_message(damped[response.best_curve]))
+        best_one = response.best_curve
+        clock.messages.append(stress_message(damped[best_one], curves[best_one].over_balance))
     response = replace(response, influences=found)
     result = SolvedRun(**vars(before), response=response, damped=damped)
     clock.messages.extend(filter(None, [utilisation_message(result)]))

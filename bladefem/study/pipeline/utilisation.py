@@ -122,7 +122,7 @@ def highest_use(
     """
     curve = run.response.curves[number]
     # stresses are those of the balance
-    share = curve.peak_amplitude / curve.balance_amplitude
+    share = curve.over_balance
     if curve.interval is not None:
         share = max(curve.interval.highest / curve.balance_amplitude, share)
     return float(used.used[used.worst] * share * (1 + (stress or run.damped[number]).mesh_error))
