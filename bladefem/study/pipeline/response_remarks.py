@@ -173,7 +173,10 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
             f"under {', '.join(unknown)} the error of the resonance amplitude is unknown, since "
             "richer models of it were not solved; nothing was refined because of that"
         )
-    above = [c for c in curves if c.error is not None and accuracy < c.error < np.inf]
+    # as it is told, with two digits: no estimate is known better
+    above = [
+        c for c in curves if c.error is not None and accuracy < float(f"{c.error:.2g}") < np.inf
+    ]
     if above:
         each = ", ".join(f"{load_of(c)} {100 * (c.error or 0):.2g} %" for c in above)
         yield (
