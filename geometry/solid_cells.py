@@ -58,11 +58,9 @@ def solid_cells(
     Raises:
         InputError: no cells, linear ones that are to be refused, mixtures that cannot be kept.
     """
-    top = max((DIMENSION[FAMILY[word]] for word, _ in raw.blocks if word in FAMILY), default=0)
+    top = max((_dimension(word) for word, _ in raw.blocks), default=0)
     chosen = [
-        b
-        for b, (word, cells) in enumerate(raw.blocks)
-        if word in FAMILY and DIMENSION[FAMILY[word]] == top and len(cells)
+        b for b, (word, cells) in enumerate(raw.blocks) if _dimension(word) == top and len(cells)
     ]
     blocks = [raw.blocks[b] for b in chosen]
     if top < 2 or not blocks:
@@ -104,6 +102,11 @@ def solid_cells(
         notes,
         whole,
     )
+
+
+def _dimension(word: str) -> int:
+    """Of the cells of a block; 0 where they are none that can be solved."""
+    return DIMENSION[FAMILY[word]] if word in FAMILY else 0
 
 
 def _as_tetrahedra(

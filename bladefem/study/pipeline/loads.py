@@ -261,8 +261,7 @@ def study_loads(
         family: of a load case, its models.
         settings: modes and damper model to keep; each case then takes the rest from what its own
             curve needs.
-        progress: wraps the numbers of the cases of this rank, as tqdm does; the second argument is
-            a label.
+        progress: wraps the numbers of this rank's cases, as tqdm does, under a label.
         keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
             and kept.
         softer: the body less the error of its stiffness, for the error by its mesh.
@@ -291,8 +290,8 @@ def study_loads(
         *(partial(curve_at, cases[i]) for i in order),
     ]
     done: list[Any] = share_work(lambda task: task(), tasks, comm, shown, on_demand=True)
-    found, curves = done[: len(searches)], done[len(searches) :]
-    studied = [(cases[i], curve) for i, curve in zip(order, curves, strict=True)]
+    found = done[: len(searches)]
+    studied = [(cases[i], curve) for i, curve in zip(order, done[len(searches) :], strict=True)]
     studied += [added for _, added in found if added is not None]
     masses = [case.mass for case in cases]
     studied.sort(key=lambda pair: (masses.index(pair[0].mass), pair[0].load))
