@@ -53,11 +53,15 @@ def field_at(name: str) -> Field:
             f"{name}: expected a field of this table, such as "
             f"{next(k for k in known if k.startswith(name + '.'))}"
         )
+    head = _table_name(name)
+    inside = [k.rpartition(".")[2] for k in known if _table_name(k) == head]
+    # excitation.order is rather excitation.engine_order than mesh.order
+    longer = [word for word in inside if head and last in word.split("_")]
+    if longer:
+        raise InputError(f"unknown key '{name}'; did you mean '{head}.{longer[0]}'?")
     if same:
         raise InputError(f"unknown key '{name}'; did you mean '{same[0]}'?")
-    head = _table_name(name)
     if head in tables:
-        inside = [k.rpartition(".")[2] for k in known if _table_name(k) == head]
         near = suggestion(last, inside)
         raise InputError(
             f"unknown key '{name}'{near.replace(SUGGESTION_START, f'{SUGGESTION_START}{head}.')}"

@@ -17,6 +17,7 @@ WEDGE = Path(__file__).with_name("wedge.toml")
 REFUSED = [
     # unknown keys and tables
     ("aerofoil.twits=3 deg", "unknown key 'aerofoil.twits'; did you mean 'aerofoil.twist'?"),
+    ("excitation.order=9", "did you mean 'excitation.engine_order'?"),
     ("blade.twist=3 deg", "unknown key 'blade.twist'; did you mean 'aerofoil.twist'?"),
     ("matrial.blade.E=3", "unknown key 'matrial.blade.E'; did you mean 'material.blade.E'?"),
     ("nonsense=3", "unknown key 'nonsense'; known are"),
