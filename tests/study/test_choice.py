@@ -32,7 +32,7 @@ from bladefem.study.adaptive.family import (
 )
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
 from bladefem.study.adaptive.settings import Settings, enriched_settings, first_for
-from bladefem.study.pipeline import case_models, loads
+from bladefem.study.pipeline import case_models, shared_accuracy
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.response_remarks import beyond_tolerance
@@ -137,16 +137,20 @@ def test_parts_of_an_error_that_is_unknown_are_not_computed(monkeypatch):
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
     case = LoadCase(3.0, model.elements, np.eye(8))
     computed = []
-    monkeypatch.setattr(loads, "halved_change", lambda *_: computed.append("halved") or 0.01)
-    monkeypatch.setattr(loads, "softened_change", lambda *_: computed.append("body") or 0.02)
-    plain = loads.resonance_curve
+    monkeypatch.setattr(
+        shared_accuracy, "halved_change", lambda *_: computed.append("halved") or 0.01
+    )
+    monkeypatch.setattr(
+        shared_accuracy, "softened_change", lambda *_: computed.append("body") or 0.02
+    )
+    plain = shared_accuracy.resonance_curve
 
     def run(error):
         def with_error(*arguments):
             curve = plain(*arguments)
             return replace(curve, settings=replace(curve.settings, error=error))
 
-        monkeypatch.setattr(loads, "resonance_curve", with_error)
+        monkeypatch.setattr(shared_accuracy, "resonance_curve", with_error)
         settings = first_for(20)
         return curve_of(scene, case, lambda _: family_of(model), settings, softer=object())
 
@@ -154,6 +158,33 @@ def test_parts_of_an_error_that_is_unknown_are_not_computed(monkeypatch):
     assert computed == [] and np.isinf(unknown.error)
     assert run(0.004).error == pytest.approx(0.034)
     assert computed == ["halved", "body"]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "asked"), [(0.005, [0.02, 0.015]), (0.001, [0.02]), (0.018, [0.02])]
+)
+def test_what_the_mesh_takes_of_the_accuracy_is_not_left_to_the_balance(mesh, asked, monkeypatch):
+    """A curve that is off by 0.018 of 0.02 keeps the accuracy with a good mesh, is made again with
+    what a worse one leaves, and stays where that is hardly anything.
+    """
+    scene = load_scene("scenes/plane.toml", ["accuracy=2 %", "study.band=1150 Hz, 1600 Hz"])
+    model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
+    case = LoadCase(3.0, model.elements, np.eye(8))
+    plain = shared_accuracy.resonance_curve
+    accuracies = []
+
+    def curve_to(family, settings, band, mode, accuracy, march):
+        accuracies.append(accuracy)
+        curve = plain(family, settings, band, mode, 0.02, march)
+        return replace(curve, settings=replace(curve.settings, error=0.9 * accuracy))
+
+    monkeypatch.setattr(shared_accuracy, "resonance_curve", curve_to)
+    monkeypatch.setattr(shared_accuracy, "halved_change", lambda *_: np.nan)
+    monkeypatch.setattr(shared_accuracy, "softened_change", lambda *_: mesh)
+    monkeypatch.setattr(shared_accuracy, "layer_change", lambda *_: np.nan)
+    found = curve_of(scene, case, lambda _: family_of(model), first_for(20), softer=object())
+    assert accuracies == pytest.approx(asked)
+    assert found.error == pytest.approx(0.9 * asked[-1] + mesh)
 
 
 def test_settings_tell_how_many_contact_points_there_are():

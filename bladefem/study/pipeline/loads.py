@@ -5,7 +5,7 @@ load.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, NamedTuple, TypeAlias
 
@@ -22,22 +22,19 @@ from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import Checked, checked_points, estimated_errors
-from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
-from ..adaptive.layer_change import layer_change
-from ..adaptive.resonance_curve import resonance_curve, too_large_to_follow
-from ..adaptive.settings import Settings, restarted_settings
-from ..adaptive.stiff_layer import stiff_layer_change
+from ..adaptive.resonance_curve import too_large_to_follow
+from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
 from .best_load import BestLoad, studied_load
-from .body_mesh import SofterBody, softened_change
+from .body_mesh import SofterBody
 from .error_in_time import Marches
 from .judged_resonance import judged_in_time, judged_resonance
 from .kept_band import KeptBand
-from .liftoff import naming_the_load
 from .linear_limits import Limit
 from .load_interval import LoadInterval, load_interval
 from .resonance_in_time import ResonanceInTime, resonance_in_time
+from .shared_accuracy import curve_with_room
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
 # a best load, and the case of any load [N] of that damper
@@ -222,22 +219,6 @@ class StudiedLoads(NamedTuple):
     best: list[BestLoad]
 
 
-@dataclass(frozen=True)
-class UnseenErrors:
-    """Relative changes of a resonance amplitude that richer balances do not show; NaN: not
-    estimated.
-    """
-
-    # with half as many contact points
-    halved: float = np.nan
-    # by the estimated error of the body's mesh
-    body_mesh: float = np.nan
-    # with the layer's law in place of its tangent, or a stiff layer in place of a softer one
-    layer_law: float = np.nan
-    # of the frequency, with a stiff layer in place of a softer one
-    layer_shift: float = np.nan
-
-
 def study_loads(
     scene: Scene,
     cases: list[LoadCase],
@@ -335,24 +316,18 @@ def curve_of(
         NotSolvedError: no point converged.
     """
     models = family(case)
-    mode = scene.excitation.mode
-    with naming_the_load(case, family_member(models, settings).model, mode, scene.excitation.force):
-        start = restarted_settings(settings)
-        marches = Marches(models)
-        march = marches if scene.study.stability else None
-        curve = resonance_curve(models, start, scene.study.band, mode, scene.accuracy, march)
+    marches = Marches(models)
+    curve, unseen, room = curve_with_room(scene, case, models, softer, settings, marches)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
     sought = _sought_in_time(scene, models, curve)
-    judged = judged_resonance(marches, curve, scene, sought is not None)
+    judged = judged_resonance(marches, curve, replace(scene, accuracy=room), sought is not None)
     marks, top = judged.marks, judged.point
     estimated, in_time = estimated_errors(curve), None
     if not judged.contradicted and sought is None:
         curve, estimated, in_time = judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
-    # at a maximum: from a point beside it other models find the maximum
-    unseen = _unseen_errors(scene, case, models, softer, curve.settings, peak_of(curve.points))
     return Curve(
         load=case.load,
         mass=case.mass,
@@ -402,37 +377,6 @@ def _sought_in_time(scene: Scene, models: Family, curve: Checked) -> ResonanceIn
     if curve.settings.softened or 2 * top.states["lift"] < len(top.w):
         return None
     return resonance_in_time(models, curve.settings, top)
-
-
-def _unseen_errors(
-    scene: Scene,
-    case: LoadCase,
-    models: Family,
-    softer: SofterBody | None,
-    settings: Settings,
-    top: Solution,
-) -> UnseenErrors:
-    """What richer balances do not show of the error of a resonance.
-
-    Args:
-        settings, top: of the resonance, and its highest point.
-    """
-    # nothing is gained by parts of an error that is unknown as a whole
-    if settings.error is not None and not np.isfinite(settings.error):
-        return UnseenErrors()
-    if settings.softened:
-        change = stiff_layer_change(models, settings, top, scene.accuracy)
-        layer, shift = change.height, change.frequency
-    else:
-        layer, shift = layer_change(models, settings, top, case.decay), np.nan
-    return UnseenErrors(
-        np.nan if scene.contact.points else halved_change(models, settings, top),
-        np.nan
-        if softer is None
-        else softened_change(softer, models, case, settings, top, scene.excitation.mode),
-        layer,
-        shift,
-    )
 
 
 def _columns(points: Sequence[Solution]) -> dict[str, np.ndarray]:
