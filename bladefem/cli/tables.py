@@ -179,10 +179,13 @@ def response_tables(response: Response) -> str:
     rows = pd.DataFrame(design_table(curves, response.limits))
     rows = rows[[name for name in SUMMARY_COLUMNS if name in rows]]
     rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
-    best = min(curves, key=lambda c: c.peak_amplitude)
+    lowest = min(curves, key=lambda c: c.peak_amplitude)
+    best = lowest if response.best_found is None else curves[response.best_curve]
+    words = "best of these loads" if response.best_found is None else "best load, by search"
+    beside = "" if best is lowest else f"; {_case_label(lowest)} has the lowest of these amplitudes"
     return (
-        f"{report_table(rows)}\nbest of these loads: {_case_label(best)}, amplitude divided by "
-        f"{undamped / best.peak_amplitude:.3g}"
+        f"{report_table(rows)}\n{words}: {_case_label(best)}, amplitude divided by "
+        f"{undamped / best.peak_amplitude:.3g}{beside}"
     )
 
 

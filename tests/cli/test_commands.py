@@ -79,6 +79,7 @@ def fake_run(folder):
     response = SimpleNamespace(
         limits=limits,
         free_peak=(812.4, 8e-5),
+        best_found=None,
         curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)],
     )
     body = SimpleNamespace(omega=np.array([500.0, 1000.0]), shapes=np.zeros((6, 2)))
