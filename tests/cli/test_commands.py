@@ -17,6 +17,7 @@ from processes import clean_environment, run_on_ranks
 import bladefem.report
 import bladefem.study.pipeline
 from bladefem.cli.main import main, parser
+from bladefem.cli.tables import response_tables
 from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.io.run_folder import lock_run_folder
@@ -647,3 +648,16 @@ def test_all_ranks_stop_where_another_command_works(tmp_path, capsys):
     with lock_run_folder(tmp_path):
         assert main(["mesh", WEDGE, "-o", str(tmp_path)]) == 2
     assert ("another command" in capsys.readouterr().err) == (MPI.COMM_WORLD.rank == 0)
+
+
+def test_the_best_load_of_the_table_is_that_of_the_search(tmp_path):
+    """The lowest amplitude may stand under another load, within the errors."""
+    response = fake_run(tmp_path).response
+    response.best_found, response.best_curve = object(), 0
+    last = response_tables(response).splitlines()[-1]
+    assert last == (
+        "best load, by search: 20 N, amplitude divided by 2; 50 N has the lowest of these "
+        "amplitudes"
+    )
+    response.best_curve = 1
+    assert response_tables(response).endswith("best load, by search: 50 N, amplitude divided by 4")
