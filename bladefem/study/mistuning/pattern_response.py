@@ -326,8 +326,12 @@ def judging_balances(wheel: Wheel, H: int, samples: int) -> list[tuple[int, int]
     return found
 
 
-def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
-    """What a reader has to know."""
+def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> list[str]:
+    """What a reader has to know.
+
+    Args:
+        held_means: of the sector's own curves too, which then say nothing about free ones.
+    """
     sentences = []
     for r in found:
         error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
@@ -354,11 +358,12 @@ def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))
     far = max(abs(r.sector_difference) for r in found)
-    moved = (
-        "where engine orders beyond the tuned sector's excite as well"
-        if np.isnan(far)
-        else f"which moves the tuned resonance by {100 * far:.2g} % at most"
-    )
+    if np.isnan(far):
+        moved = "where engine orders beyond the tuned sector's excite as well"
+    elif held_means:
+        moved = "as the tuned curves do (model.static): what free ones change is not known"
+    else:
+        moved = f"which moves the tuned resonance by {100 * far:.2g} % at most"
     sentences.append(f"the whole wheel holds mean displacements in the preload state, {moved}")
     return sentences
 

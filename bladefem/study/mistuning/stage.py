@@ -102,7 +102,8 @@ def with_whole_wheel(
         wheel=[found],
         timings={**run.timings, "whole wheel": time.perf_counter() - start},
     )
-    said = filter(None, [*pattern_sentences([found]), wheel_utilisation_message(result)])
+    held = run.scene.model.static == "uncoupled"
+    said = filter(None, [*pattern_sentences([found], held), wheel_utilisation_message(result)])
     return replace(result, messages=[*run.messages, *remarks, *said])
 
 
