@@ -26,8 +26,8 @@ from .wave_preconditioner import WavePreconditioner, make_wave_preconditioner
 
 AnyPreconditioner = Preconditioner | WavePreconditioner | CoupledPreconditioner
 
-# vectors kept by GMRES: at least, at most, and numbers in all of them between (100 MB); where blades
-# and harmonics differ much a restart forgets what the next vectors need
+# vectors kept by GMRES: at least, at most, and numbers in all of them between (100 MB); where
+# blades and harmonics differ much a restart forgets what the next vectors need
 LEAST_BASIS = 60
 MOST_BASIS = 400
 BASIS_NUMBERS = 12_500_000

@@ -173,6 +173,17 @@ def wanted_truncation(scene: Scene) -> float | None:
     return scene.accuracy / 2 if scene.model.harmonics is None else None
 
 
+def scatter_balance(scene: Scene, wheel: Wheel, curve: Curve) -> tuple[int, int]:
+    """Harmonics and samples that whole wheels of the statistics begin with: those of the curve, at
+    most SCATTER_HARMONICS of the engine order unless the scene gives more.
+    """
+    harmonic = own_harmonic(scene)
+    H, samples = first_balance(wheel, curve, harmonic)
+    if scene.model.harmonics is None:
+        H = min(H, max(SCATTER_HARMONICS * harmonic, *wheel.excitation))
+    return H, samples
+
+
 def with_balance(found: Amplification, chosen: ChosenPeak) -> Amplification:
     """Statistics of one load with the harmonics of its whole wheels, and what these leave."""
     return replace(
@@ -289,7 +300,7 @@ def _kept_statistics(
             wheel,
             pattern,
             frequency_grid(wheel, curve, pattern, spread, harmonic),
-            first_balance(wheel, curve, harmonic),
+            scatter_balance(scene, wheel, curve),
             harmonic,
             options,
             wanted_truncation(scene),
