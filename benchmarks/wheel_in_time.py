@@ -2,11 +2,14 @@
 blades and dampers from rest, friction by a return map written here, no nodal diameters, no
 harmonics, no mean displacement held.
 
-    python benchmarks/wheel_in_time.py [--set KEY=VALUE ...] [--harmonics 1 3 5 7] [--output FOLDER]
+    python benchmarks/wheel_in_time.py [--set KEY=VALUE ...] [--harmonics 1 3 5 7] [--hold-means]
+        [--output FOLDER]
 
 Taken from the package is the reduced sector alone: modes, residual flexibility, elements, the
 forces and the pattern. Beside the march stand the balances with several harmonics at the same
-frequency, with means held as in the run and with free ones as in the march.
+frequency, with means held as in the run and with free ones as in the march. With --hold-means the
+wheel is marched once more under the mean contact forces of the richest balance with held means, as
+if these were its preload: what free means change is the difference.
 """
 
 from __future__ import annotations
@@ -33,7 +36,7 @@ from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
 from bladefem.study.pipeline.run_records import SolvedRun
 from bladefem.wheel.model import Pattern, Wheel
-from bladefem.wheel.solve import solve_wheel
+from bladefem.wheel.solve import WheelSolution, solve_wheel
 
 SCENE = Path(__file__).parents[1] / "scenes" / "mistuned.toml"
 STEPS = 256
@@ -61,6 +64,8 @@ class Marched:
     # share of all contacts that slipped in the last period, and that lifted off
     slipping: float
     lifting: float
+    # how far the contacts go on in the last period, root of the mean of squares [m]
+    walk: float
     # (steps, N n, 3) relative displacements of the contacts in the last period, from the first
     # step's end on [m]
     contacts: np.ndarray
@@ -165,8 +170,13 @@ def march(
     steps: int = STEPS,
     most: int = PERIODS,
     steady: float = STEADY,
+    mean: np.ndarray | None = None,
 ) -> Marched:
-    """From rest under a growing force to a steady state at circular frequency omega."""
+    """From rest under a growing force to a steady state at circular frequency omega.
+
+    Args:
+        mean: (N n, 3) mean contact forces that hold each other; those of the preload when None [N].
+    """
     N = wheel.count
     ring = ring_of(wheel)
     e = wheel.all_elements
@@ -184,6 +194,8 @@ def march(
     preload = np.zeros((len(e.kt), 3))
     preload[:, 0] = np.maximum(e.n0, 0.0)
     preload[:, 1:] = e.traction
+    if mean is not None:
+        preload = mean
     # sliders from which the friction forces of the preload state follow at rest
     slider = -e.traction / e.kt[:, None]
     x, v = np.zeros(len(ring.omega)), np.zeros(len(ring.omega))
@@ -192,9 +204,11 @@ def march(
     waves = np.exp(-1j * np.outer(np.arange(1, 8), 2 * np.pi * (1 + np.arange(steps)) / steps))
     history: list[np.ndarray] = []
     motion = np.empty((steps, N))
-    moves = np.empty((steps, len(e.kt), 3))
+    moves = np.zeros((steps, len(e.kt), 3))
     change = np.inf
+    walk = 0.0
     for period in range(most):
+        began = moves[-1].copy()
         slipped = np.zeros(len(e.kt), dtype=bool)
         lifted = np.zeros(len(e.kt), dtype=bool)
         for step in range(steps):
@@ -228,6 +242,7 @@ def march(
             motion[step] -= ring.residual["probe", "contact"] @ push[:contacts]
             motion[step] -= ring.residual["probe", "blade"] @ push[contacts:]
         history.append(2 / steps * waves @ motion)
+        walk = float(np.sqrt(np.mean(np.sum((moves[-1] - began) ** 2, axis=1))))
         if (period + 1) % STEADY_PERIODS == 0 and period + 1 >= 2 * STEADY_PERIODS + RAMP:
             means = [
                 np.mean(
@@ -246,6 +261,7 @@ def march(
         period + 1,
         float(slipped.mean()),
         float(lifted.mean()),
+        walk,
         moves,
     )
 
@@ -273,8 +289,11 @@ def wheel_of_run(run: SolvedRun) -> tuple[Wheel, Pattern, PatternResponse]:
 
 def balances(
     wheel: Wheel, pattern: Pattern, omega: float, harmonics: list[int], options: Options
-) -> None:
-    """Print the highest blade with several harmonics, each from the one before."""
+) -> WheelSolution | None:
+    """Print the highest blade with several harmonics, each from the one before; the last one with
+    held means that is solved.
+    """
+    start: WheelSolution | None = None
     for coupled in (True, False):
         one = replace(wheel, coupled=coupled)
         start = None
@@ -292,6 +311,21 @@ def balances(
                 flush=True,
             )
             start = point if point.converged else start
+    return start
+
+
+def print_march(marched: Marched, steps: int, seconds: float, found: PatternResponse) -> None:
+    """What a march gave, beside the response of the run."""
+    print(
+        f"marched, {steps} steps: blade {marched.size.argmax() + 1}, "
+        f"{1e6 * marched.size.max():.2f} um after {marched.periods} periods, still changing by "
+        f"{100 * marched.change:.2g} %; {100 * marched.slipping:.0f} % of the contacts slip, "
+        f"{100 * marched.lifting:.0f} % lift off; they go on by {1e6 * marched.walk:.2g} um a "
+        f"period; {seconds:.0f} s of CPU",
+        flush=True,
+    )
+    off = np.abs(marched.size - found.solution.size()).max() / marched.size.max()
+    print(f"largest difference of any blade {100 * off:.2g} % of the highest", flush=True)
 
 
 def main() -> None:
@@ -299,6 +333,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--set", action="append", default=[], dest="overrides")
     parser.add_argument("--harmonics", type=int, nargs="+", default=[1, 3, 5, 7])
+    parser.add_argument("--hold-means", action="store_true")
     parser.add_argument("--steps", type=int, nargs="+", default=[STEPS])
     parser.add_argument("--output", type=Path, default=Path("runs") / "mistuned")
     arguments = parser.parse_args()
@@ -314,20 +349,16 @@ def main() -> None:
         flush=True,
     )
     options = solver_options(run.scene.accuracy)
-    balances(wheel, pattern, omega, arguments.harmonics, options)
+    point = balances(wheel, pattern, omega, arguments.harmonics, options)
+    means: list[np.ndarray | None] = [None]
+    if arguments.hold_means and point is not None:
+        means.append(point.f[..., 0].reshape(-1, point.f.shape[2]))
     for steps in arguments.steps:
-        begun = time.process_time()
-        marched = march(wheel, pattern, omega, steps)
-        print(
-            f"marched, {steps} steps: blade {marched.size.argmax() + 1}, "
-            f"{1e6 * marched.size.max():.2f} um after {marched.periods} periods, still changing by "
-            f"{100 * marched.change:.2g} %; {100 * marched.slipping:.0f} % of the contacts slip, "
-            f"{100 * marched.lifting:.0f} % lift off; "
-            f"{time.process_time() - begun:.0f} s of CPU",
-            flush=True,
-        )
-        off = np.abs(marched.size - found.solution.size()).max() / marched.size.max()
-        print(f"largest difference of any blade {100 * off:.2g} % of the highest", flush=True)
+        for mean in means:
+            begun = time.process_time()
+            marched = march(wheel, pattern, omega, steps, mean=mean)
+            print("free means:" if mean is None else "mean forces of the balance:")
+            print_march(marched, steps, time.process_time() - begun, found)
 
 
 if __name__ == "__main__":

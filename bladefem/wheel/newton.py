@@ -17,15 +17,22 @@ from ..friction.fourier import to_complex, to_real
 from ..hbm.solver.newton import Options
 from ..util.newton import Outcome, StepError, halve_step, iterate_newton
 from .contact_forces import ContactForces, contact_forces
+from .coupled_preconditioner import CoupledPreconditioner, make_coupled_preconditioner
 from .flexibility import WheelFlexibility
 from .model import Wheel
 from .preconditioner import Preconditioner, make_preconditioner
 from .tuned import travelling_order
 from .wave_preconditioner import WavePreconditioner, make_wave_preconditioner
 
-# vectors kept by GMRES, and restarts
-GMRES_BASIS = 60
-GMRES_RESTARTS = 4
+AnyPreconditioner = Preconditioner | WavePreconditioner | CoupledPreconditioner
+
+# vectors kept by GMRES: at least, at most, and numbers in all of them between (100 MB); where
+# blades and harmonics differ much a restart forgets what the next vectors need
+LEAST_BASIS = 60
+MOST_BASIS = 400
+BASIS_NUMBERS = 12_500_000
+# products of one solve, at least; more where a larger basis goes without a restart
+GMRES_PRODUCTS = 240
 # relative accuracy of a step: loose far from the solution, tight near it
 LOOSE_STEP_TOLERANCE = 1e-2
 TIGHT_STEP_TOLERANCE = 1e-6
@@ -43,6 +50,8 @@ SHORTEST_STEP_SHARE = 2.0**-8
 # is tried
 SLOW_SOLVE_PRODUCTS = 12
 MANY_PRODUCTS = 40
+# products of one solve that the coupled preconditioner's matrix is worth
+COUPLED_PRODUCTS = 80
 
 
 @dataclass(frozen=True)
@@ -147,19 +156,27 @@ def newton_wheel(
 class _Steps:
     """Newton steps of one run; the preconditioner is renewed where GMRES takes long.
 
-    Of its two kinds that by waves couples the harmonics, that by harmonics what is mistuned: the
-    first is taken where there are harmonics to couple, and the other where that takes long.
+    Of its kinds that by waves couples the harmonics, that by harmonics what is mistuned, and the
+    coupled one, which costs most to make, both: the first is taken where there are harmonics to
+    couple, and another where the present one takes long.
     """
 
     def __init__(self, balance: WheelBalance) -> None:
         self.balance = balance
-        self.preconditioner: Preconditioner | WavePreconditioner | None = None
+        self.preconditioner: AnyPreconditioner | None = None
         self.stale = True
         self.products = 0
         self.order = _wave_order(balance.wheel)
-        self.by_waves = self.order is not None and balance.stuck.shape[3] > FEW_COEFFICIENTS
+        few = balance.stuck.shape[3] <= FEW_COEFFICIENTS
+        # in the order in which they are tried
+        self.kinds = ["harmonics", "coupled"] if few else ["waves", "coupled", "harmonics"]
+        if self.order is None:
+            self.kinds = ["harmonics", "coupled"]
+        elif few:
+            self.kinds.append("waves")
+        self.kind = self.kinds[0]
         # products that a new preconditioner of each kind took last
-        self.took: dict[bool, int] = {}
+        self.took: dict[str, int] = {}
 
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
@@ -172,26 +189,26 @@ class _Steps:
         before = self.products
         found, failed = self._solve(state, state.residual, goal)
         if failed:
-            if new and self.order is not None:
-                self.took[self.by_waves] = self.products - before
-                self.by_waves = not self.by_waves
+            if new:
+                self.took[self.kind] = self.products - before
+                self._choose_kind()
             self._renew(state)
             before = self.products
             found, failed = self._solve(state, state.residual, goal)
             new = True
         taken = self.products - before
         if new:
-            self.took[self.by_waves] = taken
-        self.stale = taken > SLOW_SOLVE_PRODUCTS
+            self.took[self.kind] = taken
+        self.stale = taken > (COUPLED_PRODUCTS if self.kind == "coupled" else SLOW_SOLVE_PRODUCTS)
         return found, not failed
 
     def _choose_kind(self) -> None:
-        """Where the present kind took long, the other one unless that took longer."""
-        taken = self.took.get(self.by_waves, 0)
-        if self.order is not None and taken > max(
-            MANY_PRODUCTS, self.took.get(not self.by_waves, 0)
-        ):
-            self.by_waves = not self.by_waves
+        """Where the present kind took long, one that was not tried or that took least."""
+        taken = self.took.get(self.kind, 0)
+        if taken <= MANY_PRODUCTS:
+            return
+        kinds = [kind for kind in self.kinds if kind != "coupled" or taken > COUPLED_PRODUCTS]
+        self.kind = min(kinds, key=lambda kind: self.took.get(kind, 0))
 
     def next_length(
         self,
@@ -202,18 +219,24 @@ class _Steps:
         found, _ = self._solve(state, residual, TRIAL_TOLERANCE * float(np.linalg.norm(residual)))
         return float(np.linalg.norm(found))
 
-    def _renew(self, state: WheelState) -> Preconditioner | WavePreconditioner:
+    def _renew(self, state: WheelState) -> AnyPreconditioner:
         flex = self.balance.flex
         change = state.forces.jacobian
-        made: Preconditioner | WavePreconditioner | None = None
-        if self.by_waves and self.order is not None:
-            made = make_wave_preconditioner(flex, change, self.order)
+        made: AnyPreconditioner | None = None
+        while made is None:
+            if self.kind == "waves" and self.order is not None:
+                made = make_wave_preconditioner(flex, change, self.order)
+            elif self.kind == "coupled":
+                made = make_coupled_preconditioner(flex, change)
+            else:
+                made = make_preconditioner(flex, change)
             if made is None:
-                # too many unknowns: nor will there be fewer in another step
-                self.by_waves, self.order = False, None
-        self.preconditioner = made or make_preconditioner(flex, change)
+                # too many unknowns, or nothing to couple: nor will it be otherwise in another step
+                self.kinds.remove(self.kind)
+                self.kind = min(self.kinds, key=lambda kind: self.took.get(kind, 0))
+        self.preconditioner = made
         self.stale = False
-        return self.preconditioner
+        return made
 
     def _solve(
         self,
@@ -236,10 +259,10 @@ class _Steps:
 
         size = state.residual.size
         operator = LinearOperator((size, size), matvec=product, dtype=float)
+        basis = int(np.clip(BASIS_NUMBERS // max(size, 1), LEAST_BASIS, MOST_BASIS))
+        restarts = -(-GMRES_PRODUCTS // basis)
         # SciPy's versions name the relative tolerance differently: atol rules where it is larger
-        y, failed = gmres(
-            operator, residual.ravel(), atol=goal, restart=GMRES_BASIS, maxiter=GMRES_RESTARTS
-        )
+        y, failed = gmres(operator, residual.ravel(), atol=goal, restart=basis, maxiter=restarts)
         return prepare(y.reshape(flat)).reshape(shape), failed != 0
 
 

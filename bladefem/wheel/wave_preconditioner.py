@@ -163,7 +163,7 @@ def _averaged(
     d = change.shape[1] // K
     n = len(change) // max(len(sectors), 1)
     split = change.reshape(len(sectors), n, d, K, d, K)
-    to, back = _two_sided(H)
+    to, back = two_sided_maps(H)
     hs = np.arange(K) - H
     total = np.zeros((n, d, K, d, K), dtype=complex)
     for sector, own in zip(sectors, split, strict=True):
@@ -180,7 +180,7 @@ def _turned(own: np.ndarray, turn: np.ndarray, to: np.ndarray, back: np.ndarray)
     return found.swapaxes(2, 3)
 
 
-def _two_sided(H: int) -> tuple[np.ndarray, np.ndarray]:
+def two_sided_maps(H: int) -> tuple[np.ndarray, np.ndarray]:
     """(2H+1, 2H+1) complex amplitudes of harmonics -H..H from mean, cos 1, sin 1, ..., and the
     inverse.
     """

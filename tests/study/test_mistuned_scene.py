@@ -26,7 +26,7 @@ from bladefem.study.mistuning.blade_stress import (
 )
 from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
 from bladefem.study.mistuning.pattern_response import richer_balance
-from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
+from bladefem.study.mistuning.stage import scatter_balance, scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, whole_wheel
 from bladefem.study.pipeline import pipeline
@@ -243,6 +243,8 @@ def test_blades_of_another_shape(tmp_path):
     assert found.peak.blade in odd
     assert found.own_stress.largest == pytest.approx(found.stress.largest, rel=0.1)
     assert any("that of its own aerofoil" in text for text in run.messages)
+    # the coarse scene's own curves hold means too, and cannot say what free ones change
+    assert any("what free ones change is not known" in text for text in run.messages)
     again = with_whole_wheel(pipeline.run(scene, tmp_path))
     assert any(text.startswith("other_blades: found") for text in again.messages)
 
@@ -424,3 +426,13 @@ def test_scatter_of_several_masses_is_refused_before_long_work():
     scene = load_scene(MISTUNED, ["study.masses=10 g, 20 g"])
     with pytest.raises(InputError, match="study.masses: 2 damper masses, expected one"):
         refuse_scatter(scene)
+
+
+@pytest.mark.parametrize(("given", "H"), [(None, 3), (7, 7)])
+def test_statistics_begin_with_few_harmonics(given, H):
+    """A tuned curve under a light load may need more, unless the scene gives them."""
+    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = vary(scene, model__harmonics=given)
+    curve = SimpleNamespace(settings=SimpleNamespace(harmonics=7, samples=64))
+    wheel = SimpleNamespace(excitation={1: None})
+    assert scatter_balance(scene, wheel, curve) == (H, 64)

@@ -31,6 +31,8 @@ MOST_HARMONICS = 15
 # harmonics that judge the error at least where one is excited: a higher one may meet a lightly
 # damped mode, of which the next one alone knows nothing
 JUDGING_HARMONICS = 7
+# flexibility products of one point up to which all points of a search may be solved like it
+MOST_SEARCH_PRODUCTS = 400
 # relative error of a peak's height by the search over frequencies
 SEARCH_TOLERANCE = 0.01
 
@@ -228,15 +230,35 @@ def chosen_peak(
     """
     H, samples = first
     while True:
-        peak, solution, changes = _peak_of_pattern(
-            wheel, pattern, grid, H, samples, harmonic, options
-        )
+        peak, solution = _peak_of_pattern(wheel, pattern, grid, H, samples, harmonic, options)
+        judged = _judge(wheel, pattern, solution, (H, samples), options, wanted, most * harmonic)
+        last = judged[-1]
         # of NaN nothing says that richer settings are solved
-        enough = wanted is None or not any(change > wanted for change in changes)
-        more = richer_balance(wheel, H, samples)
-        if enough or more[0] > most * harmonic:
-            return ChosenPeak(peak, solution, H, samples, changes[-1])
-        H, samples = more
+        if not _asks_for_more(last, wanted, most * harmonic):
+            return ChosenPeak(peak, solution, H, samples, last.change)
+        H, samples = last.harmonics, last.samples
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a richer balance changes at a peak."""
+
+    harmonics: int
+    samples: int
+    # relative, of the highest blade; NaN: not solved
+    change: float
+    # flexibility products of its point
+    products: int
+
+
+def _asks_for_more(judged: Judged, wanted: float | None, most: int) -> bool:
+    """A search with the richer balance is wanted, and affordable."""
+    return (
+        wanted is not None
+        and judged.change > wanted
+        and judged.harmonics <= most
+        and judged.products <= MOST_SEARCH_PRODUCTS
+    )
 
 
 def richer_balance(wheel: Wheel, H: int, samples: int) -> tuple[int, int]:
@@ -256,24 +278,42 @@ def _peak_of_pattern(
     samples: int,
     harmonic: int,
     options: Options,
-) -> tuple[WheelPeak, WheelSolution, list[float]]:
-    """The peak, its solution, and the relative changes of its height there with the harmonics and
-    samples of `judging_balances`, from the first one not solved on NaN.
-    """
+) -> tuple[WheelPeak, WheelSolution]:
+    """The peak and its solution."""
     solved = in_common_period(wheel_respond(wheel, pattern, H, samples, options), harmonic)
     peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
     omega = peak.omega / harmonic
-    solution = solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
-    changes: list[float] = []
+    return peak, solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
+
+
+def _judge(
+    wheel: Wheel,
+    pattern: Pattern,
+    solution: WheelSolution,
+    present: tuple[int, int],
+    options: Options,
+    wanted: float | None,
+    most: int,
+) -> list[Judged]:
+    """What `judging_balances` of the present harmonics and samples change at a peak, up to one that
+    asks for a search of its own; from the first one not solved on NaN.
+    """
+    found: list[Judged] = []
     point = solution
-    for more in judging_balances(wheel, H, samples):
+    for more in judging_balances(wheel, *present):
+        products = 0
         if point.converged:
             # where the poorer balance is no start for the richer one nothing else is likely to be
-            own = options if not changes else replace(options, fallbacks=False)
-            point = solve_wheel(wheel, omega, *more, pattern=pattern, start=point, options=own)
+            own = options if not found else replace(options, fallbacks=False)
+            point = solve_wheel(
+                wheel, solution.omega, *more, pattern=pattern, start=point, options=own
+            )
+            products = point.products
         change = abs(point.size().max() / solution.size().max() - 1)
-        changes.append(float(change) if point.converged else float("nan"))
-    return peak, solution, changes
+        found.append(Judged(*more, float(change) if point.converged else float("nan"), products))
+        if _asks_for_more(found[-1], wanted, most):
+            break
+    return found
 
 
 def judging_balances(wheel: Wheel, H: int, samples: int) -> list[tuple[int, int]]:
@@ -286,8 +326,12 @@ def judging_balances(wheel: Wheel, H: int, samples: int) -> list[tuple[int, int]
     return found
 
 
-def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
-    """What a reader has to know."""
+def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> list[str]:
+    """What a reader has to know.
+
+    Args:
+        held_means: of the sector's own curves too, which then say nothing about free ones.
+    """
     sentences = []
     for r in found:
         error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
@@ -314,11 +358,12 @@ def pattern_sentences(found: Sequence[PatternResponse]) -> list[str]:
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))
     far = max(abs(r.sector_difference) for r in found)
-    moved = (
-        "where engine orders beyond the tuned sector's excite as well"
-        if np.isnan(far)
-        else f"which moves the tuned resonance by {100 * far:.2g} % at most"
-    )
+    if np.isnan(far):
+        moved = "where engine orders beyond the tuned sector's excite as well"
+    elif held_means:
+        moved = "as the tuned curves do (model.static): what free ones change is not known"
+    else:
+        moved = f"which moves the tuned resonance by {100 * far:.2g} % at most"
     sentences.append(f"the whole wheel holds mean displacements in the preload state, {moved}")
     return sentences
 

@@ -102,7 +102,8 @@ def with_whole_wheel(
         wheel=[found],
         timings={**run.timings, "whole wheel": time.perf_counter() - start},
     )
-    said = filter(None, [*pattern_sentences([found]), wheel_utilisation_message(result)])
+    held = run.scene.model.static == "uncoupled"
+    said = filter(None, [*pattern_sentences([found], held), wheel_utilisation_message(result)])
     return replace(result, messages=[*run.messages, *remarks, *said])
 
 
@@ -170,6 +171,17 @@ def wanted_truncation(scene: Scene) -> float | None:
     that the scene gives are kept.
     """
     return scene.accuracy / 2 if scene.model.harmonics is None else None
+
+
+def scatter_balance(scene: Scene, wheel: Wheel, curve: Curve) -> tuple[int, int]:
+    """Harmonics and samples that whole wheels of the statistics begin with: those of the curve, at
+    most SCATTER_HARMONICS of the engine order unless the scene gives more.
+    """
+    harmonic = own_harmonic(scene)
+    H, samples = first_balance(wheel, curve, harmonic)
+    if scene.model.harmonics is None:
+        H = min(H, max(SCATTER_HARMONICS * harmonic, *wheel.excitation))
+    return H, samples
 
 
 def with_balance(found: Amplification, chosen: ChosenPeak) -> Amplification:
@@ -288,7 +300,7 @@ def _kept_statistics(
             wheel,
             pattern,
             frequency_grid(wheel, curve, pattern, spread, harmonic),
-            first_balance(wheel, curve, harmonic),
+            scatter_balance(scene, wheel, curve),
             harmonic,
             options,
             wanted_truncation(scene),
