@@ -24,9 +24,10 @@ from bladefem.study.mistuning.blade_stress import (
     all_modes,
     blade_motion,
 )
+from bladefem.study.mistuning.drawn_wheels import scatter_balance
 from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
 from bladefem.study.mistuning.pattern_response import richer_balance
-from bladefem.study.mistuning.stage import scatter_balance, scatter_of_run, with_whole_wheel
+from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter
 from bladefem.study.mistuning.whole_wheel import blade_readings, whole_wheel
 from bladefem.study.pipeline import pipeline

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...hbm.linear_resonances import free_resonances
 from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
+from ...scene.tables import Scene
 from ...wheel.model import Pattern, Wheel
 from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
@@ -212,6 +213,13 @@ def first_balance(wheel: Wheel, curve: Curve, harmonic: int) -> tuple[int, int]:
     settings = curve.settings
     H = max(harmonic * settings.harmonics, *wheel.excitation)
     return H, max(harmonic * settings.samples, 8 * (H + 1))
+
+
+def wanted_truncation(scene: Scene) -> float | None:
+    """Estimated error by harmonics and samples above which a wheel takes more of them; None: those
+    that the scene gives are kept.
+    """
+    return scene.accuracy / 2 if scene.model.harmonics is None else None
 
 
 def chosen_peak(

@@ -18,16 +18,12 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.message import warning
 from ...util.progress import Progress, without_progress
-from ...wheel.model import Pattern, Wheel, frequency_pattern
+from ...wheel.model import Pattern, Wheel
 from ...wheel.pattern_file import BladeDeviations
-from ...wheel.resonance import find_wheel_peak
-from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
-from ...wheel.solve import TUNED_PATTERN, WheelSolution
+from ...wheel.solve import WheelSolution
 from ...wheel.statistics import (
     Amplification,
     joined_loads,
-    scatter_statistics,
-    wheel_respond,
 )
 from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
@@ -41,28 +37,19 @@ from ..pipeline.stage_inputs import stage_key
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_material import deviation_pattern
 from .blade_stress import WheelShapes, all_modes, blade_motion
+from .drawn_wheels import drawn_statistics, drawn_wheels
 from .engine_orders import own_harmonic
-from .law_level import law_level, with_checks
 from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
 from .own_stress import OwnStress, own_stress
 from .pattern_response import (
-    SEARCH_TOLERANCE,
-    ChosenPeak,
     PatternResponse,
-    chosen_peak,
-    first_balance,
-    frequency_grid,
-    in_common_period,
     pattern_response,
     pattern_sentences,
+    wanted_truncation,
 )
 from .scatter_use import ScatteredUse, scattered_use
-from .validate import LAW_LEVEL, refuse_scatter, scene_deviations, scene_scatter
+from .validate import refuse_scatter, scene_deviations
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
-
-# harmonics of the engine order that many wheels take at most: what these leave is told, and most of
-# it is the tuned wheel's too, over which amplifications are counted
-SCATTER_HARMONICS = 3
 
 
 def with_whole_wheel(
@@ -166,33 +153,6 @@ def _best_response(
     )
 
 
-def wanted_truncation(scene: Scene) -> float | None:
-    """Estimated error by harmonics and samples above which a wheel takes more of them; None: those
-    that the scene gives are kept.
-    """
-    return scene.accuracy / 2 if scene.model.harmonics is None else None
-
-
-def scatter_balance(scene: Scene, wheel: Wheel, curve: Curve) -> tuple[int, int]:
-    """Harmonics and samples that whole wheels of the statistics begin with: those of the curve, at
-    most SCATTER_HARMONICS of the engine order unless the scene gives more.
-    """
-    harmonic = own_harmonic(scene)
-    H, samples = first_balance(wheel, curve, harmonic)
-    if scene.model.harmonics is None:
-        H = min(H, max(SCATTER_HARMONICS * harmonic, *wheel.excitation))
-    return H, samples
-
-
-def with_balance(found: Amplification, chosen: ChosenPeak) -> Amplification:
-    """Statistics of one load with the harmonics of its whole wheels, and what these leave."""
-    return replace(
-        found,
-        harmonics=np.array([chosen.harmonics]),
-        truncation=np.array([chosen.truncation]),
-    )
-
-
 def _own_stress(
     run: SolvedRun,
     families: int,
@@ -283,71 +243,12 @@ def _kept_statistics(
     progress: Progress,
 ) -> Amplification:
     """Statistics under the load of one curve, computed or found in the folder."""
-    scene = run.scene
-    spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
-    harmonic = own_harmonic(scene)
-    families = len(sector.families)
-    options = solver_options(scene.accuracy)
-    if others is not None:
-        spread += abs(others.frequencies(wheel.count, families)).max()
-
-    def made(deviation: np.ndarray) -> Pattern:
-        pattern = frequency_pattern(sector.families, deviation)
-        return pattern if others is None else others.added(pattern, wheel.count)
-
-    def chosen_for(pattern: Pattern) -> ChosenPeak:
-        return chosen_peak(
-            wheel,
-            pattern,
-            frequency_grid(wheel, curve, pattern, spread, harmonic),
-            scatter_balance(scene, wheel, curve),
-            harmonic,
-            options,
-            wanted_truncation(scene),
-            SCATTER_HARMONICS,
-        )
 
     def compute() -> Amplification:
-        patterns = drawn_patterns(
-            wheel,
-            scene_scatter(scene),
-            scene.mistuning.wheels,
-            made,
-        )
-        # by the first wheel drawn: all have the same contacts
-        chosen = on_root(comm, lambda: chosen_for(patterns[0]))
-        H, samples = chosen.harmonics, chosen.samples
-        if scene.mistuning.level == LAW_LEVEL:
-            grid = frequency_grid(wheel, curve, TUNED_PATTERN, spread)
-            band = float(grid[0]), float(grid[-1])
-            drawn = scene_scatter(scene)
-            mode = scene.excitation.mode - 1
-            cheap = on_root(comm, lambda: law_level(wheel, patterns, drawn, curve, mode, band))
+        drawn = drawn_wheels(run.scene, sector.families, wheel, curve, others)
+        return drawn_statistics(drawn, comm, progress)
 
-            def whole_peak(pattern: Pattern) -> float:
-                own = frequency_grid(wheel, curve, pattern, spread, harmonic)
-                return find_wheel_peak(
-                    wheel_respond(wheel, pattern, H, samples, options), own, SEARCH_TOLERANCE
-                ).height
-
-            checks = scene.mistuning.checks
-            return with_balance(
-                with_checks(cheap, patterns, whole_peak, checks, comm, progress), chosen
-            )
-        found = scatter_statistics(
-            {curve.load: wheel},
-            {curve.load: patterns},
-            lambda load, pattern: frequency_grid(wheel, curve, pattern, spread, harmonic),
-            lambda wheel, pattern: in_common_period(
-                wheel_respond(wheel, pattern, H, samples, options), harmonic
-            ),
-            comm,
-            SEARCH_TOLERANCE,
-            progress,
-        )
-        return with_balance(found, chosen)
-
-    key = stage_key("scatter", scene, curve.load, curve.peak.omega, *_blade_keys(scene))
+    key = stage_key("scatter", run.scene, curve.load, curve.peak.omega, *_blade_keys(run.scene))
     found, _ = cached_stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)
     return found
 

@@ -1,0 +1,177 @@
+"""Many drawn wheels under the load of one curve: what all of them take, and their statistics, by
+whole wheels or by the damper law.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...io.stage_cache import on_root
+from ...scene.tables import Scene
+from ...util.communicator import Communicator
+from ...util.progress import Progress
+from ...wheel.model import Pattern, Wheel, frequency_pattern
+from ...wheel.resonance import find_wheel_peak
+from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
+from ...wheel.solve import TUNED_PATTERN
+from ...wheel.statistics import Amplification, Respond, scatter_statistics, wheel_respond
+from ..adaptive.choice import solver_options
+from ..pipeline.loads import Curve
+from .engine_orders import own_harmonic
+from .law_level import law_level, with_checks
+from .other_blades import OtherBlades
+from .pattern_response import (
+    SEARCH_TOLERANCE,
+    ChosenPeak,
+    chosen_peak,
+    first_balance,
+    frequency_grid,
+    in_common_period,
+    wanted_truncation,
+)
+from .validate import LAW_LEVEL, scene_scatter
+
+# harmonics of the engine order that many wheels take at most: what these leave is told, and most of
+# it is the tuned wheel's too, over which amplifications are counted
+SCATTER_HARMONICS = 3
+
+
+@dataclass(frozen=True)
+class DrawnWheels:
+    """Patterns of a scene's scatter, on the wheel under the load of a curve."""
+
+    scene: Scene
+    wheel: Wheel
+    curve: Curve
+    patterns: list[Pattern]
+    # largest relative deviation of a blade's frequency, roughly
+    spread: float
+
+    @property
+    def harmonic(self) -> int:
+        """Of the common period that is the scene's engine order."""
+        return own_harmonic(self.scene)
+
+    def grid(self, pattern: Pattern) -> np.ndarray:
+        """Circular frequencies at which the resonance with a pattern is looked for [rad/s]."""
+        return frequency_grid(self.wheel, self.curve, pattern, self.spread, self.harmonic)
+
+    def respond(self, pattern: Pattern, chosen: ChosenPeak) -> Respond:
+        """The wheel's motion with a pattern, by the harmonics that were chosen."""
+        options = solver_options(self.scene.accuracy)
+        return wheel_respond(self.wheel, pattern, chosen.harmonics, chosen.samples, options)
+
+
+def drawn_wheels(
+    scene: Scene,
+    families: np.ndarray,
+    wheel: Wheel,
+    curve: Curve,
+    others: OtherBlades | None,
+) -> DrawnWheels:
+    """The wheels that a scene draws.
+
+    Args:
+        families: (families,) frequencies of the blade alone [rad/s].
+        others: blades of another shape, which all of the wheels have.
+    """
+    spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
+    if others is not None:
+        spread += abs(others.frequencies(wheel.count, len(families))).max()
+
+    def made(deviation: np.ndarray) -> Pattern:
+        pattern = frequency_pattern(families, deviation)
+        return pattern if others is None else others.added(pattern, wheel.count)
+
+    patterns = drawn_patterns(wheel, scene_scatter(scene), scene.mistuning.wheels, made)
+    return DrawnWheels(scene, wheel, curve, patterns, spread)
+
+
+def drawn_statistics(
+    drawn: DrawnWheels,
+    comm: Communicator | None,
+    progress: Progress,
+) -> Amplification:
+    """Statistics of the highest blade, at the level that the scene asks for."""
+    # by the first wheel drawn: all have the same contacts
+    chosen = on_root(comm, lambda: _chosen_balance(drawn))
+    by_law = drawn.scene.mistuning.level == LAW_LEVEL
+    found = (_by_damper_law if by_law else _by_whole_wheels)(drawn, chosen, comm, progress)
+    return with_balance(found, chosen)
+
+
+def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
+    """Harmonics and samples that the first wheel needs."""
+    pattern = drawn.patterns[0]
+    return chosen_peak(
+        drawn.wheel,
+        pattern,
+        drawn.grid(pattern),
+        scatter_balance(drawn.scene, drawn.wheel, drawn.curve),
+        drawn.harmonic,
+        solver_options(drawn.scene.accuracy),
+        wanted_truncation(drawn.scene),
+        SCATTER_HARMONICS,
+    )
+
+
+def _by_damper_law(
+    drawn: DrawnWheels,
+    chosen: ChosenPeak,
+    comm: Communicator | None,
+    progress: Progress,
+) -> Amplification:
+    """All wheels by the damper law, some of them checked as whole wheels."""
+    scene, wheel, curve = drawn.scene, drawn.wheel, drawn.curve
+    grid = frequency_grid(wheel, curve, TUNED_PATTERN, drawn.spread)
+    band = float(grid[0]), float(grid[-1])
+    scatter = scene_scatter(scene)
+    mode = scene.excitation.mode - 1
+    cheap = on_root(comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, band))
+
+    def whole_peak(pattern: Pattern) -> float:
+        respond = drawn.respond(pattern, chosen)
+        return find_wheel_peak(respond, drawn.grid(pattern), SEARCH_TOLERANCE).height
+
+    return with_checks(cheap, drawn.patterns, whole_peak, scene.mistuning.checks, comm, progress)
+
+
+def _by_whole_wheels(
+    drawn: DrawnWheels,
+    chosen: ChosenPeak,
+    comm: Communicator | None,
+    progress: Progress,
+) -> Amplification:
+    """All wheels one by one, dealt out over the ranks."""
+    load = drawn.curve.load
+    return scatter_statistics(
+        {load: drawn.wheel},
+        {load: drawn.patterns},
+        lambda _, pattern: drawn.grid(pattern),
+        lambda _, pattern: in_common_period(drawn.respond(pattern, chosen), drawn.harmonic),
+        comm,
+        SEARCH_TOLERANCE,
+        progress,
+    )
+
+
+def scatter_balance(scene: Scene, wheel: Wheel, curve: Curve) -> tuple[int, int]:
+    """Harmonics and samples that whole wheels of the statistics begin with: those of the curve, at
+    most SCATTER_HARMONICS of the engine order unless the scene gives more.
+    """
+    harmonic = own_harmonic(scene)
+    H, samples = first_balance(wheel, curve, harmonic)
+    if scene.model.harmonics is None:
+        H = min(H, max(SCATTER_HARMONICS * harmonic, *wheel.excitation))
+    return H, samples
+
+
+def with_balance(found: Amplification, chosen: ChosenPeak) -> Amplification:
+    """Statistics of one load with the harmonics of its whole wheels, and what these leave."""
+    return replace(
+        found,
+        harmonics=np.array([chosen.harmonics]),
+        truncation=np.array([chosen.truncation]),
+    )
