@@ -97,6 +97,7 @@ def run_of(scene: Scene, mean: float) -> SimpleNamespace:
         load=80.0,
         peak_amplitude=1.0,
         balance_amplitude=1.0,
+        over_balance=1.0,
         interval=SimpleNamespace(highest=1.2, lowest=0.9),
     )
     bodies = {"blade": np.array([[0, 1]]), "damper": np.array([[2, 2]])}
@@ -120,7 +121,7 @@ def test_a_run_knows_its_utilisation_and_its_bound():
         utilisation_message(run)
     )
     # a march that keeps to more than the balance, whose stresses they are
-    run.response.curves[0].peak_amplitude = 1.5
+    run.response.curves[0].over_balance = 1.5
     assert highest_use(run, 0, found) == pytest.approx(0.3 * 1.5 * 1.1, rel=1e-12)
     assert run_utilisation(run_of(Scene(), 0.0)) == {}
     assert utilisation_message(run_of(Scene(), 0.0)) == ""
