@@ -84,7 +84,8 @@ def iterative_inverse(
             then conjugate residuals alone are tried, and numpy.linalg.LinAlgError is raised where
             they do not find the solution.
     """
-    return partial(_solve_system, _System((flex, change), memory or Memory(), motions, ramp))
+    system = _System((flex, change), memory or Memory(), motions, ramp or no_ramp())
+    return partial(_solve_system, system)
 
 
 @dataclass
@@ -94,7 +95,7 @@ class _System:
     double: Parts
     memory: Memory
     motions: np.ndarray | None
-    ramp: Ramp | None = None
+    ramp: Ramp
     count: int = 0
     # the second level belongs to this derivative
     fresh: bool = False
@@ -121,14 +122,14 @@ class _System:
             return
         d = len(self.motions) // len(change)
         nodes = np.arange(len(change))
-        ramp = self.ramp or no_ramp()
-        self.memory.level = second_level(flex, change, ramp, self.motions, nodes, d)
+        self.memory.level = second_level(flex, change, self.ramp, self.motions, nodes, d)
 
     def reach(self, residual: np.ndarray, accuracy: float, x: np.ndarray) -> int:
         """Fill x by conjugate residuals with the present level; the number of directions."""
         flex, change = self.double
-        ramp, level = self.ramp or no_ramp(), self.memory.level
-        return int(conjugate_residuals(flex, change, ramp, residual.ravel(), accuracy, level, x))
+        level = self.memory.level
+        right = residual.ravel()
+        return int(conjugate_residuals(flex, change, self.ramp, right, accuracy, level, x))
 
     def directions(
         self,
@@ -196,7 +197,7 @@ def _solve_system(
     found = system.directions(residual, accuracy)
     if found is not None:
         return found
-    if system.ramp is not None:
+    if len(system.ramp[0]):
         raise np.linalg.LinAlgError("conjugate residuals did not solve for the Newton step")
     if fresh:
         system.renew()

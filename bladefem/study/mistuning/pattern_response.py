@@ -239,12 +239,11 @@ def chosen_peak(
     H, samples = first
     while True:
         peak, solution = _peak_of_pattern(wheel, pattern, grid, H, samples, harmonic, options)
-        judged = _judge(wheel, pattern, solution, (H, samples), options, wanted, most * harmonic)
-        last = judged[-1]
+        judged = _judged(wheel, pattern, solution, (H, samples), options, wanted, most * harmonic)
         # of NaN nothing says that richer settings are solved
-        if not _asks_for_more(last, wanted, most * harmonic):
-            return ChosenPeak(peak, solution, H, samples, last.change)
-        H, samples = last.harmonics, last.samples
+        if not _asks_for_more(judged, wanted, most * harmonic):
+            return ChosenPeak(peak, solution, H, samples, judged.change)
+        H, samples = judged.harmonics, judged.samples
 
 
 @dataclass(frozen=True)
@@ -294,7 +293,7 @@ def _peak_of_pattern(
     return peak, solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
 
 
-def _judge(
+def _judged(
     wheel: Wheel,
     pattern: Pattern,
     solution: WheelSolution,
@@ -302,24 +301,24 @@ def _judge(
     options: Options,
     wanted: float | None,
     most: int,
-) -> list[Judged]:
-    """What `judging_balances` of the present harmonics and samples change at a peak, up to one that
-    asks for a search of its own; from the first one not solved on NaN.
+) -> Judged:
+    """What the last one of `judging_balances` of the present harmonics and samples changes at a
+    peak, or the first one that asks for a search of its own; NaN where one before it is not solved.
     """
-    found: list[Judged] = []
+    found = Judged(*present, 0.0, 0)
     point = solution
-    for more in judging_balances(wheel, *present):
+    for number, more in enumerate(judging_balances(wheel, *present)):
         products = 0
         if point.converged:
             # where the poorer balance is no start for the richer one nothing else is likely to be
-            own = options if not found else replace(options, fallbacks=False)
+            own = options if number == 0 else replace(options, fallbacks=False)
             point = solve_wheel(
                 wheel, solution.omega, *more, pattern=pattern, start=point, options=own
             )
             products = point.products
         change = abs(point.size().max() / solution.size().max() - 1)
-        found.append(Judged(*more, float(change) if point.converged else float("nan"), products))
-        if _asks_for_more(found[-1], wanted, most):
+        found = Judged(*more, float(change) if point.converged else float("nan"), products)
+        if _asks_for_more(found, wanted, most):
             break
     return found
 
