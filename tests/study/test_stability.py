@@ -131,6 +131,10 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     assert unstable_sentence(rippling(near), 0.05) == ""
     assert "keeps between 990 and 1200 um" in unstable_sentence(rippling(far), 0.05)
     assert ripple_sentence([rippling(far)], 0.05) == ""
+    # given in place of the balance where the mesh leaves little of the accuracy
+    instead = SimpleNamespace(**vars(rippling(near)) | {"marched_instead": True})
+    assert ripple_sentence([instead], 0.05) == ""
+    assert "the amplitude given is that of a march from there" in unstable_sentence(instead, 0.05)
     marched = SimpleNamespace(
         **vars(rippling(far)) | {"marched_instead": True, "peak_amplitude": 1.2e-3}
     )

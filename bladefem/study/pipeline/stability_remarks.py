@@ -137,7 +137,8 @@ def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
 
 
 def _rippled(curve: Curve, accuracy: float) -> bool:
-    if not curve.keeps_unstable or curve.kept is None:
+    # with little room beside the mesh's error a march is given that keeps within the accuracy
+    if curve.marched_instead or not curve.keeps_unstable or curve.kept is None:
         return False
     return curve.kept.holds(size(curve.peak), accuracy)
 
