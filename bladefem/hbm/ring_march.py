@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from scipy import sparse
 
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
@@ -24,10 +23,17 @@ from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_en
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
+from .ring_readings import displacements, modal_forces, ring_readings
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
-from .step_forces import contact_forces
+from .step_forces import (
+    contact_forces,
+    in_places,
+    places_of_directions,
+    places_of_nodes,
+    ring_contacts,
+)
 
 # of the instants of a period
 INSTANTS_PER_PERIOD = 256
@@ -119,7 +125,9 @@ def march_ring(
     r = _system(model).blades
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
-    y, forces = start.modal.copy(), start.forces.copy()
+    nodes = places_of_nodes(len(start.forces) // r)
+    y = start.modal.copy()
+    forces = in_places(start.forces.reshape(r, -1, 3).swapaxes(1, 2), nodes)
     resolved, prepared = _prepared(model, start, S)
     motion = np.empty((periods, S, r))
     work = np.zeros(1)
@@ -149,7 +157,8 @@ def march_ring(
                 _leap(_system(model), start.drive.omega, leap, y, prepared)
                 envelope, leapt = [], done
     marched = motion[leapt:done].transpose(0, 2, 1)
-    end = RingState(start.drive, y, forces)
+    ended = forces[:, :, np.argsort(nodes)[np.count_nonzero(nodes < 0) :]]
+    end = RingState(start.drive, y, ended.swapaxes(1, 2).reshape(-1, 3))
     return RingMarch(marched, done, settled, resolved, operations, end)
 
 
@@ -159,9 +168,9 @@ def _leap(
     """Move the modal state y along the envelope, and the contacts with it, so that no step of
     theirs is a large one.
     """
-    w, probe = prepared[0], prepared[-1][0]
+    w, readings, probe = prepared[0], prepared[2], prepared[-1][0]
     moved = moved_envelope(system, probe, y, omega, leap)
-    w += system.contact @ (moved - y)[: len(system.stiffness)]
+    w += displacements(readings, (moved - y)[: len(system.stiffness)])
     y[:] = moved
 
 
@@ -233,46 +242,48 @@ def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tupl
     for amplitudes in steady:
         amplitudes[1:] *= size
     free, free_probe = (_of_blades(amplitudes, r, S) for amplitudes in steady)
-    preload = np.tile(model.preload, r)
     dt = 2 * np.pi / omega / S
     resolved = steps_are_resolved(model, omega, S)
     E, G0, G1 = linear_steps(system, dt, mean=not resolved)
     e = model.elements
-    extra = start.forces[:, : 1 + e.tangents].ravel() - preload
+    own = len(model.preload)
+    extra = start.forces[:, : 1 + e.tangents].ravel() - np.tile(model.preload, r)
     w = free[0] + system.contact @ start.modal[:M] - system.residual @ extra
-    F = system.residual + system.contact @ G1[:M] @ system.contact.T
+    F = system.residual[:, :own] + system.contact @ G1[:M] @ system.contact[:own].T
+    places = places_of_directions(len(e.kt), model.directions)
+    nodes = places_of_nodes(len(e.kt))
     probes = len(system.probe) // r
     return resolved, (
-        w,
-        tuple(map(_sparse_rows, (E, -G0, -G1))),
-        (np.ascontiguousarray(system.contact), np.ascontiguousarray(system.contact.T)),
-        (np.ascontiguousarray(F), np.ascontiguousarray(F.T), F @ preload),
-        np.tile(np.column_stack([e.kt, e.kn, e.mu]), (r, 1)),
-        _normal_loads(model, r, S),
-        preload,
-        free,
-        tuple(
-            map(
-                np.ascontiguousarray,
-                (system.probe[::probes], system.probe_residual[::probes], free_probe),
-            )
+        in_places(w.reshape(r, own), places),
+        tuple(map(_step_terms, (E, -G0, -G1))),
+        ring_readings(system, places),
+        ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
+        # a place without a node is open
+        in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
+        in_places(free.reshape(S, r, own), places),
+        (
+            np.ascontiguousarray(system.probe[::probes]),
+            in_places(system.probe_residual[::probes].reshape(r, r, own), places).reshape(r, -1),
+            np.ascontiguousarray(free_probe),
         ),
     )
 
 
-class _SparseRows(NamedTuple):
-    """A matrix by rows: row i has ``values[starts[i] : starts[i + 1]]`` in these columns. Those of
-    a step have few entries unless the damping couples the modes.
-    """
+class _StepTerms(NamedTuple):
+    """A matrix as terms with one entry of each row: few, unless the damping couples the modes."""
 
-    starts: np.ndarray
+    # (terms, rows)
     columns: np.ndarray
     values: np.ndarray
 
 
-def _sparse_rows(matrix: np.ndarray) -> _SparseRows:
-    found = sparse.csr_array(matrix)
-    return _SparseRows(found.indptr, found.indices, found.data)
+def _step_terms(matrix: np.ndarray) -> _StepTerms:
+    used = matrix != 0
+    terms = max(1, int(used.sum(axis=1).max()))
+    # entries of each row first
+    columns = np.argsort(~used, axis=1, kind="stable")[:, :terms]
+    values = np.take_along_axis(matrix, columns, axis=1)
+    return _StepTerms(columns.T.copy(), values.T.copy())
 
 
 def _of_blades(amplitudes: np.ndarray, r: int, S: int) -> np.ndarray:
@@ -364,55 +375,52 @@ def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
 
 
 @njit(**KERNEL)
-def _march(y, f, w, steps, readings, F, table, load, preload, free, probe, motion, work):
+def _march(y, f, w, steps, readings, contacts, load, free, probe, motion, work):
     """Fill motion (periods, S, r); False where the forces of a step were not found.
 
     Args:
-        y: (2M,) modal displacements and velocities, changed; f: (n, 3) contact forces, changed.
-        w: (m,) relative displacements, changed.
-        steps: of `linear_steps`, by rows; the last two for contact forces in the modes.
-        readings: U (m, M), and its transpose.
-        F: (m, m) flexibility for the forces after a step, its transpose, and F preload (m,).
-        table: (n, 3) kt, kn, mu; load: (S, n) normal load at zero displacement.
-        preload: (m,) forces under which nothing moves; free: (S, m) motion without contact forces.
-        probe: readings (r, M), flexibility (r, m) and free motion (S, r).
+        y: (2M,) modal displacements and velocities, changed.
+        f: (r, 3, width) contact forces, changed; w: (r, 3 width) relative displacements, changed.
+        steps: of `linear_steps`; the last two for contact forces in the modes.
+        readings: of the contacts; contacts: their flexibility is that for the forces after a step.
+        load: (S, r, width) normal load at zero displacement.
+        free: (S, r, 3 width) motion without contact forces.
+        probe: readings (r, M), flexibility (r, r 3 width) and free motion (S, r).
         work: (1,) takes the operations of the contact forces.
     """
     E, before, after = steps
-    U, by_mode = readings
     reading, flexible, steady = probe
     periods, S, _ = motion.shape
-    n = len(f)
-    m, M = U.shape
-    d = m // n
-    extra = np.empty(m)
-    for i in range(n):
-        for a in range(d):
-            extra[i * d + a] = f[i, a] - preload[i * d + a]
-    modal = np.dot(by_mode, extra)
+    M = len(y) // 2
+    extra = f.copy().reshape(w.shape)
+    for b in range(len(w)):
+        for k in range(len(contacts.preload)):
+            extra[b, k] -= contacts.preload[k]
+    modal = modal_forces(readings, extra)
     moved = np.empty(2 * M)
-    change = np.zeros((2, n, 3))
+    change = np.zeros((2, *f.shape))
+    pushed = extra.reshape(w.size)
     for k in range(periods * S):
-        motion[k // S, k % S] = steady[k % S] + np.dot(reading, y[:M]) - np.dot(flexible, extra)
+        motion[k // S, k % S] = steady[k % S] + np.dot(reading, y[:M]) - np.dot(flexible, pushed)
         j = (k + 1) % S
         moved[:] = 0.0
         _add_product(E, y, moved)
         _add_product(before, modal, moved)
-        c = free[j] + np.dot(U, moved[:M])
-        loads = load[k % S], load[j]
-        if not contact_forces(c, F, w, f, change, extra, table, loads[0], loads[1], preload, work):
+        c = displacements(readings, moved[:M])
+        c += free[j]
+        if not contact_forces(c, contacts, w, f, change, extra, load[k % S], load[j], work):
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False
-        modal = np.dot(by_mode, extra)
+        modal = modal_forces(readings, extra)
         _add_product(after, modal, moved)
         y[:] = moved
     return True
 
 
 @njit(**INNER_KERNEL)
-def _add_product(rows, x, target):
+def _add_product(terms, x, target):
     """target (n,) becomes target plus the matrix (n, k) times x (k,)."""
-    for i in range(len(target)):
-        for k in range(rows.starts[i], rows.starts[i + 1]):
-            target[i] += rows.values[k] * x[rows.columns[k]]
+    for term in range(len(terms.columns)):
+        for i in range(len(target)):
+            target[i] += terms.values[term, i] * x[terms.columns[term, i]]
