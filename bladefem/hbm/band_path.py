@@ -24,6 +24,27 @@ SAME_MOTION = 0.03
 MAX_FOLDS = 24
 
 
+@dataclass(frozen=True)
+class PathLimits:
+    """How far the paths of a band are followed."""
+
+    # folds of one path, and of all before no further one is begun
+    folds: int = MAX_FOLDS
+    # points of all paths with which they are given up, as they are with more folds; None for as
+    # many as the size of the model allows, after which what was found is kept
+    points: int | None = None
+
+    def given_up(self, followed: Sequence[Solution]) -> bool:
+        """Points with the numbers of their pieces are those of paths that were given up."""
+        pieces = [point.branch for point in followed if point.branch]
+        if self.points is None:
+            return False
+        return len(pieces) >= self.points or max(pieces, default=0) > self.folds
+
+
+USUAL_LIMITS = PathLimits()
+
+
 @dataclass
 class BandPath:
     """Points of a path in their order, and whether it begins and ends at an end of the band."""
@@ -46,16 +67,11 @@ def follow_path(
     budget: int,
     notes: list[str],
     options: Options,
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> BandPath:
-    """The path from a solution until it leaves the band, closes on itself, or the budget ends.
-
-    Args:
-        most_folds: with which it is left; MAX_FOLDS when None.
-    """
+    """The path from a solution until it leaves the band, closes on itself, or the budget ends."""
     points: list[PathPoint] = []
     folds = 0
-    most = MAX_FOLDS if most_folds is None else most_folds
     options = replace(options, frugal=False)
     bounds = min(band[0], start.omega), max(band[1], start.omega)
     try:
@@ -76,10 +92,10 @@ def follow_path(
                     f"{point.restarted}"
                 )
             folds += point.fold
-            if folds > most:
+            if folds > limits.folds:
                 notes.append(
-                    f"a path was left at {point.solution.frequency:.6g} Hz after {most} "
-                    "folds: there may be further motions"
+                    f"a path was left at {point.solution.frequency:.6g} Hz after "
+                    f"{limits.folds} folds: there may be further motions"
                 )
                 break
             if len(points) >= budget or _closed(points, band):
@@ -100,13 +116,13 @@ def follow_both_ways(
     budget: int,
     notes: list[str],
     options: Options,
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> BandPath:
     """The path continued beyond its start in the other direction, unless it closed on itself."""
     if _closed(path.points, band):
         return path
     left = budget - len(path.points)
-    back = follow_path(model, start, band, False, left, notes, options, most_folds)
+    back = follow_path(model, start, band, False, left, notes, options, limits)
     turned = (
         [
             replace(late, forward=not late.forward, fold=early.fold)

@@ -18,8 +18,9 @@ import numpy as np
 from ..errors import NotSolvedError
 from ..friction.fourier import to_real
 from .band_path import (
-    MAX_FOLDS,
+    USUAL_LIMITS,
     BandPath,
+    PathLimits,
     count_folds,
     follow_both_ways,
     follow_path,
@@ -96,14 +97,15 @@ def find_branches(
     *,
     peak: float = 1e-3,
     options: Options = DEFAULT_OPTIONS,
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> Branches:
     """Paths through a band of circular frequencies [rad/s], from its ends and from known motions.
 
     Args:
         known: solutions in the band, such as those of a sweep.
         peak: relative accuracy of each local maximum.
-        most_folds: of one path, and of all before no further one is begun; MAX_FOLDS when None.
+        limits: where they have an end for points, paths that reach it, or have more folds, are
+            given up as they are.
     """
     options = replace(options, tolerance=min(options.tolerance, PATH_TOLERANCE))
     notes: list[str] = []
@@ -117,20 +119,23 @@ def find_branches(
     if not solved:
         return Branches((), (), ("no point of the band was solved",))
     limit = int(np.clip(POINT_BUDGET / (model.springs.size * (2 * H + 1)), MIN_POINTS, MAX_POINTS))
+    if limits.points is not None:
+        limit = min(limit, limits.points)
     budget = limit
     further = _further(model, band, solved[0], H, samples, options)
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
         at_end = start is solved[0] or start is solved[-1]
-        most = MAX_FOLDS if most_folds is None else most_folds
-        full = len(paths) >= MAX_PATHS or count_folds(paths) >= most
+        full = len(paths) >= MAX_PATHS or count_folds(paths) >= limits.folds
         if budget <= 0 or (full and not at_end) or lies_on_paths(paths, start):
             continue
-        path = follow_path(model, start, band, forward, budget, notes, options, most_folds)
+        path = follow_path(model, start, band, forward, budget, notes, options, limits)
         if not at_end:
-            path = follow_both_ways(model, start, band, path, budget, notes, options, most_folds)
+            path = follow_both_ways(model, start, band, path, budget, notes, options, limits)
         budget -= len(path.points)
         paths.append(path)
+        if limits.points is not None and (budget <= 0 or count_folds(paths) > limits.folds):
+            return _sorted_out(paths, [], options.probe, notes)
     if budget <= 0:
         notes.append(f"paths ended after {limit} points: there may be further motions")
     for path in paths:

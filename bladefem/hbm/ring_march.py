@@ -19,21 +19,17 @@ from numba import njit
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
 from ..util.numba_options import INNER_KERNEL, KERNEL
+from .blade_forces import no_inverses
 from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_envelope, scatter
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
+from .ring_contacts import in_places, places_of_directions, places_of_nodes, ring_contacts
 from .ring_readings import displacements, modal_forces, ring_readings
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
-from .step_forces import (
-    contact_forces,
-    in_places,
-    places_of_directions,
-    places_of_nodes,
-    ring_contacts,
-)
+from .step_forces import contact_forces
 
 # of the instants of a period
 INSTANTS_PER_PERIOD = 256
@@ -258,6 +254,7 @@ def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tupl
         tuple(map(_step_terms, (E, -G0, -G1))),
         ring_readings(system, places),
         ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
+        no_inverses(r, len(places)),
         # a place without a node is open
         in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
         in_places(free.reshape(S, r, own), places),
@@ -375,7 +372,7 @@ def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
 
 
 @njit(**KERNEL)
-def _march(y, f, w, steps, readings, contacts, load, free, probe, motion, work):
+def _march(y, f, w, steps, readings, contacts, kept, load, free, probe, motion, work):
     """Fill motion (periods, S, r); False where the forces of a step were not found.
 
     Args:
@@ -383,6 +380,7 @@ def _march(y, f, w, steps, readings, contacts, load, free, probe, motion, work):
         f: (r, 3, width) contact forces, changed; w: (r, 3 width) relative displacements, changed.
         steps: of `linear_steps`; the last two for contact forces in the modes.
         readings: of the contacts; contacts: their flexibility is that for the forces after a step.
+        kept: from step to step, changed.
         load: (S, r, width) normal load at zero displacement.
         free: (S, r, 3 width) motion without contact forces.
         probe: readings (r, M), flexibility (r, r 3 width) and free motion (S, r).
@@ -408,7 +406,7 @@ def _march(y, f, w, steps, readings, contacts, load, free, probe, motion, work):
         _add_product(before, modal, moved)
         c = displacements(readings, moved[:M])
         c += free[j]
-        if not contact_forces(c, contacts, w, f, change, extra, load[k % S], load[j], work):
+        if not contact_forces(c, contacts, kept, w, f, change, extra, load[k % S], load[j], work):
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False

@@ -13,8 +13,8 @@ import numpy as np
 from numba import njit
 
 from ..util.numba_options import INNER_KERNEL, KERNEL
+from .ring_contacts import in_places
 from .sector_modes import SectorModes
-from .step_forces import in_places
 
 # entries of a hand-over that are no more than rounding
 ROUNDING = 1e-9

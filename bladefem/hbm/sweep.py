@@ -11,6 +11,7 @@ from functools import cache, partial
 import numpy as np
 
 from ..errors import InputError
+from .band_path import USUAL_LIMITS, PathLimits
 from .branches import Branches, find_branches
 from .frequency_walk import all_stick, predicted_start
 from .from_neighbours import nearest_neighbours, solve_from, solve_off_resonance, walk_from
@@ -161,7 +162,7 @@ def sweep(
     notes: list[str] | None = None,
     paths: bool = True,
     known: Sequence[Solution] = (),
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need.
 
@@ -182,8 +183,7 @@ def sweep(
         paths: whether the response is followed round folds; otherwise one motion is looked for.
         known: converged points of the band, of this model with these harmonics and samples, which
             are not solved again; they come first.
-        most_folds: after which paths are left, and no more begun; those of
-            :func:`bladefem.hbm.branches.find_branches` when None.
+        limits: of these paths.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -204,7 +204,7 @@ def sweep(
     if followed:
         points = list(solved.values())
         found = find_branches(
-            model, band, points, H, samples, peak=peak, options=options, most_folds=most_folds
+            model, band, points, H, samples, peak=peak, options=options, limits=limits
         )
         notes.extend(found.notes)
         yield from found.points

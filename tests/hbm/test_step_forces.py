@@ -6,14 +6,15 @@ from numba import njit
 
 from bladefem.friction.simd.node_steps import node_steps
 from bladefem.friction.time_step import step_2d
-from bladefem.hbm.step_forces import (
-    _violation,
-    contact_forces,
+from bladefem.hbm.blade_forces import no_inverses
+from bladefem.hbm.ring_contacts import (
     in_places,
     places_of_directions,
     places_of_nodes,
     ring_contacts,
 )
+from bladefem.hbm.ring_contacts import violation as one_violation
+from bladefem.hbm.step_forces import contact_forces
 
 NODES = 8
 MU = 0.3
@@ -114,7 +115,7 @@ def block_steps(table, flexibility, before, old, load0, load1, w, f, step):
 
 @njit
 def violation(w, f, i, table, before, load1):
-    return _violation(w, f, i, table, before, load1)
+    return one_violation(w, f, i, table, before, load1)
 
 
 def nodes_of_eight(generator):
@@ -177,7 +178,8 @@ def contact_forces_of(case, w, f, extra, preload=None, blades=1):
     rows = in_places(f.reshape(blades, n, 3).swapaxes(1, 2), nodes)
     moved, more, c = (in_places(x.reshape(blades, -1), places) for x in (w, extra, case["c"]))
     change, work = np.zeros((2, *rows.shape)), np.zeros(1)
-    found = contact_forces(c, contacts, moved, rows, change, more, *loads, work)
+    kept = no_inverses(blades, len(places))
+    found = contact_forces(c, contacts, kept, moved, rows, change, more, *loads, work)
     assert work[0] > 0
     there = places >= 0
     for row in range(blades):

@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from ...errors import NotSolvedError
+from ...hbm.band_path import USUAL_LIMITS, PathLimits
 from ...hbm.full_stick import sticks_safely
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
@@ -321,7 +322,7 @@ def covered_band(
     paths: bool | None = None,
     notes: list[str] | None = None,
     known: Sequence[Solution] = (),
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> list[Solution]:
     """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
     point lies inside.
@@ -331,24 +332,21 @@ def covered_band(
         paths: whether the response is followed round folds; where accuracy is below 1 if left out.
         notes: takes what the last sweep could not do, in sentences.
         known: points of this model with these settings and solver options, not to be solved again.
-        most_folds: after which the response is no longer followed; None for as many as a sweep
-            follows by itself.
+        limits: of the paths on which the response is followed.
 
     Raises:
         NotSolvedError: no point converged.
     """
     swept = band or default_band(model, mode)
-    limits = _halfway(model, mode)
+    between = _halfway(model, mode)
     for _ in range(1 if band and not widen else MAX_BAND_WIDENINGS):
         left_open: list[str] = []
-        points = response_points(
-            model, settings, swept, accuracy, paths, left_open, known, most_folds
-        )
+        points = response_points(model, settings, swept, accuracy, paths, left_open, known, limits)
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
-        if good[0] < top < good[-1]:
+        if good[0] < top < good[-1] or limits.given_up(points):
             break
-        swept = _doubled_band(swept, top == good[0], limits)
+        swept = _doubled_band(swept, top == good[0], between)
     if notes is not None:
         notes[:] = left_open
     return points
@@ -387,7 +385,7 @@ def response_points(
     paths: bool | None = None,
     notes: list[str] | None = None,
     known: Sequence[Solution] = (),
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> list[Solution]:
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
@@ -397,8 +395,7 @@ def response_points(
 
     Args:
         known: points of this model with these settings and solver options, not to be solved again.
-        most_folds: after which the response is no longer followed; None for as many as a sweep
-            follows by itself.
+        limits: of the paths on which the response is followed.
 
     Raises:
         NotSolvedError: no point converged.
@@ -416,7 +413,7 @@ def response_points(
         notes=notes,
         paths=not rough if paths is None else paths,
         known=[p for p in known if p.converged and ends[0] <= p.omega <= ends[1]],
-        most_folds=most_folds,
+        limits=limits,
     )
     options = solver_options(accuracy)
     points = list(swept(options=replace(options, fallbacks=not rough)))

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...errors import NotSolvedError
+from ...hbm.band_path import USUAL_LIMITS, PathLimits
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution, size
 from ...hbm.sweep import MAX_PATH_UNKNOWNS
@@ -54,6 +55,9 @@ LOST_HEIGHT_SHARE = 0.5
 # seat and 64 samples have 20 pieces between folds, 549 points in 15 s; 256 samples have 7, and with
 # 16 points there is one, 41 points in 1.3 s, 0.6 % higher
 MANY_FOLDS = 6
+# points of a curve from which it is given up as well: under 320 N with the default layer six folds
+# of four points a seat were found in 353 points and 12 s, 16 points have none
+MANY_POINTS = 100
 FOLDED_SAMPLES = 256
 FOLDED_POINTS = 16
 
@@ -95,10 +99,10 @@ def resonance_curve(
             used, peak, errors = _with_missed(family, used, points, top, accuracy, peak, errors)
         if swept[1] != accuracy or not same_settings(swept[0], used):
             finer = _with_fewer_folds(used, peak) if number == 0 else None
-            most = None if finer is None else MANY_FOLDS
-            points = _swept(family, used, points, swept, band, mode, accuracy, notes, most)
+            limits = USUAL_LIMITS if finer is None else PathLimits(MANY_FOLDS, MANY_POINTS)
+            points = _swept(family, used, points, swept, band, mode, accuracy, notes, limits)
             swept = used, accuracy
-            if finer is not None and max(p.branch for p in points) > MANY_FOLDS:
+            if finer is not None and limits.given_up(points):
                 used, top = _refined_top(family, used, peak_of(points), finer, accuracy)
                 # it was given up, and is swept again in any case
                 swept = used, 1.0
@@ -167,7 +171,7 @@ def _swept(
     mode: int,
     accuracy: float,
     notes: list[str],
-    most_folds: int | None = None,
+    limits: PathLimits = USUAL_LIMITS,
 ) -> list[Solution]:
     """The curve with chosen settings, over the band of the points that an earlier sweep solved.
 
@@ -183,7 +187,7 @@ def _swept(
     known = [] if again else points
     model = family_member(family, settings).model
     return covered_band(
-        model, settings, span, mode, accuracy, band is None, paths, notes, known, most_folds
+        model, settings, span, mode, accuracy, band is None, paths, notes, known, limits
     )
 
 
