@@ -131,6 +131,35 @@ def own_facets(
     return known, facets[~used]
 
 
+def without_halves(mesh: Mesh, facets: IntegerArray) -> IntegerArray:
+    """The facets (nf, k) but for those that are half of a quadrilateral whose other half is not
+    among them.
+    """
+    if not mesh.whole:
+        return facets
+    _, halves = own_facets(mesh, tuple(mesh.bodies), facets)
+    half = set(map(tuple, np.sort(halves, axis=1).tolist()))
+    kept = [tuple(row) not in half for row in np.sort(facets, axis=1).tolist()]
+    return facets[np.array(kept, bool)]
+
+
+def quads_of_halves(mesh: Mesh, names: tuple[str, ...], halves: IntegerArray) -> IntegerArray:
+    """(h, 4 or 9) the quadrilaterals of which triangles (h, k) are halves, the corners of each
+    turned so that the half has the first three; looking the way they look from their first cell.
+    """
+    quads = _facets_with(mesh, names, 4)
+    given = np.sort(halves[:, :3], axis=1)
+    turned = np.empty((len(halves), quads.shape[1]), int)
+    for out in range(4):
+        # first the corner after the one that the half leaves out
+        ring = (out + 1 + np.arange(4)) % 4
+        place = _found_rows(np.sort(np.delete(quads[:, :4], out, axis=1), axis=1), given)
+        hit = place >= 0
+        columns = [*ring, *(4 + ring), 8] if quads.shape[1] > 4 else [*ring]
+        turned[hit] = quads[place[hit]][:, columns]
+    return turned
+
+
 def _facet_word(mesh: Mesh) -> tuple[str, int]:
     """meshio's word of the facets of the mesh's own cells, and their order."""
     family = FAMILY[mesh.cell_type]
