@@ -37,6 +37,7 @@ from .raw_mesh import RawMesh, read_raw
 from .renaming import read_names, renamed_raw
 from .solid_cells import SolidCells, solid_cells
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY, boundary_facets, outward_faces
+from .whole_cells import without_halves
 
 # files carry few digits; a match within this share of the face is a match, and is then snapped
 MATCH_TOLERANCE = 1e-4
@@ -282,6 +283,12 @@ def _with_faces(
     number[used] = np.arange(len(used))
     points = mesh.points[used]
     cells = number[cells]
+    mesh = replace(
+        mesh,
+        points=points,
+        bodies={n: number[c] for n, c in mesh.bodies.items()},
+        whole={n: np.where(c < 0, -1, number[c]) for n, c in mesh.whole.items()},
+    )
     sets = {
         _family_word(name): number[nodes][number[nodes] >= 0]
         for name, nodes in raw.node_sets.items()
@@ -290,18 +297,18 @@ def _with_faces(
     skin = boundary_facets(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
     joined = {_family_word(name) for name in wanted}
     for name, nodes in sets.items():
-        inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
-        if not inside.any() or (name in faces and name not in joined):
+        if name in faces and name not in joined:
             continue
-        both = [faces[name], skin[inside]] if name in faces else [skin[inside]]
-        faces[name] = np.vstack(both)
+        inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
+        # three corners of a quadrilateral are no face
+        held = without_halves(mesh, skin[inside])
+        if not len(held):
+            continue
+        faces[name] = np.vstack([faces[name], held]) if name in faces else held
         # new nodes in the middle of edges and faces belong to the set too
         sets[name] = np.union1d(nodes, faces[name])
     return replace(
         mesh,
-        points=points,
-        bodies={n: number[c] for n, c in mesh.bodies.items()},
-        whole={n: np.where(c < 0, -1, number[c]) for n, c in mesh.whole.items()},
         nodes=sets,
         faces={n: outward_faces(points, cells, mesh.cell_type, f) for n, f in faces.items()},
     )

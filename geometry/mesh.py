@@ -78,10 +78,11 @@ class Mesh:
     parts: dict[str, IntegerArray] = field(default_factory=dict)
     # (n,) numbers of the nodes in the user's file, NO_NUMBER of added ones; None without such
     numbers: IntegerArray | None = None
-    # name of a body -> (nc, 27) nodes of the cell of another shape that each of its tetrahedra is a
-    # piece of, gmsh's order, -1 beyond its own (4, 5, 6 or 8 of first order, 10, 14, 18 or 27 of
-    # second). Such a body is solved with the cells themselves, and so are its loads, stresses and
-    # halved meshes (`whole_cells`); contacts and pictures see its tetrahedra.
+    # name of a body -> (nc, 27) nodes of the cell of another shape that each of its tetrahedra, or
+    # triangles of a plane mesh, is a piece of, gmsh's order, -1 beyond its own (4, 5, 6 or 8 of
+    # first order, 10, 14, 18 or 27 of second; 3 and 4, 6 and 9 in a plane). Such a body is solved
+    # with the cells themselves, and so are its loads, stresses and halved meshes (`whole_cells`);
+    # contacts and pictures see the pieces.
     whole: dict[str, IntegerArray] = field(default_factory=dict)
 
     def __repr__(self) -> str:

@@ -2,7 +2,8 @@
 
 Second order is the rule here: linear solids are far too stiff in bending (a blade of linear
 tetrahedra vibrates at more than twice its frequency). Serendipity cells get the nodes in the middle
-of their faces. Mixed shapes become tetrahedra, of which each knows the cell that it is a piece of.
+of their faces. Mixed shapes become tetrahedra, those of a plane triangles, of which each knows the
+cell that it is a piece of.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from bladefem.errors import InputError
 from bladefem.util.arrays import IntegerArray, RealArray
 
 from .raw_mesh import RawMesh
-from .second_order_cells import completed_cells
+from .second_order_cells import COMPLETE_CELL, completed_cells
 from .split_cells import split_cells, vertex_order
 from .topology import CORNERS, DIMENSION, EDGES, FACETS, FAMILY, NODES
 from .whole_cells import padded_cells
@@ -74,15 +75,11 @@ def solid_cells(
     owner = [np.repeat(b, len(cells)) for b, (_, cells) in zip(chosen, blocks, strict=True)]
     row = [np.arange(len(cells)) for _, cells in blocks]
     if len(words) > 1 or (top == 3 and not words <= {"tetra", "tetra10", *_HEXAHEDRA}):
-        if top == 2:
-            raise InputError(
-                f"imported.file = '{source}': cells are {' and '.join(sorted(words))}, expected "
-                "triangles or quadrilaterals, not both"
-            )
-        word, parts, whole = _as_tetrahedra(points, blocks, vertex_order(points, axis))
+        simplex = "tetra" if top == 3 else "triangle"
+        word, parts, whole = _as_simplices(simplex, points, blocks, vertex_order(points, axis))
         notes += (
             f"{_count_text(blocks)} are solved as they are; contacts and pictures see them split "
-            "into tetrahedra",
+            f"into {_PLURALS.get(simplex, simplex + 's')}",
         )
         if word == "tetra":
             _check_facets(points, blocks, source)
@@ -109,7 +106,8 @@ def _dimension(word: str) -> int:
     return DIMENSION[FAMILY[word]] if word in FAMILY else 0
 
 
-def _as_tetrahedra(
+def _as_simplices(
+    simplex: str,
     points: np.ndarray,
     blocks: list[tuple[str, np.ndarray]],
     rank: np.ndarray,
@@ -117,6 +115,7 @@ def _as_tetrahedra(
     """What the cells of several kinds are split into.
 
     Args:
+        simplex: "tetra" or "triangle".
         rank: of the points; of a quadrilateral the diagonal at its lowest one is taken.
 
     Returns:
@@ -128,9 +127,10 @@ def _as_tetrahedra(
         [(cells, rows) for (_, cells), (_, rows) in zip(blocks, parts, strict=True)]
     )
     quadratic = any(NODES[word] > CORNERS[FAMILY[word]] for word, _ in blocks)
-    return "tetra10" if quadratic else "tetra", parts, whole
+    return COMPLETE_CELL[simplex] if quadratic else simplex, parts, whole
 
 
+_PLURALS = {"hexahedron": "hexahedra", "tetra": "tetrahedra", "quad": "quadrilaterals"}
 _HEXAHEDRA = ("hexahedron", "hexahedron27")
 
 
@@ -233,5 +233,4 @@ def _count_text(blocks: list[tuple[str, np.ndarray]]) -> str:
     for word, cells in blocks:
         family = FAMILY[word]
         count[family] = count.get(family, 0) + len(cells)
-    plural = {"hexahedron": "hexahedra", "tetra": "tetrahedra", "quad": "quadrilaterals"}
-    return " and ".join(f"{n} {plural.get(name, name + 's')}" for name, n in count.items())
+    return " and ".join(f"{n} {_PLURALS.get(name, name + 's')}" for name, n in count.items())

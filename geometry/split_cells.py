@@ -1,6 +1,8 @@
-"""Hexahedra, wedges and pyramids split into tetrahedra that conform across all faces.
+"""Hexahedra, wedges and pyramids split into tetrahedra that conform across all faces, and
+quadrilaterals of plane meshes into triangles.
 
-Contacts and pictures know meshes of one cell shape; for them a mixed mesh is one of tetrahedra.
+Contacts and pictures know meshes of one cell shape; for them a mixed mesh is one of tetrahedra, or
+of triangles.
 Each cell is a cone from its first vertex in a global order over the faces that do not touch that
 vertex, and each quadrilateral is split through its own first vertex (Dompierre et al., How to
 subdivide pyramids, prisms and hexahedra into tetrahedra, 8th Int. Meshing Roundtable 1999). The
@@ -42,7 +44,8 @@ def split_cells(
     rank: np.ndarray,
     points: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Tetrahedra (nt, 4 or 10) with positive volume, and the row of the cell that each came from.
+    """Tetrahedra (nt, 4 or 10) with positive volume, of plane cells triangles (nt, 3 or 6) that
+    turn as they do, and the row of the cell that each came from.
 
     Args:
         word: a first-order cell type or a complete second-order one.
@@ -52,9 +55,11 @@ def split_cells(
     family = FAMILY[word]
     k = CORNERS[family]
     quadratic = NODES[word] > k
-    if family == "tetra":
+    if family in ("triangle", "tetra"):
         return cells, np.arange(len(cells))
     corner_rank = rank[cells[:, :k]]
+    if family == "quad":
+        return _quad_triangles(cells, corner_rank, quadratic)
     first = corner_rank.argmin(axis=1)
     found = []
     owner = []
@@ -70,6 +75,23 @@ def split_cells(
     owner = np.concatenate(owner)
     order = np.argsort(owner, kind="stable")
     return np.vstack(found)[order], owner[order]
+
+
+def _quad_triangles(
+    cells: np.ndarray, corner_rank: np.ndarray, quadratic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (2 nc, 3 or 6) of quadrilaterals, and the row of each one's cell."""
+    parts = _facet_triangles((0, 1, 2, 3), corner_rank)
+    owner = np.concatenate([some for _, some in parts])
+    local = np.vstack([triangle for triangle, _ in parts])
+    row = owner[:, None]
+    found = cells[row, local]
+    if quadratic:
+        ends = np.array(EDGES["triangle"])
+        between = _middle_nodes("quad")[local[:, ends[:, 0]], local[:, ends[:, 1]]]
+        found = np.hstack([found, cells[row, between]])
+    order = np.argsort(owner, kind="stable")
+    return found[order], owner[order]
 
 
 def _facet_triangles(

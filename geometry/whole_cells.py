@@ -1,5 +1,6 @@
-"""The cells of a body as they are solved, where its mesh is of tetrahedra that are pieces of cells
-of other shapes; and their facets, of which named triangles are pieces too.
+"""The cells of a body as they are solved, where its mesh is of tetrahedra, or of triangles in a
+plane, that are pieces of cells of other shapes; and their facets, of which named triangles are
+pieces too.
 """
 
 from __future__ import annotations
@@ -14,10 +15,11 @@ from bladefem.util.arrays import IntegerArray
 from .mesh import Mesh
 from .topology import CORNERS, FACETS, FAMILY, NODES, facet_nodes
 
-# meshio's words of cells, by their number of nodes
+# meshio's words of cells that may be mixed, by the dimension of the mesh; told apart by their
+# numbers of nodes
 WORDS = {
-    NODES[word]: word
-    for word in (
+    2: ("triangle", "quad", "triangle6", "quad9"),
+    3: (
         "tetra",
         "pyramid",
         "wedge",
@@ -26,7 +28,7 @@ WORDS = {
         "pyramid14",
         "wedge18",
         "hexahedron27",
-    )
+    ),
 }
 # of a facet, by the number of its corners and its order
 FACET_WORDS = {(3, 1): "triangle", (3, 2): "triangle6", (4, 1): "quad", (4, 2): "quad9"}
@@ -70,7 +72,8 @@ def own_cells(mesh: Mesh, names: tuple[str, ...]) -> list[OwnCells]:
         first, owner = _distinct(mesh.whole[name])
         distinct = mesh.whole[name][first]
         count = (distinct >= 0).sum(axis=1)
-        for nodes, word in WORDS.items():
+        for word in WORDS[mesh.dimension]:
+            nodes = NODES[word]
             some = count == nodes
             if not some.any():
                 continue
@@ -107,7 +110,7 @@ def own_facets(
         whose other half was not given.
     """
     word, order = _facet_word(mesh)
-    if not any(name in mesh.whole for name in names):
+    if mesh.dimension == 2 or not any(name in mesh.whole for name in names):
         return {word: facets}, facets[:0]
     given = np.sort(facets[:, :3], axis=1)
     known: dict[str, IntegerArray] = {}
@@ -129,6 +132,35 @@ def own_facets(
         if full.any():
             known[FACET_WORDS[corners, order]] = own[full]
     return known, facets[~used]
+
+
+def without_halves(mesh: Mesh, facets: IntegerArray) -> IntegerArray:
+    """The facets (nf, k) but for those that are half of a quadrilateral whose other half is not
+    among them.
+    """
+    if not mesh.whole:
+        return facets
+    _, halves = own_facets(mesh, tuple(mesh.bodies), facets)
+    half = set(map(tuple, np.sort(halves, axis=1).tolist()))
+    kept = [tuple(row) not in half for row in np.sort(facets, axis=1).tolist()]
+    return facets[np.array(kept, bool)]
+
+
+def quads_of_halves(mesh: Mesh, names: tuple[str, ...], halves: IntegerArray) -> IntegerArray:
+    """(h, 4 or 9) the quadrilaterals of which triangles (h, k) are halves, the corners of each
+    turned so that the half has the first three; looking the way they look from their first cell.
+    """
+    quads = _facets_with(mesh, names, 4)
+    given = np.sort(halves[:, :3], axis=1)
+    turned = np.empty((len(halves), quads.shape[1]), int)
+    for out in range(4):
+        # first the corner after the one that the half leaves out
+        ring = (out + 1 + np.arange(4)) % 4
+        place = _found_rows(np.sort(np.delete(quads[:, :4], out, axis=1), axis=1), given)
+        hit = place >= 0
+        columns = [*ring, *(4 + ring), 8] if quads.shape[1] > 4 else [*ring]
+        turned[hit] = quads[place[hit]][:, columns]
+    return turned
 
 
 def _facet_word(mesh: Mesh) -> tuple[str, int]:

@@ -11,6 +11,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 
+from ..util.communicator import Communicator
 from . import backbone, commands, ranks, scatter, study
 from .fit import add_fit, fit
 from .look import add_look, look
@@ -118,9 +119,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not hasattr(options, "overrides"):
             parser().error("options of PETSc (after --) need a command with a scene")
         options.overrides.append(f"solver.petsc={' '.join(words[cut + 1 :])}")
-    # run folders, kept for this command
-    with ExitStack() as options.held:
-        return ranks.exit_code_of(lambda comm: options.function(options, comm), options)
+
+    def command(comm: Communicator | None) -> None:
+        # run folders, kept for this command; they see how it ends
+        with ExitStack() as options.held:
+            options.function(options, comm)
+
+    return ranks.exit_code_of(command, options)
 
 
 def parser() -> argparse.ArgumentParser:

@@ -165,7 +165,7 @@ def _assemble_bodies(
     rows = _block_rows(mesh, space, used[local], origin, comm)
     pieces: tuple[Piece, ...] = ()
     if any(n in mesh.whole for n in materials):
-        K, M, pieces = _sum_of_pieces(mesh, materials, (space, rows), quadrature, heat)
+        K, M, pieces = _sum_of_pieces(mesh, materials, (space, rows), plane, quadrature, heat)
     else:
         K, M = _matrices(mesh, materials, (space, cells), plane, quadrature, heat)
     return Body(
@@ -211,6 +211,7 @@ def _sum_of_pieces(
     mesh: Mesh,
     materials: dict[str, Material],
     layout: tuple[Any, np.ndarray],
+    plane: str,
     quadrature: str,
     heat: Temperatures | None,
 ) -> tuple[PETSc.Mat, PETSc.Mat, tuple[Piece, ...]]:
@@ -226,7 +227,7 @@ def _sum_of_pieces(
         own = {name: materials[name] for name in part.bodies}
         warm = None if heat is None else replace(heat, nodal=np.asarray(spread @ heat.nodal))
         comm = space.mesh.comm
-        body = _assemble_bodies(part, own, comm, "stress", quadrature, warm, piece=True)
+        body = _assemble_bodies(part, own, comm, plane, quadrature, warm, piece=True)
         piece = Piece(body, spread)
         gathered = [_gathered(piece, layout, matrix) for matrix in (body.K, body.M)]
         total = (

@@ -18,10 +18,16 @@ from geometry.matching import match_faces
 from geometry.mesh import Mesh, Pair
 from geometry.second_order_cells import COMPLETE_CELL as SECOND_ORDER
 from geometry.split_cells import split_cells, vertex_order
-from geometry.topology import FAMILY, NODES, boundary_facets
-from geometry.whole_cells import OwnCells, own_cells, own_facets, padded_cells
+from geometry.topology import CORNERS, FAMILY, NODES, boundary_facets
+from geometry.whole_cells import (
+    OwnCells,
+    own_cells,
+    own_facets,
+    padded_cells,
+    quads_of_halves,
+    without_halves,
+)
 
-from ..errors import InputError
 from ..util.arrays import IntegerArray, RealArray
 from . import shape_functions as shape
 from .cell_functions import order_of, reference_nodes, straight_nodes, tabulate
@@ -89,9 +95,6 @@ def refine_uniformly(mesh: Mesh) -> Mesh:
 
     A node set takes the new nodes of the outer facets whose nodes it holds. A pyramid becomes six
     pyramids and four tetrahedra, a cell of any other shape eight of its own.
-
-    Raises:
-        InputError: a face that holds half of a quadrilateral.
     """
     own = own_cells(mesh, tuple(mesh.bodies))
     hashes = np.random.default_rng(0).integers(0, 2**64, len(mesh.points), dtype=np.uint64)
@@ -101,22 +104,23 @@ def refine_uniformly(mesh: Mesh) -> Mesh:
     for some in own:
         at = reference_nodes(some.word)
         kept[some.cells] = np.searchsorted(keys, _keys(some.word, some.cells, hashes, at))
-    rank = vertex_order(points, AXIS) if mesh.whole else np.empty(0, int)
+    rank = _order_to_split(points, own, kept) if mesh.whole else np.empty(0, int)
     bodies, whole, parent = _bodies(mesh, points, children, rank)
 
-    def facets(some: IntegerArray, name: str) -> IntegerArray:
+    def children_nodes(word: str, own: IntegerArray) -> IntegerArray:
+        at = _child_nodes(word, FAMILY[word])
+        return np.searchsorted(keys, _keys(word, own, hashes, at)).reshape(-1, own.shape[1])
+
+    def facets(some: IntegerArray) -> IntegerArray:
         by_shape, halves = own_facets(mesh, tuple(mesh.bodies), some)
-        if len(halves):
-            raise InputError(
-                f"face '{name}': {len(halves)} of its triangles are half of a quadrilateral, "
-                "expected whole faces of the cells where elements are halved"
-            )
         found = []
         for word, own in by_shape.items():
-            kind = FAMILY[word]
-            at = _child_nodes(word, kind)
-            new = np.searchsorted(keys, _keys(word, own, hashes, at)).reshape(-1, own.shape[1])
-            found.append(_triangles(new, rank) if kind == "quad" and mesh.whole else new)
+            new = children_nodes(word, own)
+            found.append(_triangles(new, rank) if FAMILY[word] == "quad" and mesh.whole else new)
+        if len(halves):
+            quads = quads_of_halves(mesh, tuple(mesh.bodies), halves)
+            word = "quad" if quads.shape[1] == 4 else "quad9"
+            found.append(_half_triangles(children_nodes(word, quads), rank))
         return np.vstack(found) if found else some
 
     refined = replace(
@@ -126,9 +130,9 @@ def refine_uniformly(mesh: Mesh) -> Mesh:
         numbers=None,
         whole=whole,
         bodies=bodies,
-        faces={name: facets(some, name) for name, some in mesh.faces.items()},
+        faces={name: facets(some) for name, some in mesh.faces.items()},
         nodes={
-            name: np.union1d(kept[nodes], np.unique(facets(_facets_inside(mesh, nodes), name)))
+            name: np.union1d(kept[nodes], np.unique(facets(_facets_inside(mesh, nodes))))
             for name, nodes in mesh.nodes.items()
         },
         parts={name: _part_rows(mesh, rows, parent) for name, rows in mesh.parts.items()},
@@ -202,6 +206,21 @@ def _bodies(
     return bodies, whole, parent
 
 
+def _order_to_split(points: RealArray, own: list[OwnCells], kept: IntegerArray) -> IntegerArray:
+    """(n,) rank of the new nodes by which quadrilaterals are split: corners of the parents first,
+    so that the children on a diagonal of their parent are split along it.
+
+    Args:
+        kept: new number of each of the parents' nodes.
+    """
+    corner = np.zeros(len(points), bool)
+    for some in own:
+        corner[kept[some.cells[:, : CORNERS[FAMILY[some.word]]]]] = True
+    rank = np.empty(len(points), int)
+    rank[np.lexsort([vertex_order(points, AXIS), ~corner])] = np.arange(len(points))
+    return rank
+
+
 def _part_rows(mesh: Mesh, rows: IntegerArray, parent: dict[str, IntegerArray]) -> IntegerArray:
     """Rows of the new blade that are in a volume, of which ``rows`` were the old blade's."""
     chosen = []
@@ -226,6 +245,16 @@ def _triangles(quads: IntegerArray, rank: IntegerArray) -> IntegerArray:
     first = [corner[:, [0, 1, 2]], middle[:, [0, 1]], centre]
     second = [corner[:, [0, 2, 3]], centre, middle[:, [2, 3]]]
     return np.vstack([np.hstack(first), np.hstack(second)])
+
+
+def _half_triangles(quads: IntegerArray, rank: IntegerArray) -> IntegerArray:
+    """The children (4 nf, 4 or 9) of quadrilaterals of which the half at the first three corners is
+    meant, as its triangles (4 nf, 3 or 6): those at the ends of the diagonal are cut by it.
+    """
+    # at the corners (0, 0), (0, 1), (1, 0), (1, 1): first, fourth, second, third
+    first, _, second, third = (quads[i::4] for i in range(4))
+    columns = [0, 1, 2, 4, 5, 8] if quads.shape[1] == 9 else [0, 1, 2]
+    return np.vstack([_triangles(second, rank), first[:, columns], third[:, columns]])
 
 
 def _same_order(family: str, word: str) -> str:
@@ -285,12 +314,7 @@ def _facets_inside(mesh: Mesh, nodes: IntegerArray) -> IntegerArray:
     cells = np.concatenate(list(mesh.bodies.values()))
     outer = boundary_facets(cells, mesh.cell_type)
     inside = np.asarray(outer[np.isin(outer, nodes).all(axis=1)])
-    if not mesh.whole:
-        return inside
-    _, halves = own_facets(mesh, tuple(mesh.bodies), inside)
-    half = set(map(tuple, np.sort(halves, axis=1).tolist()))
-    whole = [tuple(row) not in half for row in np.sort(inside, axis=1).tolist()]
-    return np.asarray(inside[np.array(whole, bool)])
+    return without_halves(mesh, inside)
 
 
 def _matched(mesh: Mesh, pair: Pair) -> Pair:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import scipy.sparse as sp
 
 from geometry.topology import FAMILY
 from geometry.whole_cells import OwnCells, own_cells
@@ -72,14 +73,38 @@ def gauss_stress(
     Raises:
         InputError: the field does not fit the mesh, or a complex one with large displacements.
     """
+    return _gauss_stress_of(body, _stress_of_shapes(body, u, large, heated))
+
+
+def gauss_and_nodal_stress(
+    body: Body,
+    u: np.ndarray,
+    large: bool = False,
+    heated: bool = False,
+) -> tuple[GaussStress, np.ndarray]:
+    """``gauss_stress`` and ``nodal_stress`` of one field, in half the time of both."""
+    found = _stress_of_shapes(body, u, large, heated)
+    return _gauss_stress_of(body, found), _nodal_stress_of(body, found)
+
+
+def _stress_of_shapes(
+    body: Body,
+    u: np.ndarray,
+    large: bool,
+    heated: bool,
+) -> list[tuple[OwnCells, list[np.ndarray]]]:
+    """Cells of each material and shape with places, volumes and stresses at their Gauss points."""
     _check_field(body, u, large)
-    own = solved_cells(body)
-    width = max(len(best_points(some.word)[0]) for some in own)
+    return [(own, _all_cells(body, u, own, large, heated)) for own in solved_cells(body)]
+
+
+def _gauss_stress_of(body: Body, by_shape: list[tuple[OwnCells, list[np.ndarray]]]) -> GaussStress:
+    """What was found by shape, in the order of the body's cells."""
+    width = max(len(best_points(some.word)[0]) for some, _ in by_shape)
     starts = dict(zip(body.material, np.cumsum([0, *_piece_counts(body)])[:-1], strict=True))
     columns: list[np.ndarray] = []
-    for some in own:
+    for some, found in by_shape:
         rows = starts[some.name] + some.pieces
-        found = _all_cells(body, u, some, large, heated)
         for i, values in enumerate(_for_pieces(some, found, width)):
             if i == len(columns):
                 shape_of = (sum(_piece_counts(body)), *values.shape[1:])
@@ -149,21 +174,27 @@ def nodal_stress(
     A node between two materials takes the mean of the material with the larger von Mises stress
     there.
     """
-    _check_field(body, u, large)
+    return _nodal_stress_of(body, _stress_of_shapes(body, u, large, heated))
+
+
+def _nodal_stress_of(body: Body, by_shape: list[tuple[OwnCells, list[np.ndarray]]]) -> np.ndarray:
+    """``nodal_stress`` from what was found by shape."""
     n = len(body.mesh.points)
-    out = np.zeros((n, 6), np.result_type(u, float))
+    out = np.zeros((n, 6), np.result_type(*(stress for _, (*_, stress) in by_shape)))
     largest = np.full(n, -1.0)
     for name in body.material:
         weight = np.zeros(n)
         total = np.zeros_like(out)
-        for own in solved_cells(body):
+        for own, (_, volume, stress) in by_shape:
             if own.name != name:
                 continue
-            _, volume, stress = _all_cells(body, u, own, large, heated)
-            at_nodes = np.einsum("kq,cqs->cks", extrapolation_matrix(own.word), stress)
-            size = volume.sum(axis=1)
-            weight += np.bincount(own.cells.ravel(), np.repeat(size, own.cells.shape[1]), n)
-            np.add.at(total, own.cells, at_nodes * size[:, None, None])
+            at_nodes = extrapolation_matrix(own.word) @ stress
+            # row by row: the mean over cells is a product with a sparse matrix
+            entry = np.arange(own.cells.size)
+            size = np.repeat(volume.sum(axis=1), own.cells.shape[1])
+            sums = sp.csr_matrix((size, (own.cells.ravel(), entry)), shape=(n, own.cells.size))
+            weight += np.asarray(sums.sum(axis=1)).ravel()
+            total += sums @ at_nodes.reshape(-1, 6)
         mean = total / np.maximum(weight, np.finfo(float).tiny)[:, None]
         size = np.where(weight > 0, von_mises(mean), -1.0)
         better = size > largest
@@ -186,7 +217,7 @@ def stress_jumps(
         matrix = extrapolation_matrix(own.word)
         for cells in np.array_split(own.cells, len(own.cells) // CELLS_PER_BLOCK + 1):
             *_, stress = _of_cells(body, u, own.name, own.word, cells, False)
-            at_nodes = np.einsum("kq,cqs->cks", matrix, stress)
+            at_nodes = matrix @ stress
             np.maximum.at(jumps, cells, von_mises(at_nodes - recovered[cells]))
     return jumps
 
@@ -315,11 +346,12 @@ def _of_cells(
     d = body.dim
     at, w = best_points(word)
     values, gradients = tabulate(word, at)
-    tangents = np.einsum("ckg,qkd->cqgd", mesh.points[cells][:, :, :d], gradients)
+    corners = mesh.points[cells]
+    # matrix products: einsum takes several times as long
+    turned = gradients.swapaxes(1, 2)
+    tangents = (turned @ corners[:, None, :, :d]).swapaxes(2, 3)
     volume = np.abs(np.linalg.det(tangents)) * w * (mesh.depth if d == 2 else 1.0)
-    slope = np.einsum(
-        "cki,qkd,cqdj->cqij", u[cells], gradients, np.linalg.inv(tangents), optimize=True
-    )
+    slope = (turned @ u[cells][:, None]).swapaxes(2, 3) @ np.linalg.inv(tangents)
     strain = (slope + slope.swapaxes(2, 3)) / 2
     if large:
         strain = strain + slope.swapaxes(2, 3) @ slope / 2
@@ -339,7 +371,7 @@ def _of_cells(
         stress = F @ stress @ F.swapaxes(2, 3) / J[..., None, None]
         across = None if across is None else across / J
     return (
-        np.einsum("qk,ckg->cqg", values, mesh.points[cells]),
+        values @ corners,
         volume,
         _stress_vector(stress, across),
     )

@@ -15,11 +15,17 @@ from pathlib import Path
 from ..errors import InputError
 from ..scene.tables import Scene
 from ..scene.toml import dump_scene, load_scene
+from .folder_undo import (
+    EARLIER_FOLDER,
+    GIVEN_FIELDS_FILE,
+    REPLACED_FOLDER,
+    SCENE_FILE,
+    folder_state,
+    forget_replaced,
+    restore_folder,
+)
 from .stage_cache import open_folder, write_text
 
-EARLIER_FOLDER = "earlier"
-# names of the fields that the user gave, in addition to the scene with all its values
-GIVEN_FIELDS_FILE = "given.json"
 # not all .msh are results: a mesh of the user's own may lie in the folder
 NAMED_MESH = "named_mesh.msh"
 # what belongs to the mesh alone
@@ -42,11 +48,12 @@ RESULT_SUFFIXES = (
 @contextmanager
 def lock_run_folder(folder: str | Path) -> Iterator[None]:
     """Keep a run folder for this process; the system gives it back when the process ends, however
-    it ends.
+    it ends. A command that ends by bad input, before any long work, leaves the folder as it was.
 
     Raises:
         InputError: another process holds it, or the folder cannot be written.
     """
+    before = folder_state(folder)
     path = open_folder(folder) / ".lock"
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
@@ -63,7 +70,13 @@ def lock_run_folder(folder: str | Path) -> Iterator[None]:
         except OSError:
             # a file system without locks
             pass
-        yield
+        try:
+            yield
+        except InputError:
+            restore_folder(before)
+            raise
+        finally:
+            forget_replaced(folder)
     finally:
         os.close(file)
 
@@ -90,7 +103,7 @@ def take_folder(
         InputError: the folder cannot be written.
     """
     folder = open_folder(folder)
-    file = folder / "scene.toml"
+    file = folder / SCENE_FILE
     said = ""
     if file.is_file():
         held = _read(file)
@@ -158,9 +171,11 @@ def _put_away(folder: Path, kept: Container[str]) -> str:
         return ""
     earlier = folder / EARLIER_FOLDER
     try:
-        shutil.rmtree(earlier, ignore_errors=True)
+        forget_replaced(folder)
+        if earlier.is_dir():
+            earlier.rename(folder / REPLACED_FOLDER)
         earlier.mkdir()
-        for path in [*results, folder / "scene.toml"]:
+        for path in [*results, folder / SCENE_FILE]:
             path.rename(earlier / path.name)
     except OSError as error:
         raise InputError(

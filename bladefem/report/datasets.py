@@ -42,7 +42,9 @@ def mode_shapes(result: ModalRun) -> xr.Dataset:
     sets = result.modes
     diameters = [-1 if s.nodal_diameter is None else s.nodal_diameter for s in sets]
     count = min(len(s.frequencies) for s in sets)
-    shapes = np.stack([s.shapes[:count].astype(complex) for s in sets]).astype(np.complex64)
+    shapes = np.empty((len(sets), count, *sets[0].shapes.shape[1:]), np.complex64)
+    for own, one in zip(shapes, sets, strict=True):
+        own[:] = one.shapes[:count]
     return xr.Dataset(
         {
             "frequency": (

@@ -8,7 +8,7 @@ import pandas as pd
 from geometry.mesh import Mesh
 
 from ..data import ModeSet
-from ..study.modes.comparison import family_table
+from ..study.modes.comparison import family_references, name_modes
 
 
 def mode_table(
@@ -19,13 +19,14 @@ def mode_table(
     """One row a mode of each nodal diameter, named after the clamped blade's modes where these are
     given.
     """
+    references = family_references(geometry, clamped)
     rows = [
         pd.DataFrame(
             {
                 "nodal_diameter": 0 if s.nodal_diameter is None else s.nodal_diameter,
                 "mode": np.arange(1, len(s.frequencies) + 1),
                 "frequency": s.frequencies,
-                "family": family_table(s, geometry, clamped)["family"],
+                "family": name_modes(s, references)["family"],
                 "residual": s.residuals,
             }
         )

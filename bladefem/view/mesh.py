@@ -148,9 +148,13 @@ def save_vtu(
     return write_vtu(pyvista_grid(mesh, fields, inside), file)
 
 
-def write_vtu(grid: UnstructuredGrid, file: str | Path) -> Path:
+def write_vtu(grid: UnstructuredGrid, file: str | Path, quick: bool = False) -> Path:
     """Write what pyvista holds: compressed numbers as they are, which takes a third less time and a
     quarter less room than pyvista's own text.
+
+    Args:
+        quick: by LZ4, in a tenth of the time and an eighth more room; ParaView reads it, meshio
+            does not.
     """
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
 
@@ -160,6 +164,8 @@ def write_vtu(grid: UnstructuredGrid, file: str | Path) -> Path:
     writer.SetInputData(grid)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()
+    if quick:
+        writer.SetCompressorTypeToLZ4()
     writer.SetCompressionLevel(1)
     if not writer.Write():
         raise OSError(f"{file}: expected a file that can be written")
@@ -199,7 +205,7 @@ def save_wheel_vtu(
     for name, values in split_complex(around).items():
         result.point_data[name] = values.astype(np.float32)
     grid = pyvista.UnstructuredGrid(result)
-    return write_vtu(grid.clean(tolerance=0.0) if volume else grid, file)
+    return write_vtu(grid.clean(tolerance=0.0) if volume else grid, file, quick=True)
 
 
 def volume_wheel(mesh: Mesh, count: int) -> UnstructuredGrid:

@@ -38,6 +38,7 @@ from .style import (
     open_plotter,
     photograph,
     reduced,
+    resized,
     show_photograph,
     size_for,
     trim_border,
@@ -56,6 +57,9 @@ DRAWN_DISPLACEMENT_SHARE = 0.1
 SHAPE_PIXELS = (880, 960)
 TILE_PIXELS = (450, 520)
 WHEEL_PIXELS = (1130, 890)
+# part of a tile's width that a picture takes, and the gap below its title [inch]
+TILE_SHARE = 0.98
+TITLE_GAP = 0.06
 # in an animated wave
 WAVE_COLOURS = 224
 
@@ -236,42 +240,59 @@ def draw_mode_sheet(
     columns = min(count, 4)
     rows = -(-count // columns)
     direction = view_of(mesh)
-    with canvas(
-        file, size=(2.45 * columns, 3.0 * rows + 0.5), grid=(rows, columns), squeeze=False
-    ) as axes:
-        for ax in axes.flat:
-            ax.set_axis_off()
-        real = [np.real(shape * best_phase(shape)) for shape in modes.shapes[:count]]
-        drawn = [(shape, scale_of(mesh, shape), np.linalg.norm(shape, axis=1)) for shape in real]
-        images = photograph_shapes(mesh, drawn, direction, TILE_PIXELS, coarse=True)
-        for number, (ax, image) in enumerate(zip(axes.flat, images, strict=False)):
-            show_photograph(ax, image)
-            name = families[number] if number < len(families) else ""
-            ax.set_title(f"{number + 1}  {modes.frequencies[number]:.5g} Hz\n{name}", fontsize=9)
+    real = [np.real(shape * best_phase(shape)) for shape in modes.shapes[:count]]
+    drawn = [(shape, scale_of(mesh, shape), np.linalg.norm(shape, axis=1)) for shape in real]
+    images = photograph_shapes(mesh, drawn, direction, TILE_PIXELS, coarse=True)
+    titles = [
+        f"{number + 1}  {modes.frequencies[number]:.5g} Hz\n{name}"
+        for number, name in enumerate([*families, *[""] * count][:count])
+    ]
+    with canvas(file, size=(2.45 * columns, 3.0 * rows + 0.5)) as ax:
+        # axes of their own for all pictures take as long as the pictures
+        ax.set_axis_off()
+        figure = ax.figure
+        figure.set_layout_engine(None)
+        _place_tiles(figure, list(images), titles, (rows, columns))
         diameter = (
             "" if modes.nodal_diameter is None else f", nodal diameter {modes.nodal_diameter}"
         )
-        headline(axes[0, 0].figure, f"first modes{diameter}")
-        axes[0, 0].figure.supxlabel(
+        headline(figure, f"first modes{diameter}")
+        figure.supxlabel(
             "colour: displacement over its largest value, drawn as "
             f"{100 * DRAWN_DISPLACEMENT_SHARE:.0f} % of the height",
             fontsize=7.5,
             color="#555555",
         )
-        _place_tiles(axes[0, 0].figure)
-        return axes[0, 0].figure
+        return figure
 
 
-def _place_tiles(figure: Any) -> None:
-    """Fixed places for the pictures of a sheet: to measure all titles takes as long as to draw half
-    of them.
-    """
-    figure.set_layout_engine(None)
-    height = figure.get_figheight()
-    top, bottom, title = np.array([0.72, 0.3, 0.45]) / height
-    rows = figure.axes[0].get_gridspec().nrows
-    tile = (1 - top - bottom - (rows - 1) * title) / rows
-    figure.subplots_adjust(0.01, bottom, 0.99, 1 - top, wspace=0.02, hspace=title / tile)
+def _place_tiles(
+    figure: Any,
+    images: Sequence[np.ndarray],
+    titles: Sequence[str],
+    grid: tuple[int, int],
+) -> None:
+    """Pictures in rows and columns, each as large as its tile allows, with its title above."""
+    rows, columns = grid
+    width, height = figure.get_size_inches() * figure.dpi
+    # of the headline, the line below and the titles between the rows
+    top, bottom, title = np.array([0.72, 0.3, 0.45]) * figure.dpi
+    tile = (0.98 * width / columns, (height - top - bottom - (rows - 1) * title) / rows)
+    for number, (image, text) in enumerate(zip(images, titles, strict=True)):
+        row, column = divmod(number, columns)
+        scale = min(TILE_SHARE * tile[0] / image.shape[1], tile[1] / image.shape[0])
+        pixels = round(scale * image.shape[1]), round(scale * image.shape[0])
+        left = round(0.01 * width + (column + 0.5) * tile[0] - pixels[0] / 2)
+        upper = round(height - top - row * (tile[1] + title) - (tile[1] - pixels[1]) / 2)
+        figure.figimage(resized(image, pixels), left, upper - pixels[1], zorder=1)
+        figure.text(
+            left / width,
+            (upper + TITLE_GAP * figure.dpi) / height,
+            text,
+            fontsize=9,
+            fontweight="bold",
+            verticalalignment="bottom",
+        )
 
 
 def wheel_motion(
@@ -352,7 +373,13 @@ def draw_wheel_mode(
     surface = polydata(wheel, moved)
     surface.point_data["signed"] = signed.real
     parts: list[dict[str, Any]] = [
-        {"mesh": surface, "scalars": "signed", "cmap": DIVERGING_COLOURS, "clim": (-1, 1)}
+        {
+            "mesh": surface,
+            "scalars": "signed",
+            "cmap": DIVERGING_COLOURS,
+            "clim": (-1, 1),
+            **hidden_faces(mesh),
+        }
     ]
     surface.point_data["envelope"] = np.abs(signed)
     # Where nothing moves (the clamp) the sign is noise, not a nodal line.
@@ -375,6 +402,14 @@ def draw_wheel_mode(
         )
         say_exaggeration(ax, mesh, modes)
         return ax.figure
+
+
+def hidden_faces(mesh: Mesh) -> dict[str, str]:
+    """Options of ``Plotter.add_mesh`` for a whole wheel: faces that look away are behind others,
+    and not to draw them spares a third of the time; a row without end is open at its ends.
+    """
+    closed = mesh.dimension == 3 and (mesh.sector is None or mesh.sector.count > 0)
+    return {"culling": "back"} if closed else {}
 
 
 def wheel_camera(mesh: Mesh) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
@@ -455,7 +490,12 @@ def wave_frames(
     size = (pixels, pixels)
     plotter = open_plotter(enlarged(size), smooth=False)
     plotter.add_mesh(
-        surface, scalars="signed", cmap=DIVERGING_COLOURS, clim=(-1, 1), **RENDER_OPTIONS
+        surface,
+        scalars="signed",
+        cmap=DIVERGING_COLOURS,
+        clim=(-1, 1),
+        **RENDER_OPTIONS,
+        **hidden_faces(mesh),
     )
     aim_camera(plotter, *wheel_camera(mesh), wheel.points, border=1.15)
     for k in range(frames):

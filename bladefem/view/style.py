@@ -27,6 +27,10 @@ DIVERGING_COLOURS = "RdBu_r"
 INK_COLOUR = "#222222"
 # pixels of the window to one of the picture, along each side, in place of several samples a pixel
 SUPERSAMPLING = 1.5
+# zlib's level: two thirds of the time of the usual one, 2 to 4 % more room
+PNG_OPTIONS = {"compress_level": 4}
+# mark of images that are renderings
+PHOTOGRAPH = "photograph"
 FAILED_COLOUR = "#d62728"
 RENDER_OPTIONS = {"show_scalar_bar": False, "ambient": 0.42, "diffuse": 0.62, "specular": 0.05}
 
@@ -88,7 +92,9 @@ def canvas(
         if file is not None:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
             _settle_layout(figure)
-            figure.savefig(file)
+            _fit_photographs(figure)
+            quick = {"pil_kwargs": PNG_OPTIONS} if Path(file).suffix.lower() == ".png" else {}
+            figure.savefig(file, **quick)
 
 
 def _settle_layout(figure: Any) -> None:
@@ -99,6 +105,23 @@ def _settle_layout(figure: Any) -> None:
     if layout is not None:
         layout.execute(figure)
         figure.set_layout_engine(None)
+
+
+def _fit_photographs(figure: Any) -> None:
+    """Bring renderings to the pixels that they are shown with: Pillow does it in a tenth of
+    matplotlib's time.
+    """
+    for ax in figure.axes:
+        for image in ax.get_images():
+            if image.get_gid() != PHOTOGRAPH:
+                continue
+            ax.apply_aspect()
+            box = ax.get_window_extent()
+            extent = image.get_extent()
+            pixels = max(round(box.width), 1), max(round(box.height), 1)
+            image.set_data(resized(image.get_array(), pixels))
+            image.set_extent(extent)
+            image.set_interpolation("nearest")
 
 
 def take_words_as_they_are(figure: Any) -> None:
@@ -200,6 +223,13 @@ def reduced(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.BILINEAR))
 
 
+def resized(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A picture (rows, columns, 3) at another size (width, height), as sharp as it can be."""
+    from PIL import Image
+
+    return np.asarray(Image.fromarray(image).resize(size, Image.Resampling.LANCZOS))
+
+
 def open_plotter(size: tuple[int, int], smooth: bool = True) -> Any:
     """A pyvista plotter on an off-screen EGL surface with the common theme.
 
@@ -279,7 +309,7 @@ def show_photograph(
     """Put a rendering on axes, with a small triad (x radial, y circumferential, z axial) when a
     direction is given.
     """
-    ax.imshow(image, interpolation="lanczos")
+    ax.imshow(image, interpolation="lanczos").set_gid(PHOTOGRAPH)
     ax.set_axis_off()
     if direction is not None:
         figure = ax.figure

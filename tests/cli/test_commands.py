@@ -422,6 +422,12 @@ def test_what_goes_wrong_has_an_exit_code_and_a_sentence(
     assert code != 2 or text.count("\n") == 1
 
 
+def test_bad_input_that_the_work_finds_leaves_no_folder(pipeline, tmp_path):
+    pipeline.state.behaviour = raiser(InputError("no face 'clamp'"))
+    assert main(["modes", WEDGE, "-o", str(tmp_path / "run")]) == 2
+    assert not (tmp_path / "run").exists()
+
+
 @pytest.mark.parametrize(
     "arguments",
     [

@@ -27,6 +27,7 @@ from bladefem.fem.stress_error import mesh_error
 from bladefem.fem.supports import AreaSpring, supported
 from bladefem.fem.temperature import Temperatures
 from bladefem.scene.tables import Material
+from geometry.imported import mesh_of_raw
 from geometry.raw_mesh import RawMesh
 from geometry.solid_cells import solid_cells
 from geometry.whole_cells import own_cells, own_facets
@@ -283,13 +284,47 @@ def test_cyclic_sector_in_halves():
     assert ((ours - exact) < 0.4 * (theirs - exact)).all()
 
 
-def test_half_a_quadrilateral_is_no_face_of_a_halved_mesh():
-    mesh = row()
-    mesh = replace(mesh, faces={"seat": mesh.faces["z0"][:1]})
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("face", ["x0", "z0"])
+@pytest.mark.parametrize("number", [0, 1])
+def test_half_a_quadrilateral_in_halves(number, face, order):
+    """Force and moments of a pressure on the half stay, on a skewed row."""
+    mesh = row(map=skew, order=order)
+    half = mesh.faces[face][number : number + 1]
+    mesh = replace(mesh, faces={"seat": half})
+    assert len(own_facets(mesh, ("blade",), half)[1]) == 1
+    fine = mesh
+    found = []
+    for level in range(3):
+        seat = fine.faces["seat"]
+        assert len(seat) == 4**level
+        body = assemble(fine, "blade", STEEL)
+        load = surface_load(body, "seat", pressure=1.0).reshape(-1, 3)
+        found.append([load.sum(axis=0), np.cross(fine.points, load).sum(axis=0)])
+        fine = refine_uniformly(fine)
+    assert 4e-3 < np.linalg.norm(found[0][0]) < 7e-3
+    np.testing.assert_allclose(found[1:], found[:1] * 2, rtol=1e-10, atol=1e-14)
+
+
+def test_three_corners_of_a_quadrilateral_are_no_face(tmp_path):
+    """Of a node set over two sides of a box of hexahedra and wedges: the side that it holds, whole,
+    and on no other one the half of an element.
+    """
+    divisions = (2, 2, 2)
+    cubes = cut(box(divisions, (0.2, 0.2, 0.2), "hexahedron27"), divisions, lambda i, j: "hw"[i])
+    low = np.flatnonzero(cubes.points[:, 0] < 1e-9)
+    beside = np.flatnonzero(abs(cubes.points - [0.1, 0.0, 0.1]).max(axis=1) < 1e-9)
+    held = np.union1d(low, beside)
+    blocks = [(own.word, own.cells) for own in own_cells(cubes, ("blade",))]
+    raw = RawMesh(cubes.points, blocks, {}, {"held": held})
+    mesh = mesh_of_raw(raw, 1.0, 0, (0.0, 0.0, 1.0), "box")
     body = assemble(mesh, "blade", STEEL)
-    assert face_areas(body, "seat").sum() == pytest.approx(0.005)
-    with pytest.raises(InputError, match="face 'seat': 1 of its triangles are half of a quadri"):
-        refine_uniformly(mesh)
+    assert not len(own_facets(mesh, ("blade",), mesh.faces["held"])[1])
+    assert face_areas(body, "held").sum() == pytest.approx(0.04)
+    assert set(held) <= set(mesh.nodes["held"])
+    assert face_areas(assemble(refine_uniformly(mesh), "blade", STEEL), "held").sum() == (
+        pytest.approx(0.04)
+    )
 
 
 @pytest.mark.parametrize("halvings", [0, 1])

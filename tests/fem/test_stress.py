@@ -16,7 +16,13 @@ from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.loads import surface_load
 from bladefem.fem.modes import modes
 from bladefem.fem.rotation import preload, unit_speed_displacement
-from bladefem.fem.stress import gauss_stress, nodal_stress, principal_stresses, von_mises
+from bladefem.fem.stress import (
+    gauss_and_nodal_stress,
+    gauss_stress,
+    nodal_stress,
+    principal_stresses,
+    von_mises,
+)
 from bladefem.scene.tables import Material
 
 STEEL = Material()
@@ -185,6 +191,18 @@ def test_two_materials_keep_their_own_stress():
         set(np.round(s / 1e5, 6)) == {21.0, 10.0}
         and (s[mesh.points[:, 1] == 0.1] / 1e5).round(6).min() == 21.0
     )
+
+
+def test_both_stresses_at_once():
+    """At Gauss points and nodes, of a complex field."""
+    mesh = sector(9, (2, 2, 1), "tetra10", bump=0.2)
+    body = assemble(mesh, "blade", STEEL, MPI.COMM_SELF)
+    rng = np.random.default_rng(2)
+    u = rng.normal(size=mesh.points.shape) + 1j * rng.normal(size=mesh.points.shape)
+    at_points, at_nodes = gauss_and_nodal_stress(body, u)
+    np.testing.assert_array_equal(at_points.stress, gauss_stress(body, u).stress)
+    np.testing.assert_array_equal(at_points.volume, gauss_stress(body, u).volume)
+    np.testing.assert_array_equal(at_nodes, nodal_stress(body, u))
 
 
 def test_wrong_fields():

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from bladefem.errors import InputError
-from bladefem.io.run_folder import lock_run_folder, take_folder
+from bladefem.errors import InputError, NotSolvedError
+from bladefem.io.run_folder import keep_given, lock_run_folder, take_folder
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.stage_inputs import same_mesh
@@ -90,3 +90,53 @@ def test_another_process_is_kept_out_and_a_dead_one_is_not(tmp_path):
     holder.communicate()
     with lock_run_folder(tmp_path):
         pass
+
+
+def end_by(error, folder, scene, files):
+    """A command that writes some files and ends by an error."""
+    with pytest.raises(type(error)), lock_run_folder(folder):
+        take_folder(folder, scene)
+        keep_given(folder, ["contact.mu"])
+        for name in files:
+            (folder / name).parent.mkdir(parents=True, exist_ok=True)
+            (folder / name).write_text("second")
+        raise error
+
+
+def test_bad_input_leaves_no_folder_behind(tmp_path):
+    end_by(InputError("no face"), tmp_path / "runs" / "a", OTHER, ["stages/mesh.npz", "mesh.vtu"])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_bad_input_brings_back_what_was_put_away(tmp_path):
+    with lock_run_folder(tmp_path):
+        take_folder(tmp_path, Scene())
+    for name in ("report.md", "stages/mesh.npz", "earlier/report.md", "own.msh"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text("first")
+    before = {name: (tmp_path / name).read_bytes() for name in results(tmp_path)}
+    end_by(InputError("no face"), tmp_path, OTHER, ["report.md", "mesh.vtu"])
+    assert {name: (tmp_path / name).read_bytes() for name in results(tmp_path)} == before
+
+
+@pytest.mark.parametrize(
+    ("error", "files"),
+    [
+        (InputError("no such probe"), ["stages/mesh.npz", "stages/modes.npz"]),
+        (InputError("no such probe"), ["mu=0.2/stages/modes.npz"]),
+        (NotSolvedError("40 steps"), []),
+    ],
+)
+def test_long_work_stays_with_its_scene(error, files, tmp_path):
+    end_by(error, tmp_path, OTHER, files)
+    assert {"scene.toml", "given.json", *files} <= results(tmp_path)
+
+
+def test_what_results_replace_is_gone_after_the_command(tmp_path):
+    for scene, text in ((Scene(), "first"), (OTHER, "second"), (Scene(), "third")):
+        with lock_run_folder(tmp_path):
+            take_folder(tmp_path, scene)
+            (tmp_path / "report.md").write_text(text)
+    assert (tmp_path / "earlier" / "report.md").read_text() == "second"
+    assert results(tmp_path / "earlier") == {"report.md", "scene.toml"}
+    assert not (tmp_path / ".earlier").exists()

@@ -36,7 +36,8 @@ from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
 from bladefem.view.optimum import draw_optimum
 from bladefem.view.response import draw_responses, smooth_curve
 from bladefem.view.skin import row_keys, skin, wheel_skin
-from bladefem.view.style import SUPERSAMPLING, canvas, enlarged_lines
+from bladefem.view.style import SUPERSAMPLING, canvas, enlarged_lines, show_photograph
+from geometry.mesh import Sector
 
 
 def ink(file):
@@ -177,6 +178,36 @@ def test_mode_pictures(sector, wave, folder):
     draw_wheel_mode(sector, wave, 1, folder / "wheel.png")
     draw_mode_sheet(sector, wave, folder / "sheet.png")
     assert min(ink(folder / name) for name in ("mode.png", "wheel.png", "sheet.png")) > 0.1
+
+
+def test_faces_that_look_away_are_left_out_of_wheels_alone(sector, plane_row):
+    assert modes_view.hidden_faces(sector) == {"culling": "back"}
+    assert modes_view.hidden_faces(plane_row) == {}
+    # a row of solids is open at its ends
+    row = replace(sector, sector=Sector(0, np.eye(3), np.array([0.0, 0.1, 0.0])))
+    assert modes_view.hidden_faces(row) == {}
+
+
+def test_faces_that_look_away_change_no_picture(sector, wave, monkeypatch):
+    """But for single pixels on edges."""
+    (with_them, without) = [], []
+    for frames, options in ((without, {"culling": "back"}), (with_them, {})):
+        monkeypatch.setattr(modes_view, "hidden_faces", lambda _, options=options: options)
+        frames += [np.array(f, int) for f in modes_view.wave_frames(sector, wave, 0, 4, 160)]
+    for one, other in zip(with_them, without, strict=True):
+        assert np.mean(abs(one - other).max(axis=2) > 8) < 2e-3
+
+
+def test_renderings_are_saved_with_their_own_pixels(folder):
+    """A chequered picture stays one: each pixel of the file is one of the picture, scaled once."""
+    picture = np.indices((160, 160)).sum(axis=0)[..., None] % 2 * np.full(3, 255, np.uint8)
+    with canvas(folder / "own.png", size=(2.0, 2.0)) as ax:
+        ax.figure.set_layout_engine(None)
+        # 160 pixels an inch
+        ax.set_position([0.25, 0.25, 0.5, 0.5])
+        show_photograph(ax, picture.astype(np.uint8))
+    saved = imread(folder / "own.png")[80:240, 80:240, 0]
+    np.testing.assert_array_equal(saved, picture[..., 0] / 255)
 
 
 def test_wheel_picture_shows_six_nodal_radii(sector, wave, folder):

@@ -5,6 +5,7 @@ mass.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -171,6 +172,47 @@ def pure_shapes(
     return shapes
 
 
+@dataclass(frozen=True)
+class FamilyReferences:
+    """The motions that modes of a mesh are named after; see `family_table`."""
+
+    # one a reference
+    names: list[str]
+    # (r, n, 3) on the nodes of the aerofoil
+    shapes: np.ndarray
+    # (n,) numbers of these nodes
+    nodes: np.ndarray
+    # (n_points,) shares of the mesh's volume [m^3]
+    volumes: np.ndarray
+    # of modes that are not the aerofoil's
+    below: str
+
+
+def family_references(
+    mesh: Mesh,
+    clamped: ModeSet | None = None,
+    body: str = "blade",
+    root: float | None = None,
+) -> FamilyReferences:
+    """What serves all mode sets of a mesh; arguments as of `family_table`."""
+    root = naming_root(mesh) if root is None else root
+    nodes = np.unique(mesh.bodies.get(body, np.concatenate(list(mesh.bodies.values()))))
+    nodes = nodes[mesh.points[nodes, 0] >= root]
+    pure = pure_shapes(mesh, nodes, root)
+    below = "disc" if _is_wheel(mesh) else "foot"
+    own = FamilyReferences(
+        list(pure), np.stack(list(pure.values())), nodes, nodal_volumes(mesh), below
+    )
+    if clamped is None:
+        return own
+    found = name_modes(clamped, own)["family"]
+    return replace(
+        own,
+        names=[*own.names, *(name.removesuffix(", coupled") for name in found)],
+        shapes=np.concatenate([own.shapes, clamped.shapes[:, nodes]]),
+    )
+
+
 def family_table(
     modes: ModeSet,
     mesh: Mesh,
@@ -195,22 +237,17 @@ def family_table(
         body: the aerofoil's body; the whole mesh when there is no such body.
         root: height x of the aerofoil's root [m]; found from the named faces when left out.
     """
-    root = naming_root(mesh) if root is None else root
-    volumes = nodal_volumes(mesh)
-    nodes = np.unique(mesh.bodies.get(body, np.concatenate(list(mesh.bodies.values()))))
-    nodes = nodes[mesh.points[nodes, 0] >= root]
-    pure = pure_shapes(mesh, nodes, root)
-    names = list(pure)
-    references = list(pure.values())
-    if clamped is not None:
-        found = family_table(clamped, mesh, None, body, root)["family"]
-        names += [name.removesuffix(", coupled") for name in found]
-        references += list(clamped.shapes[:, nodes])
-    match = mac_of(modes.shapes[:, nodes], np.stack(references), volumes[nodes])
+    return name_modes(modes, family_references(mesh, clamped, body, root))
+
+
+def name_modes(modes: ModeSet, references: FamilyReferences) -> pd.DataFrame:
+    """`family_table` of one of several mode sets of a mesh."""
+    names, nodes, volumes = references.names, references.nodes, references.volumes
+    match = mac_of(modes.shapes[:, nodes], references.shapes, volumes[nodes])
     match[:, [name == "mixed" for name in names]] = 0.0
-    energy = np.einsum("mni,n->mn", np.abs(modes.shapes) ** 2, volumes)
+    energy = volumes * np.square(np.abs(modes.shapes)).sum(axis=2)
     share = energy[:, nodes].sum(axis=1) / np.maximum(energy.sum(axis=1), 1e-300)
-    below = "disc" if _is_wheel(mesh) else "foot"
+    below = references.below
     return pd.DataFrame(
         {
             "mode": np.arange(1, len(match) + 1),

@@ -210,13 +210,13 @@ def _state_stress(
     u: np.ndarray,
 ) -> tuple[dict[str, Any], dict[str, np.ndarray], np.ndarray]:
     """A row of the table, fields at the nodes, and von Mises stresses [Pa] in the cells (nc,)."""
-    from ...fem.stress import gauss_stress, nodal_stress, principal_stresses, von_mises
+    from ...fem.stress import gauss_and_nodal_stress, principal_stresses, von_mises
 
     heated = name == STATIC_STATES[True]
-    stress = nodal_stress(body, u, heated=heated)
+    at_points, stress = gauss_and_nodal_stress(body, u, heated=heated)
     size = von_mises(stress)
     sides = principal_stresses(stress)
-    inside = von_mises(gauss_stress(body, u, heated=heated).stress).max(1)
+    inside = von_mises(at_points.stress).max(1)
     worst = size.argmax()
     fields = {"von Mises": size, "largest principal": sides[:, 0]}
     # motion swings to both sides: its smallest is minus the largest
