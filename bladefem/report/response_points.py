@@ -9,8 +9,9 @@ from ..hbm.stability import STABLE
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
 
-# method of a point that no balance gives
+# methods of points that the balance of the curve does not give
 MARCHED = "march in time"
+FOLLOWED = "followed to the stiff layer"
 
 
 def points_of(curve: Curve) -> pd.DataFrame:
@@ -53,15 +54,18 @@ def points_of(curve: Curve) -> pd.DataFrame:
 
 
 def _with_marched(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:
-    """The table with the resonance that a march gives, as a motion next to those of the curve."""
+    """The table with the resonance that a march or a stiff layer gives, as a motion next to those
+    of the curve.
+    """
+    method = FOLLOWED if curve.reaches_layer else MARCHED
     branch = table["branch"] if "branch" in table else table["converged"].astype(int)
     row = table.iloc[[0]].assign(
         frequency=curve.peak_frequency,
         amplitude=curve.peak_amplitude,
         phase=np.nan,
         converged=True,
-        method=MARCHED,
-        route=MARCHED,
+        method=method,
+        route=method,
         residual=np.nan,
         iterations=0,
         slipping=curve.peak.states["slip"] + curve.peak.states["lift"],

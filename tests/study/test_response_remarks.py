@@ -38,6 +38,8 @@ def curve(
         sought=None,
         peak=SimpleNamespace(frequency=100.0),
         peak_amplitude=656e-6,
+        curve_amplitude=656e-6,
+        reaches_layer=False,
         frequency=np.array([99.0, 100.0, 101.0]),
         peak_frequency=100.0,
         converged=np.array([converged, True, True]),
@@ -52,7 +54,12 @@ def test_a_softer_layer_says_where_the_stiff_one_resonates():
     shifted.layer_shift = 0.012
     plain.layer_shift = np.nan
     said = stiff_layer_sentence([shifted, plain])
-    assert said.endswith("at 101.2 Hz in place of 100 Hz under 80 N")
+    assert said.endswith("lies at 101.2 Hz in place of 100 Hz under 80 N")
+    reached = curve(160.0, 0.05)
+    reached.layer_shift, reached.reaches_layer = 0.02, True
+    reached.peak_amplitude, reached.peak_frequency = 600e-6, 102.0
+    said = stiff_layer_sentence([shifted, reached])
+    assert "600 um at 102 Hz in place of 656 um at 100 Hz under 160 N; the resonance" in said
     assert stiff_layer_sentence([plain]) == ""
 
 

@@ -128,12 +128,15 @@ class Curve:
     # relative change of the peak's height by the estimated error of the body's mesh; NaN: not
     # estimated
     body_mesh: float = np.nan
-    # relative change of the peak's height with the layer's law in place of its tangent; NaN: not
-    # estimated
+    # relative change of the peak's height with the layer's law in place of its tangent, or what is
+    # not known of that from a softer layer to the stiff one that it stands for; NaN: not estimated
     layer_law: float = np.nan
-    # relative change of the peak's frequency from a softer layer to the stiff one that it stands
-    # for; NaN: none does, or it is not known
+    # relative change of the peak's frequency from that softer layer to the stiff one; NaN: none
+    # stands for another, or it is not known
     layer_shift: float = np.nan
+    # the same of its height, where the stiff one was reached: the resonance given is then that of
+    # the stiff layer
+    layer_height: float = np.nan
 
     @property
     def error(self) -> float | None:
@@ -171,9 +174,9 @@ class Curve:
             return 1 - self.kept.lowest / self.kept.highest
         if self.keeps_unstable:
             ends = (self.kept.lowest, self.kept.highest)
-            beside = max(abs(end / self.peak_amplitude - 1) for end in ends)
+            beside = max(abs(end / self.curve_amplitude - 1) for end in ends)
             return 0.0 if self.in_time is not None else beside
-        return max(0.0, self.kept.highest / self.peak_amplitude - 1)
+        return max(0.0, self.kept.highest / self.curve_amplitude - 1)
 
     @property
     def keeps_unstable(self) -> bool:
@@ -187,10 +190,22 @@ class Curve:
     @property
     def peak_frequency(self) -> float:
         """[Hz]"""
+        if self.reaches_layer:
+            return (1 + self.layer_shift) * self.peak.frequency
         return self.peak.frequency if self.sought is None else self.sought.frequency
 
     @property
     def peak_amplitude(self) -> float:
+        """That of the curve, or that of the stiff layer that its softer one stands for [m]."""
+        return (1 + self.layer_height if self.reaches_layer else 1.0) * self.curve_amplitude
+
+    @property
+    def reaches_layer(self) -> bool:
+        """The curve is that of a softer layer, and the resonance given that of the stiff one."""
+        return bool(np.isfinite(self.layer_height))
+
+    @property
+    def curve_amplitude(self) -> float:
         """That of the balance, or the highest that a march keeps to where it contradicts it [m]."""
         if self.sought is not None:
             return self.sought.highest
@@ -354,6 +369,7 @@ def curve_of(
         body_mesh=unseen.body_mesh,
         layer_law=unseen.layer_law,
         layer_shift=unseen.layer_shift,
+        layer_height=unseen.layer_height,
     )
 
 

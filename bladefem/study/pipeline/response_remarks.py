@@ -115,20 +115,32 @@ def search_sentence(curve: Curve) -> str:
 
 
 def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
-    """Where the stiff layer itself resonates, under loads whose resonance is a softer one's, or
-    "".
-    """
-    each = ", ".join(
+    """Where the stiff layer itself resonates, under loads whose curve is a softer one's, or ""."""
+    shifted = [c for c in curves if np.isfinite(c.layer_shift)]
+    reached = ", ".join(
+        f"{1e6 * c.peak_amplitude:.4g} um at {c.peak_frequency:.5g} Hz in place of "
+        f"{1e6 * c.curve_amplitude:.4g} um at {c.peak.frequency:.5g} Hz under {load_of(c)}"
+        for c in shifted
+        if c.reaches_layer
+    )
+    left = ", ".join(
         f"{(1 + c.layer_shift) * c.peak_frequency:.5g} Hz in place of {c.peak_frequency:.5g} Hz "
         f"under {load_of(c)}"
-        for c in curves
-        if np.isfinite(c.layer_shift)
+        for c in shifted
+        if not c.reaches_layer
     )
-    return (
-        "contacts lift off, and the resonance given is that of a softer layer; followed to the "
-        f"stiff one it lies at {each}"
-        if each
-        else ""
+    said = [
+        f"the resonance given is that of the stiff one, followed from there: {reached}"
+        if reached
+        else "",
+        f"the resonance given is its own; followed towards the stiff one it lies at {left}"
+        if left
+        else "",
+    ]
+    if not shifted:
+        return ""
+    return "contacts lift off, and the curve is that of a softer layer; " + "; ".join(
+        filter(None, said)
     )
 
 

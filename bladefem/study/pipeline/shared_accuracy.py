@@ -41,8 +41,10 @@ class UnseenErrors:
     body_mesh: float = np.nan
     # with the layer's law in place of its tangent, or a stiff layer in place of a softer one
     layer_law: float = np.nan
-    # of the frequency, with a stiff layer in place of a softer one
+    # of the frequency, with a stiff layer in place of a softer one, and of the amplitude where the
+    # stiff one was reached
     layer_shift: float = np.nan
+    layer_height: float = np.nan
 
     @property
     def total(self) -> float:
@@ -126,9 +128,9 @@ def unseen_errors(
         return UnseenErrors()
     if settings.softened:
         change = stiff_layer_change(models, settings, top, scene.accuracy)
-        layer, shift = change.height, change.frequency
+        layer, shift, height = change.error, change.frequency, change.height
     else:
-        layer, shift = layer_change(models, settings, top, case.decay), np.nan
+        layer, shift, height = layer_change(models, settings, top, case.decay), np.nan, np.nan
     return UnseenErrors(
         np.nan if scene.contact.points else halved_change(models, settings, top),
         np.nan
@@ -136,4 +138,5 @@ def unseen_errors(
         else softened_change(softer, models, case, settings, top, scene.excitation.mode),
         layer,
         shift,
+        height,
     )
