@@ -67,8 +67,13 @@ class PatternResponse:
     stress: DampedStress
     # blades of another shape
     others: OtherBlades | None = None
-    # of the aerofoil of that blade on its own mesh, where it has another shape
+    # of that blade on its own mesh, where it has another shape
     own_stress: OwnStress | None = None
+
+    @property
+    def worst(self) -> DampedStress | OwnStress:
+        """The stress of the highest blade on the mesh of its own shape."""
+        return self.stress if self.own_stress is None else self.own_stress
 
     @property
     def factor(self) -> float:
@@ -157,7 +162,7 @@ def pattern_response(
         pattern: what differs from blade to blade.
         deviation: (N, q) relative deviations of the blade-alone frequencies.
         stress: of a blade, by the pattern, the solution and the blade's number; of one of another
-            shape also that of its own aerofoil.
+            shape also that on its own mesh.
         others: the blades of another shape in the pattern.
         options: when a point is accepted.
         harmonic: of the scene's engine order.
@@ -342,24 +347,23 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
     sentences = []
     for r in found:
         error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
-        place = ", ".join(f"{1e3 * x:.1f}" for x in r.stress.place)
+        place = ", ".join(f"{1e3 * x:.1f}" for x in r.worst.place)
         text = (
             f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
             f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
             f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
             f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
-            f"stress is {1e-6 * r.stress.largest:.4g} MPa at ({place}) mm, estimated error of the "
-            f"mesh there {100 * r.stress.mesh_error:.2g} %"
+            f"stress is {1e-6 * r.worst.largest:.4g} MPa at ({place}) mm, estimated error of the "
+            f"mesh there {100 * r.worst.mesh_error:.2g} %"
         )
         if not r.peak.closed_in:
             text += "; the highest point is an end of the band, the resonance may be higher"
         if r.own_stress is not None:
-            own = r.own_stress
-            place = ", ".join(f"{1e3 * x:.1f}" for x in own.place)
             text += (
-                "; that blade has another shape: the stress above is that of the others' shape, "
-                f"that of its own aerofoil {1e-6 * own.largest:.4g} MPa at ({place}) mm, estimated "
-                f"error of its mesh there {100 * own.mesh_error:.2g} %"
+                "; that blade has another shape, and its stress is that of its own mesh, where "
+                f"{1e-6 * r.stress.largest:.4g} MPa is that of the same motion on the others'; "
+                "wheel and blade disagree about its own motion by "
+                f"{100 * r.own_stress.mismatch:.2g} % of its inertia"
             )
         sentences.append(text)
     if found[0].others is not None:
