@@ -1,7 +1,7 @@
-"""One sector of a wheel whose cut faces move in a known way: on its own mesh, whatever the others'.
+"""One sector of a wheel whose cut faces move in a known way, on a mesh of its own.
 
-With the cut faces' motion u_b given, u = S u_b + v, S the static motions that follow them and v zero
-there,
+With the cut faces' motion u_b given, u = S u_b + v, S the static motions that follow them and v
+zero there,
 
     (K - w^2 M) v = F + w^2 M S u_b.
 
@@ -22,7 +22,6 @@ from geometry.mesh import Mesh
 from ..data import ModeSet
 from ..errors import InputError
 from .body import Body
-from .compat import MPI
 from .constraint import clamped_nodes, constrain, expand_to_mesh, restrict_load
 from .flexibility import Flexibility, compliance, flexible
 from .forced_motion import forced_motion

@@ -72,8 +72,8 @@ def steady_root_forces(
     speed: float,
     root: np.ndarray,
 ) -> np.ndarray:
-    """(p,) forces [N] by which the other aerofoil pulls on its root more than the tuned one does, in
-    rotation and heat.
+    """(p,) forces [N] by which the other aerofoil pulls on its root more than the tuned one does,
+    in rotation and heat.
 
     Args:
         speed: [rad/s].

@@ -7,8 +7,6 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-import numpy as np
-
 from ...errors import InputError
 from ...io.stage_cache import cached_stage, found_remark, on_root
 from ...scene.fields import value_at

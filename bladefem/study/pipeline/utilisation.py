@@ -33,8 +33,8 @@ def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
 
 
 def wheel_utilisation(run: SolvedRun) -> list[Utilisation]:
-    """The utilisation at the nodes of the blade that moves most, of each load of the whole wheel; of
-    a blade of another shape at those of its own mesh.
+    """The utilisation at the nodes of the blade that moves most, of each load of the whole wheel;
+    of a blade of another shape at those of its own mesh.
 
     Empty where all blades are alike or the scene gives no diagram.
 
