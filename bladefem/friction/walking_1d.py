@@ -91,10 +91,20 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         last = mu * max(N[S - 1], 0.0)
         # a walk drags the force to its limit
         f = last * np.sign(step) if step != 0.0 else min(max(g[S - 1], -last), last)
+        # one that rests beside those that walk remembers where its motion began
+        rests = step == 0.0
+        row[:] = 0.0
+        if rests and N[S - 1] > 0.0:
+            clipped = abs(g[S - 1]) >= last
+            for l in range(K):
+                row[l] = mu * kn * np.sign(g[S - 1]) * tab.at[S - 1, l] if clipped else 0.0
+                row[K + l] = 0.0 if clipped else kt * tab.at[S - 1, l]
         cycles[e] = -limit
         for cycle in range(1, limit + 1):
             before = f
             f = _march_forces(before, g, N, step, node, friction, states)
+            if rests and jacobian:
+                _carry_rows(row, g, N, step, node, tab.at, friction, states, rows)
             if cycle > 1 and abs(f - before) <= REPEAT_TOLERANCE * mu * max(N.max(), 0.0):
                 cycles[e] = cycle
                 break
@@ -106,7 +116,8 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         shares[e, 0] = 1.0 - shares[e, 1] - shares[e, 2]
         if not jacobian:
             continue
-        row[:] = 0.0
+        if not rests:
+            row[:] = 0.0
         # the row of the period's start is that of its end
         for _ in range(2):
             _carry_rows(row, g, N, step, node, tab.at, friction, states, rows)
