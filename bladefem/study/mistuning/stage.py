@@ -148,6 +148,7 @@ def _best_response(
         solver_options(run.scene.accuracy),
         own_harmonic(run.scene),
         wanted_truncation(run.scene),
+        run.scene.model.static == "uncoupled",
     )
 
 
