@@ -68,6 +68,18 @@ def _carry_rows(row, g, N, step, node, at, friction, states, rows):
 
 
 @njit(cache=True, error_model="numpy")
+def _start_row(row, g, last, node, at):
+    """Fill the derivative row (2K,) of the force with which an element that rests begins, at the
+    motion g and the friction limit last [N].
+    """
+    kt, kn, mu = node
+    clipped = abs(g) >= last
+    for l in range(at.size):
+        row[l] = mu * kn * np.sign(g) * at[l] if clipped else 0.0
+        row[at.size + l] = 0.0 if clipped else kt * at[l]
+
+
+@njit(cache=True, error_model="numpy")
 def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycles):
     """Forces F (n, 2, K), Jacobian J (n, 2, K, 2, K), shares (n, 3) of stick, slip and separation,
     cycles (n,), negative where the force was not periodic after ``limit``.
@@ -95,10 +107,7 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         rests = step == 0.0
         row[:] = 0.0
         if rests and N[S - 1] > 0.0:
-            clipped = abs(g[S - 1]) >= last
-            for l in range(K):
-                row[l] = mu * kn * np.sign(g[S - 1]) * tab.at[S - 1, l] if clipped else 0.0
-                row[K + l] = 0.0 if clipped else kt * tab.at[S - 1, l]
+            _start_row(row, g[S - 1], last, node, tab.at[S - 1])
         cycles[e] = -limit
         for cycle in range(1, limit + 1):
             before = f

@@ -139,10 +139,12 @@ def _walking(
     if near and start is not None and start.walk is not None:
         w, walks = _fitted(start.w, wheel, H), start.walk.dampers
     else:
-        if start is not None and start.converged:
-            first = _fitted(start.w, wheel, H)
-        else:
-            first = _tuned(wheel, balance.flex.omega, H, balance.samples)
+        known = start is not None and start.converged
+        first = (
+            _fitted(start.w, wheel, H)
+            if known and start is not None
+            else _tuned(wheel, balance.flex.omega, H, balance.samples)
+        )
         held = _held(balance, options, first)
         if held is None:
             return None
