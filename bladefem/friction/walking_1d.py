@@ -68,6 +68,18 @@ def _carry_rows(row, g, N, step, node, at, friction, states, rows):
 
 
 @njit(cache=True, error_model="numpy")
+def _start_row(row, g, last, node, at):
+    """Fill the derivative row (2K,) of the force with which an element that rests begins, at the
+    motion g and the friction limit last [N].
+    """
+    kt, kn, mu = node
+    clipped = abs(g) >= last
+    for l in range(at.size):
+        row[l] = mu * kn * np.sign(g) * at[l] if clipped else 0.0
+        row[at.size + l] = 0.0 if clipped else kt * at[l]
+
+
+@njit(cache=True, error_model="numpy")
 def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycles):
     """Forces F (n, 2, K), Jacobian J (n, 2, K, 2, K), shares (n, 3) of stick, slip and separation,
     cycles (n,), negative where the force was not periodic after ``limit``.
@@ -91,10 +103,17 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         last = mu * max(N[S - 1], 0.0)
         # a walk drags the force to its limit
         f = last * np.sign(step) if step != 0.0 else min(max(g[S - 1], -last), last)
+        # one that rests beside those that walk remembers where its motion began
+        rests = step == 0.0
+        row[:] = 0.0
+        if rests and N[S - 1] > 0.0:
+            _start_row(row, g[S - 1], last, node, tab.at[S - 1])
         cycles[e] = -limit
         for cycle in range(1, limit + 1):
             before = f
             f = _march_forces(before, g, N, step, node, friction, states)
+            if rests and jacobian:
+                _carry_rows(row, g, N, step, node, tab.at, friction, states, rows)
             if cycle > 1 and abs(f - before) <= REPEAT_TOLERANCE * mu * max(N.max(), 0.0):
                 cycles[e] = cycle
                 break
@@ -106,7 +125,8 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         shares[e, 0] = 1.0 - shares[e, 1] - shares[e, 2]
         if not jacobian:
             continue
-        row[:] = 0.0
+        if not rests:
+            row[:] = 0.0
         # the row of the period's start is that of its end
         for _ in range(2):
             _carry_rows(row, g, N, step, node, tab.at, friction, states, rows)

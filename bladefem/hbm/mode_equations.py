@@ -55,6 +55,10 @@ class ModeFrame:
     stuck0: np.ndarray
     # (S, k, k) Coriolis forces of the blade's modes [1/s]; None without
     coriolis: np.ndarray | None = None
+    # on the way to a motion (`mode_detour`): of the contacts' alternating forces that act, and the
+    # damping ratio that all modes but this one in harmonic 1 have
+    share: float = 1.0
+    lent: float = 0.0
 
     @property
     def still(self) -> np.ndarray:
@@ -145,7 +149,10 @@ def _inverse(frame: ModeFrame, i: int, h: int, omega: float, zeta: float) -> np.
     """
     body = frame.bodies[i]
     w = h * omega
-    Z = body.omega[_of(body, h)] ** 2 - w**2 - 2j * zeta * omega * w
+    own = body.omega[_of(body, h)]
+    Z = own**2 - w**2 - 2j * zeta * omega * w
+    if frame.lent:
+        Z = Z + 2j * frame.lent * own * w
     kept = np.ones(len(Z), dtype=bool)
     if i == 0 and h == 1:
         kept[frame.mode] = False
@@ -217,6 +224,11 @@ def mode_residual(
     forces = contact_forces(model, w, frame.samples)
     load = forces.f.copy()
     load[:, :, 0] -= model.preload.reshape(shape[:2])
+    jacobian = forces.jacobian
+    if frame.share != 1.0:
+        load[:, :, 1:] *= frame.share
+        jacobian = jacobian.copy()
+        jacobian[:, :, 1:] *= frame.share
     f = to_complex(load.reshape(-1, shape[2]))
     omega, zeta = _frequency(frame, f[:, 1], amplitude)
     motion = to_complex(w.reshape(-1, shape[2]))
@@ -226,7 +238,7 @@ def mode_residual(
     p = f[:, 0].real - springs * motion[:, 0].real
     r[:, 0] = motion[:, 0].real - frame.stuck0 + frame.A0 @ p
     r += _moved(frame, f, omega, zeta, amplitude)
-    return ModeState(w, f, forces.jacobian, omega, zeta, to_real(r).ravel())
+    return ModeState(w, f, jacobian, omega, zeta, to_real(r).ravel())
 
 
 def _frequency(
@@ -387,6 +399,19 @@ def stuck_mode(frame: ModeFrame) -> np.ndarray:
     _, vectors = linalg.eigh(stiffness)
     found = vectors[:, np.argmax(abs(vectors[frame.mode]))]
     return held @ (found / found[frame.mode])
+
+
+def nearest_mode(frame: ModeFrame, omega: float) -> tuple[int, int, float] | None:
+    """Harmonic, number and relative distance of the blade's mode that a multiple of a frequency
+    comes nearest to, the mode itself left out; None where there is no other.
+    """
+    found = []
+    for h in range(1, frame.H + 1):
+        own = frame.bodies[0].omega[_of(frame.bodies[0], h)]
+        others = (own > 0) & ~((h == 1) & (np.arange(len(own)) == frame.mode))
+        off = h * omega / own[others] - 1
+        found += [(h, int(k), float(x)) for k, x in zip(np.flatnonzero(others), off, strict=True)]
+    return min(found, key=lambda one: abs(one[2]), default=None)
 
 
 def probe_amplitudes(

@@ -24,12 +24,14 @@ from scipy import linalg
 
 from ..friction.fourier import to_real
 from ..util.newton import halve_step, iterate_newton
+from .mode_detour import led_motions
 from .mode_equations import (
     ModeFrame,
     ModeState,
     amplitude_derivative,
     mode_jacobian,
     mode_residual,
+    nearest_mode,
     stuck_mode,
 )
 
@@ -68,8 +70,9 @@ SMALLEST_DAMPING = -1e-6
 FARTHEST_RETURN = 4.0
 # folds that a reason lists
 TURNS_TOLD = 3
-# motions between two amplitudes that are asked for
+# motions between two amplitudes that are asked for, and of each way of a detour
 MAX_ARCS = 200
+MAX_DETOUR_ARCS = 200
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,8 @@ def follow_mode(
         s = float(np.log(amplitude))
         spots, lost, near = _towards(frame, s, known, plain, ended, arcs)
         if spots[-1].converged:
-            yield from _from_above(frame, missing, spots[-1])
+            below = _from_above(frame, missing, spots[-1])
+            yield from _by_detours(frame, list(below), arcs)
             missing = []
             yield from spots
         else:
@@ -149,7 +153,43 @@ def follow_mode(
         else:
             known = (*known, *solved)[-2:]
         plain = near or known
-    yield from missing
+    yield from _by_detours(frame, missing, arcs)
+
+
+def _by_detours(frame: ModeFrame, spots: list[PathSpot], arcs: int) -> Iterator[PathSpot]:
+    """The motions with those that were not reached, from one found by a detour, or from such a one
+    at the next amplitude above or below.
+    """
+    found = list(spots)
+    known: tuple[PathSpot, ...] = ()
+    for i, spot in enumerate(spots):
+        if spot.converged:
+            known = ()
+            continue
+        made = _towards(frame, spot.s, known, known, "", arcs)[0][-1] if known else None
+        if made is None or not made.converged:
+            made = _detour(frame, spot.s, arcs)
+        known = () if made is None else (*known[-1:], made)
+        if made is not None:
+            found[i] = replace(made, reason=f"begun again by a detour, {spot.reason}")
+    for i in reversed(range(len(found) - 1)):
+        above = found[i + 1]
+        if not found[i].converged and above.converged:
+            steps = _shorter_steps(frame, found[i].s, (above,))
+            if steps[-1].s == found[i].s:
+                found[i] = replace(steps[-1], reason="reached from above")
+    yield from found
+
+
+def _detour(frame: ModeFrame, s: float, arcs: int) -> PathSpot | None:
+    """A motion at an amplitude that the branch does not lead to, if one is found."""
+    amplitude = float(np.exp(s))
+    alone = frame.still + amplitude * _without_contact(frame)
+    for x in led_motions(frame, alone, amplitude, min(arcs, MAX_DETOUR_ARCS)):
+        spot = _solve(frame, _Plane((x - frame.still) / amplitude, s), MAX_NEWTON_STEPS)
+        if spot.converged:
+            return spot
+    return None
 
 
 def _from_above(
@@ -213,7 +253,17 @@ def _towards(
         if spot.converged:
             return [replace(spot, reason=f"begun again, {reason}")], reason, ()
     text = f"not followed beyond an amplitude of {known[-1].amplitude:.4g}: {reason}"
+    text += _met_there(frame, known[-1])
     return [replace(spot, reason=text)], reason, near
+
+
+def _met_there(frame: ModeFrame, spot: PathSpot) -> str:
+    """Which other mode of the blade a multiple of the frequency comes nearest to."""
+    own = nearest_mode(frame, spot.state.omega)
+    if own is None:
+        return ""
+    harmonic, mode, off = own
+    return f"; {harmonic} times its frequency is {100 * abs(off):.2g} % off mode {mode + 1} there"
 
 
 def _shorter_steps(

@@ -9,8 +9,11 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from geometry.mesh import Mesh
+
 from ..errors import InputError
 from ..study.fatigue import Utilisation, haigh_diagram
+from ..study.mistuning.pattern_response import PatternResponse
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
     blade_nodes,
@@ -30,6 +33,18 @@ def known_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
         return {}
 
 
+def known_wheel_use(run: SolvedRun) -> list[tuple[PatternResponse, Utilisation]]:
+    """Each response of the whole wheel with the utilisation of its highest blade; empty where it is
+    not known, which the run's messages say.
+    """
+    if run.wheel is None or not known_utilisation(run):
+        return []
+    try:
+        return list(zip(run.wheel, wheel_utilisation(run), strict=True))
+    except InputError:
+        return []
+
+
 def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
     """The worst places of the blade at each resonance whose whole motion is known, and those of the
     worst blade of a mistuned wheel; no table without a diagram.
@@ -44,9 +59,11 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
     tables = {"modes/fatigue": pd.DataFrame(rows)}
     number = run.response.best_curve
     rows = []
-    for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
+    for response, used in known_wheel_use(run):
         first = {"load": response.load, "blade": response.peak.blade + 1}
-        rows += _worst_rows(run, first, used, highest_use(run, number, used, response.stress))
+        rows += _worst_rows(
+            run, first, used, highest_use(run, number, used, response.worst.mesh_error)
+        )
     return {**tables, "wheel/fatigue_of_the_worst_blade": pd.DataFrame(rows)} if rows else tables
 
 
@@ -93,10 +110,10 @@ def worst_utilisation(run: SolvedRun) -> list[tuple[float, float, float]]:
     return [
         (
             float(used.used[used.worst]),
-            highest_use(run, number, used, response.stress),
+            highest_use(run, number, used, response.worst.mesh_error),
             float(tuned[number].used[tuned[number].worst]),
         )
-        for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True)
+        for response, used in known_wheel_use(run)
     ]
 
 
@@ -107,39 +124,52 @@ def utilisation_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
         return {}
     number = run.response.best_curve
     load = run.response.curves[number].load
-    field = _on_mesh(run, found[number].used)
+    field = _on_mesh(run.mesh, found[number].used)
     title = f"utilisation at the resonance under {load:.4g} N"
     drawings: dict[str, Callable[[Path], object]] = {
         "modes/utilisation": lambda file: draw_utilisation(run.mesh, field, title, file)
     }
-    for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
+    for response, used in known_wheel_use(run):
         words = f"utilisation of blade {response.peak.blade + 1} under {response.load:.4g} N"
-        worst = _on_mesh(run, used.used)
+        # of a blade of another shape its own mesh
+        mesh = run.mesh if response.own_stress is None else response.own_stress.mesh
+        worst = _on_mesh(mesh, used.used)
         drawings["wheel/utilisation_of_the_worst_blade"] = partial(
-            draw_utilisation, run.mesh, worst, words
+            draw_utilisation, mesh, worst, words
         )
     return drawings
 
 
 def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
-    """Mean and alternating stress and utilisation of each known resonance, for ParaView."""
+    """Mean and alternating stress and utilisation of each known resonance, for ParaView; of a
+    highest blade of another shape in a file of its own.
+    """
     found = known_utilisation(run)
     if not found:
         return
     fields = {"mean stress [Pa]": run.strength.mean}
     for number, used in found.items():
         load = f"{run.response.curves[number].load:g} N"
-        fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run, used.alternating)
-        fields[f"utilisation, {load} [1]"] = _on_mesh(run, used.used)
-    for response, used in zip(run.wheel or [], wheel_utilisation(run), strict=True):
+        fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run.mesh, used.alternating)
+        fields[f"utilisation, {load} [1]"] = _on_mesh(run.mesh, used.used)
+    for response, used in known_wheel_use(run):
+        own = response.own_stress
+        mesh = run.mesh if own is None else own.mesh
         name = f"blade {response.peak.blade + 1}, {response.load:g} N"
-        fields[f"alternating stress, {name} [Pa]"] = _on_mesh(run, used.alternating)
-        fields[f"utilisation, {name} [1]"] = _on_mesh(run, used.used)
+        worst = {
+            f"alternating stress, {name} [Pa]": _on_mesh(mesh, used.alternating),
+            f"utilisation, {name} [1]": _on_mesh(mesh, used.used),
+        }
+        if own is None:
+            fields |= worst
+        else:
+            worst["mean stress [Pa]"] = _on_mesh(mesh, used.mean)
+            save_vtu(mesh, file.with_name(f"{file.stem}_of_the_worst_blade{file.suffix}"), worst)
     save_vtu(run.mesh, file, fields)
 
 
-def _on_mesh(run: SolvedRun, values: np.ndarray) -> np.ndarray:
+def _on_mesh(mesh: Mesh, values: np.ndarray) -> np.ndarray:
     """(n_points,) values at the blade's nodes, zero elsewhere."""
-    field = np.zeros(len(run.mesh.points))
-    field[blade_nodes(run.mesh)] = values
+    field = np.zeros(len(mesh.points))
+    field[blade_nodes(mesh)] = values
     return field

@@ -42,7 +42,7 @@ def pattern_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
                 "peak_frequency": r.peak.omega / (2 * np.pi),
                 "amplification": r.factor,
                 "amplification_free": r.free_factor,
-                "alternating_stress": r.stress.largest,
+                "alternating_stress": r.worst.largest,
                 "estimated_error": r.truncation,
                 "unconverged": r.peak.unsolved,
             }

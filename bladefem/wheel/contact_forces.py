@@ -47,6 +47,7 @@ def contact_forces(
     start: np.ndarray,
     samples: int,
     jacobian: bool = True,
+    walk: np.ndarray | None = None,
 ) -> ContactForces:
     """Forces for relative displacements w (N, n, d, K) [m], each damper's on the rank of its
     sector.
@@ -55,6 +56,7 @@ def contact_forces(
         elements: of all dampers.
         start: (N n, tangents) friction forces from which the law starts [N].
         samples: a period; 0 locates transitions exactly, for elements of one tangent.
+        walk: (N n, tangents) how far the contacts go on in each period, which needs samples [m].
     """
     count, n, d, K = w.shape
     deal = wheel.deal
@@ -68,8 +70,9 @@ def contact_forces(
     if deal.ranks > 1:
         rows = np.arange(count * n).reshape(count, n)[deal.sectors].ravel()
         own = select_elements(elements, rows)
+        walk = None if walk is None else walk[rows]
     if samples:
-        found = evaluate(own, flat, samples, jacobian, precision="single")
+        found = evaluate(own, flat, samples, jacobian, precision="single", walk=walk)
     else:
         found = evaluate_exact(own, flat)
     f = deal.join(found.f[:, missing:].reshape(-1, n, d, K))

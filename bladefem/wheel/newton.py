@@ -22,6 +22,7 @@ from .flexibility import WheelFlexibility
 from .model import Wheel
 from .preconditioner import Preconditioner, make_preconditioner
 from .tuned import travelling_order
+from .walking import WheelWalk, held_flexibility, walk_rates
 from .wave_preconditioner import WavePreconditioner, make_wave_preconditioner
 
 AnyPreconditioner = Preconditioner | WavePreconditioner | CoupledPreconditioner
@@ -68,6 +69,8 @@ class WheelBalance:
     stuck: np.ndarray
     # a period, 0: transitions located exactly
     samples: int
+    # None: all dampers rest in the mean
+    walk: WheelWalk | None = None
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,8 @@ class WheelState:
     residual: np.ndarray
     # over the size of the motion [1]
     error: float
+    # (z, N, n, d, K) derivatives of the forces with the steps of dampers that walk [N/m]
+    rates: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -101,11 +106,22 @@ def evaluate_wheel(
     jacobian: bool = True,
 ) -> WheelState:
     """Forces and residual at w (N, n, d, K)."""
-    forces = contact_forces(
-        balance.wheel, balance.elements, w, balance.start, balance.samples, jacobian
-    )
+    walk = balance.walk
+    ramp = None if walk is None else walk.ramp(walk.steps(w))
+    forces = _forces(balance, w, jacobian, ramp)
+    rates = None
+    if walk is not None and jacobian:
+        rates = walk_rates(walk, w, forces.f, lambda moved: _forces(balance, w, False, moved).f)
     residual = w - balance.stuck + contact_motions(balance.flex, forces.p)
-    return WheelState(w, forces, residual, _error(w, residual, balance.stuck))
+    return WheelState(w, forces, residual, _error(w, residual, balance.stuck), rates)
+
+
+def _forces(
+    balance: WheelBalance, w: np.ndarray, jacobian: bool, ramp: np.ndarray | None
+) -> ContactForces:
+    return contact_forces(
+        balance.wheel, balance.elements, w, balance.start, balance.samples, jacobian, ramp
+    )
 
 
 def _error(w: np.ndarray, residual: np.ndarray, stuck: np.ndarray) -> float:
@@ -221,6 +237,8 @@ class _Steps:
 
     def _renew(self, state: WheelState) -> AnyPreconditioner:
         flex = self.balance.flex
+        if self.balance.walk is not None:
+            flex = held_flexibility(self.balance.wheel, flex)
         change = state.forces.jacobian
         made: AnyPreconditioner | None = None
         while made is None:
@@ -248,6 +266,7 @@ class _Steps:
         flat = (shape[0], -1, shape[3])
         change = state.forces.jacobian
         deal = self.balance.wheel.deal
+        walk = self.balance.walk
         prepare = (self.preconditioner or self._renew(state)).apply
 
         def product(y: np.ndarray) -> np.ndarray:
@@ -255,6 +274,9 @@ class _Steps:
             x = prepare(y.reshape(flat))
             own = x[deal.sectors].reshape(*change.shape[:2], 1)
             forces = deal.join((change @ own).reshape(-1, *shape[1:]))
+            if walk is not None and state.rates is not None:
+                steps = walk.steps(x.reshape(shape))
+                forces = forces + np.einsum("zsndk,sz->sndk", state.rates, steps)
             return (x.reshape(shape) + contact_motions(self.balance.flex, forces)).ravel()
 
         size = state.residual.size

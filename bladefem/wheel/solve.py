@@ -16,6 +16,7 @@ from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
 from .tuned import tuned_displacements
+from .walking import WheelWalk, slipping_dampers, walking_motions
 
 TUNED_PATTERN = Pattern()
 # modal damping ratios within which a solved neighbour is the best start: resonances of a mistuned
@@ -29,6 +30,10 @@ FIRST_LOAD_SHARE = 0.02
 FIRST_LOAD_FACTOR = 2.0
 LAST_LOAD_FACTOR = 1.01
 HOMOTOPY_POINTS = 60
+# rounds in which it is found which dampers walk, and samples for each harmonic of a walk where
+# transitions were to be located exactly
+WALK_ROUNDS = 6
+WALK_SAMPLES = 64
 
 
 @dataclass(frozen=True)
@@ -56,6 +61,16 @@ class WheelSolution:
     shares: RealArray
     # (N,) friction work of each damper in a period [J]
     dissipated: RealArray
+    # dampers that walk, whose mean of w along their motions is the step a period; None: none does
+    walk: WheelWalk | None = None
+
+    @property
+    def drift(self) -> RealArray:
+        """(N,) how fast each damper walks, of the contact that goes on fastest [m/s]."""
+        if self.walk is None:
+            return np.zeros(len(self.w))
+        ramp = self.walk.ramp(self.walk.steps(self.w)).reshape(len(self.w), -1, self.walk.tangents)
+        return np.asarray(np.linalg.norm(ramp, axis=2).max(axis=1) * self.frequency)
 
     @property
     def frequency(self) -> float:
@@ -97,8 +112,61 @@ def solve_wheel(
     stuck = _shaped(wheel, linear_motion(wheel, flex, "contact"))
     first = wheel.first_forces(pattern, elements)
     balance = WheelBalance(wheel, flex, elements, first, stuck, samples)
+    motions = walking_motions(wheel)
+    if motions.shape[2]:
+        found = _walking(balance, motions, start, options)
+        if found is not None:
+            return _solution(*found)
     end, method = _attempts(balance, start, options)
     return _solution(balance, end, method)
+
+
+def _walking(
+    balance: WheelBalance,
+    motions: np.ndarray,
+    start: WheelSolution | None,
+    options: Options,
+) -> tuple[WheelBalance, WheelNewton, str] | None:
+    """The solution in which exactly those dampers walk on which no contact sticks, and its balance;
+    None where none does, or it is not found.
+    """
+    wheel = balance.wheel
+    H = balance.stuck.shape[3] // 2
+    tangents = wheel.elements.tangents
+    if balance.samples == 0:
+        balance = replace(balance, samples=WALK_SAMPLES * (H + 1))
+    near = start is not None and start.converged and start.walk is not None
+    if near and start is not None and start.walk is not None:
+        w, walks = _fitted(start.w, wheel, H), start.walk.dampers
+    else:
+        known = start is not None and start.converged
+        first = (
+            _fitted(start.w, wheel, H)
+            if known and start is not None
+            else _tuned(wheel, balance.flex.omega, H, balance.samples)
+        )
+        held = _held(balance, options, first)
+        if held is None:
+            return None
+        w, walks = held.state.w, slipping_dampers(held.state.forces.shares)
+    iterations = products = 0
+    for _ in range(WALK_ROUNDS):
+        if not walks.any():
+            return None
+        walk = WheelWalk(motions, wheel.springs, tangents, walks)
+        own = replace(balance, walk=walk)
+        end = newton_wheel(own, w, options)
+        iterations += end.iterations
+        products += end.products
+        if not end.converged:
+            return None
+        end = replace(end, iterations=iterations, products=products)
+        slips = slipping_dampers(end.state.forces.shares)
+        if (slips == walks).all():
+            return own, end, "newton, walking"
+        # those that stick again begin where they are
+        w, walks = replace(walk, dampers=walk.dampers & ~slips).without_steps(end.state.w), slips
+    return None
 
 
 def _starts(
@@ -117,7 +185,7 @@ def _starts(
         ("newton from full stick", lambda: balance.stuck),
     ]
     if wheel.coupled and options.fallbacks:
-        starts.append(("newton from held means", lambda: _held(balance, options)))
+        starts.append(("newton from held means", lambda: _held_motion(balance, options)))
     if start is not None:
         fitted = _fitted(start.w, wheel, H)
         near = max(NEIGHBOUR_HALF_WIDTHS * np.max(wheel.damping.ratio), SAME_FREQUENCY)
@@ -148,9 +216,11 @@ def _attempts(
     return replace(end, iterations=iterations, products=products), method
 
 
-def _held(balance: WheelBalance, options: Options) -> np.ndarray | None:
-    """Displacements of the wheel whose means stay in the preload state: dampers that slip
-    throughout drift far on nearly no force, which hides the way to the solution.
+def _held(
+    balance: WheelBalance, options: Options, first: np.ndarray | None = None
+) -> WheelNewton | None:
+    """The wheel whose means stay in the preload state, from its full stick or a first motion:
+    dampers that slip throughout drift far on nearly no force, which hides the way to the solution.
     """
     key = "held means"
     wheel = balance.wheel
@@ -160,8 +230,20 @@ def _held(balance: WheelBalance, options: Options) -> np.ndarray | None:
     stuck = balance.stuck.copy()
     stuck[..., 0] = 0.0
     held = replace(balance, wheel=wheel.kept[key], flex=flex, stuck=stuck)
-    end = newton_wheel(held, stuck, replace(options, fallbacks=False))
-    return end.state.w if end.converged else None
+    starts = [stuck]
+    if first is not None:
+        starts.insert(0, first * (np.arange(first.shape[3]) > 0))
+    for w in starts:
+        end = newton_wheel(held, w, replace(options, fallbacks=False))
+        if end.converged:
+            return end
+    return None
+
+
+def _held_motion(balance: WheelBalance, options: Options) -> np.ndarray | None:
+    """Displacements of `_held`, or None."""
+    end = _held(balance, options)
+    return None if end is None else end.state.w
 
 
 def _tuned(
@@ -326,6 +408,7 @@ def _solution(
         state.error,
         state.forces.shares,
         state.forces.dissipated.sum(axis=1),
+        balance.walk,
     )
 
 

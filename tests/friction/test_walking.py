@@ -120,3 +120,27 @@ def test_a_walk_that_does_not_fit_is_refused():
     elements, w, _ = walking_case(2, 0.0)
     with pytest.raises(InputError, match=r"walk: expected \(5, 2\)"):
         evaluate(elements, w, 128, walk=np.zeros((5, 1)))
+
+
+@pytest.mark.parametrize("tangents", [1, 2])
+def test_an_element_that_rests_beside_one_that_walks_is_as_alone(tangents):
+    """It sticks, or slips, and remembers its mean displacement: forces and derivative are those of
+    a batch in which nothing walks.
+    """
+    rng = np.random.default_rng(3)
+    w = 0.1 * rng.normal(size=(4, 1 + tangents, 7))
+    ends = np.full(4, 0.3)
+    # sticks throughout; sticks at a limit that its mean reaches; slips; walks
+    mu = np.array([20.0, 0.5, 0.2, 0.2])
+    w[1, 1:, 1:] *= 1e-3
+    w[1, 1:, 0] = 3.0
+    w[1, 0] = 0.0
+    elements = Elements(np.ones(4), 0.1 * np.ones(4), mu, ends + 1.0, tangents=tangents)
+    walk = np.zeros((4, tangents))
+    walk[3, 0] = 0.4
+    both = evaluate(elements, w, 128, walk=walk)
+    alone = evaluate(elements, w, 128)
+    np.testing.assert_allclose(both.f[:3], alone.f[:3], atol=1e-12)
+    np.testing.assert_allclose(both.jacobian[:3], alone.jacobian[:3], atol=1e-9)
+    assert abs(both.jacobian[0, 1, 0, 1, 0]) > 0.5
+    assert abs(both.f[3] - alone.f[3]).max() > 1e-3

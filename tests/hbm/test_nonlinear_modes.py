@@ -309,3 +309,37 @@ def test_bad_input_is_refused():
         next(nonlinear_mode(model, [1.0], mode=3))
     with pytest.raises(InputError, match="amplitude -1"):
         next(nonlinear_mode(model, [-1.0]))
+
+
+def test_amplitudes_beyond_an_internal_resonance_are_found_by_a_detour():
+    """Two amplitudes where the branch leaves with another mode, whose third harmonic nothing damps:
+    seven were not reached before on bodies of 5 contacts. Each motion is one of all modes.
+    """
+    model = block(5, dofs=60)
+    body = model.side(1)
+    shapes = body.shapes[body.ports["contact"]]
+    amplitudes = np.geomspace(0.05, 50, 20) / abs(shapes[:, 2]).max()
+    found = list(nonlinear_mode(model, amplitudes, 2, H=3, samples=128))
+    assert all(p.converged for p in found), [p.reason for p in found if not p.converged]
+    turned = [p for p in found if "by a detour" in p.reason]
+    assert turned
+    for p in turned:
+        harmonic, _ = forces_in_time(model, p.w, 512)
+        f = shapes.T @ harmonic.ravel()
+        Z = body.omega**2 - p.omega**2 * (1 + 2j * p.zeta)
+        q = -f / Z
+        q[2] = p.amplitude
+        moved = p.w[:, :, 1] - 1j * p.w[:, :, 2]
+        size = abs(moved).max()
+        np.testing.assert_allclose(shapes @ q, moved.ravel(), atol=1e-2 * size)
+        assert abs(Z[2] * p.amplitude + f[2]) < 1e-2 * abs(f).max()
+
+
+def test_an_amplitude_left_says_which_mode_it_meets():
+    """No arcs are allowed: the branch ends before its first fold, and the reason names the mode."""
+    own, shapes, kt, limit = np.array([1.0, 1.2]), np.array([0.9, np.sqrt(0.19)]), 2.0, 0.5
+    model = two_modes(own, shapes, kt, limit)
+    found = list(nonlinear_mode(model, np.geomspace(1.5, 40, 15), 1, H=1, samples=0, arcs=0))
+    lost = [p for p in found if not p.converged]
+    assert all("1 times its frequency is" in p.reason for p in lost)
+    assert all("off mode 1 there" in p.reason for p in lost)

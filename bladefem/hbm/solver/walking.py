@@ -46,10 +46,10 @@ def _tangential_motions(model: ReducedModel, B: np.ndarray) -> np.ndarray:
     first = d - model.elements.tangents
     normal = np.zeros((n, d), dtype=bool)
     normal[:, :first] = True
-    return _unresisted(B, model.springs.ravel(), normal.ravel(), UNRESISTED_NORMAL)
+    return unresisted(B, model.springs.ravel(), normal.ravel(), UNRESISTED_NORMAL)
 
 
-def _unresisted(
+def unresisted(
     B: np.ndarray,
     springs: np.ndarray,
     rows: np.ndarray,
@@ -76,7 +76,7 @@ def walking_motions(balance: Balance, shares: np.ndarray) -> np.ndarray | None:
     free = tangential_motions(model, balance.linear.B)
     sticks = (shares[:, 1] == 0.0) & (shares[:, 2] == 0.0)
     rows = np.repeat(sticks, model.directions)
-    found = _unresisted(free, balance.linear.springs, rows, UNRESISTED_STICK)
+    found = unresisted(free, balance.linear.springs, rows, UNRESISTED_STICK)
     return found if found.shape[1] else None
 
 

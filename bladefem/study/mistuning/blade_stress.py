@@ -78,11 +78,35 @@ def blade_motion(
     Raises:
         NotSolvedError: the modes do not cover a harmonic.
     """
+    ports = wheel_ports(shapes)
+    forces = port_forces(shapes, ports, wheel, pattern, case, solution, points)
+    omega = solution.omega * np.arange(1, forces.shape[1] + 1)
+    return seen_motion(ports, wave_fields(shapes, ports, forces, omega, blade), solution, blade)
+
+
+def wheel_ports(shapes: WheelShapes) -> Ports:
+    """The ports of each blade, with "blade"."""
+    bodies = shapes.bodies
+    return blade_ports(bodies.mesh, shapes.patches, bodies.scene.excitation, shapes.readings)
+
+
+def wave_fields(
+    shapes: WheelShapes,
+    ports: Ports,
+    forces: np.ndarray,
+    omega: np.ndarray,
+    blade: int,
+) -> ComplexArray:
+    """(H, n_points, dim) displacements of one blade [m], the sum of all waves; zero where the modes
+    do not reach a frequency.
+
+    Args:
+        forces: (N, H, P) complex, on each blade at its ports [N].
+        omega: (H,) circular frequency of each [rad/s]; 0 for a steady one.
+    """
     from ...fem.forced_motion import forced_motion
 
     bodies = shapes.bodies
-    ports = blade_ports(bodies.mesh, shapes.patches, bodies.scene.excitation, shapes.readings)
-    forces = port_forces(shapes, ports, wheel, pattern, case, solution, points)
     by_diameter = np.fft.fft(forces, axis=0)
     count, H, _ = forces.shape
     fields = np.zeros((H, len(bodies.mesh.points), bodies.mesh.dimension), complex)
@@ -94,8 +118,8 @@ def blade_motion(
     for found, damping in zip(shapes.modes, dampings, strict=True):
         n = found.nodal_diameter or 0
         highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
-        harmonics = [h for h in range(H) if (h + 1) * solution.omega < highest]
-        if not harmonics:
+        harmonics = np.flatnonzero(omega < highest)
+        if not len(harmonics):
             continue
         flex = factorised(n)
         # forward and backward waves feel another flow
@@ -104,14 +128,21 @@ def blade_motion(
             loads = by_diameter[d, harmonics].T
             loads = ports.matrix @ (loads.conj() if mirrored else loads)
             # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
-            omega = (np.array(harmonics) + 1) * solution.omega * (-1.0 if mirrored else 1.0)
+            own = omega[harmonics] * (-1.0 if mirrored else 1.0)
             part = flowing_modes(flow, found, damping, ratio, d, numbers.get(n, 0))
-            u = forced_motion(flex, part[0], loads, omega, part[1]).displacement
+            u = forced_motion(flex, part[0], loads, own, part[1]).displacement
             u = u.conj() if mirrored else u
             turn = np.exp(2j * np.pi * d * blade / count) / count
             fields[harmonics] += turn * u.transpose(2, 0, 1)
+    return fields
+
+
+def seen_motion(
+    ports: Ports, fields: ComplexArray, solution: WheelSolution, blade: int
+) -> DampedMotion:
+    """The fields (H, n_points, dim) of one blade [m] beside the probe of the balance."""
     seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
-    probe = fields.reshape(H, -1) @ seen
+    probe = fields.reshape(len(fields), -1) @ seen
     known = solution.probe[blade, 1:, 0]
     mismatch = float(abs(probe - known).max() / max(abs(known).max(), np.finfo(float).tiny))
     return DampedMotion(solution.frequency, fields, probe, mismatch)

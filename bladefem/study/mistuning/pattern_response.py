@@ -16,6 +16,7 @@ from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, solve_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
+from ...wheel.walking import walking_motions
 from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
 from .other_blades import OtherBlades, other_blade_sentences
@@ -36,6 +37,17 @@ JUDGING_HARMONICS = 7
 MOST_SEARCH_PRODUCTS = 400
 # relative error of a peak's height by the search over frequencies
 SEARCH_TOLERANCE = 0.01
+
+
+@dataclass(frozen=True)
+class FreeMeans:
+    """What the wheel does at its highest point where the dampers' mean displacements are free."""
+
+    # relative change of the highest blade; NaN: not solved
+    change: float
+    # dampers that walk, and the fastest of them [m/s]
+    walking: int
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -65,10 +77,17 @@ class PatternResponse:
     sector_difference: float
     # of the blade that moves most, at its resonance
     stress: DampedStress
+    # None where the scene holds means, or no damper has a motion that friction alone resists
+    free_means: FreeMeans | None = None
     # blades of another shape
     others: OtherBlades | None = None
-    # of the aerofoil of that blade on its own mesh, where it has another shape
+    # of that blade on its own mesh, where it has another shape
     own_stress: OwnStress | None = None
+
+    @property
+    def worst(self) -> DampedStress | OwnStress:
+        """The stress of the highest blade on the mesh of its own shape."""
+        return self.stress if self.own_stress is None else self.own_stress
 
     @property
     def factor(self) -> float:
@@ -149,6 +168,7 @@ def pattern_response(
     options: Options = DEFAULT_OPTIONS,
     harmonic: int = 1,
     wanted: float | None = None,
+    held_means: bool = True,
 ) -> PatternResponse:
     """The wheel with one pattern, under the load of a curve.
 
@@ -157,12 +177,13 @@ def pattern_response(
         pattern: what differs from blade to blade.
         deviation: (N, q) relative deviations of the blade-alone frequencies.
         stress: of a blade, by the pattern, the solution and the blade's number; of one of another
-            shape also that of its own aerofoil.
+            shape also that on its own mesh.
         others: the blades of another shape in the pattern.
         options: when a point is accepted.
         harmonic: of the scene's engine order.
         wanted: estimated error by harmonics and samples above which there are more of them; None:
             those of the curve.
+        held_means: the scene holds them, and nobody asks what free ones do.
     """
     H, samples = first_balance(wheel, curve, harmonic)
     grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
@@ -190,8 +211,32 @@ def pattern_response(
         found.truncation,
         tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
         alternating,
+        None if held_means else _free_means(wheel, pattern, solution, options),
         others,
         own,
+    )
+
+
+def _free_means(
+    wheel: Wheel, pattern: Pattern, solution: WheelSolution, options: Options
+) -> FreeMeans | None:
+    """The point of a held wheel with free means, in which dampers may walk."""
+    free = replace(wheel, coupled=True)
+    if not walking_motions(free).shape[2]:
+        return None
+    point = solve_wheel(
+        free,
+        solution.omega,
+        solution.probe.shape[1] - 1,
+        solution.samples,
+        pattern=pattern,
+        start=solution,
+        options=replace(options, fallbacks=False),
+    )
+    change = float(point.size().max() / solution.size().max() - 1)
+    walks = int(np.count_nonzero(point.drift))
+    return FreeMeans(
+        change if point.converged else float("nan"), walks, float(point.drift.max(initial=0.0))
     )
 
 
@@ -342,24 +387,23 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
     sentences = []
     for r in found:
         error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
-        place = ", ".join(f"{1e3 * x:.1f}" for x in r.stress.place)
+        place = ", ".join(f"{1e3 * x:.1f}" for x in r.worst.place)
         text = (
             f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
             f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
             f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
             f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
-            f"stress is {1e-6 * r.stress.largest:.4g} MPa at ({place}) mm, estimated error of the "
-            f"mesh there {100 * r.stress.mesh_error:.2g} %"
+            f"stress is {1e-6 * r.worst.largest:.4g} MPa at ({place}) mm, estimated error of the "
+            f"mesh there {100 * r.worst.mesh_error:.2g} %"
         )
         if not r.peak.closed_in:
             text += "; the highest point is an end of the band, the resonance may be higher"
         if r.own_stress is not None:
-            own = r.own_stress
-            place = ", ".join(f"{1e3 * x:.1f}" for x in own.place)
             text += (
-                "; that blade has another shape: the stress above is that of the others' shape, "
-                f"that of its own aerofoil {1e-6 * own.largest:.4g} MPa at ({place}) mm, estimated "
-                f"error of its mesh there {100 * own.mesh_error:.2g} %"
+                "; that blade has another shape, and its stress is that of its own mesh, where "
+                f"{1e-6 * r.stress.largest:.4g} MPa is that of the same motion on the others'; "
+                "wheel and blade disagree about its own motion by "
+                f"{100 * r.own_stress.mismatch:.2g} % of its inertia"
             )
         sentences.append(text)
     if found[0].others is not None:
@@ -372,6 +416,21 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
     else:
         moved = f"which moves the tuned resonance by {100 * far:.2g} % at most"
     sentences.append(f"the whole wheel holds mean displacements in the preload state, {moved}")
+    for r in found:
+        free = r.free_means
+        if free is None:
+            continue
+        if np.isnan(free.change):
+            said = "no balance was found"
+        elif free.walking:
+            said = (
+                f"{free.walking} of {len(r.deviation)} dampers walk, by up to "
+                f"{1e3 * free.speed:.2g} mm/s, and the highest blade changes by "
+                f"{100 * free.change:+.2g} %"
+            )
+        else:
+            said = f"no damper walks, and the highest blade changes by {100 * free.change:+.2g} %"
+        sentences.append(f"with free mean displacements at the wheel's resonance {said}")
     return sentences
 
 

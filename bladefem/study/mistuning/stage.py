@@ -7,8 +7,6 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-import numpy as np
-
 from ...errors import InputError
 from ...io.stage_cache import cached_stage, found_remark, on_root
 from ...scene.fields import value_at
@@ -29,18 +27,18 @@ from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases
-from ..pipeline.damped_motion import DampedMotion, DampedStress, stress_of_motion
+from ..pipeline.damped_motion import DampedStress, stress_of_motion
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
-from ..pipeline.scene_mesh import build_mesh
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_material import deviation_pattern
 from .blade_stress import WheelShapes, all_modes, blade_motion
 from .drawn_wheels import drawn_statistics, drawn_wheels
 from .engine_orders import own_harmonic
+from .odd_blade import odd_blade_stress
 from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
-from .own_stress import OwnStress, own_stress
+from .own_stress import OwnStress
 from .pattern_response import (
     PatternResponse,
     pattern_response,
@@ -133,10 +131,10 @@ def _best_response(
         patches = list(run.contact.problem.patches)
         shapes = WheelShapes(alone, patches, all_modes(alone), readings)
         points = curve.settings.points
-        motion = blade_motion(shapes, wheel, pattern, case, solution, blade, points)
-        own = None
-        if others is not None and blade in others.changes:
-            own = _own_stress(run, len(sector.families), blade, motion, readings)
+        solved = shapes, wheel, pattern, case, solution, blade, points
+        if others is None or blade not in others.changes:
+            return stress_of_motion(alone, case, blade_motion(*solved)), None
+        motion, own = odd_blade_stress(run, *solved, _given_blades(run.scene)[blade])
         return stress_of_motion(alone, case, motion), own
 
     shared = replace(wheel, comm=comm)
@@ -150,28 +148,8 @@ def _best_response(
         solver_options(run.scene.accuracy),
         own_harmonic(run.scene),
         wanted_truncation(run.scene),
+        run.scene.model.static == "uncoupled",
     )
-
-
-def _own_stress(
-    run: SolvedRun,
-    families: int,
-    blade: int,
-    motion: DampedMotion,
-    readings: np.ndarray,
-) -> OwnStress:
-    """The stress of the aerofoil of a blade of another shape.
-
-    Args:
-        motion: of that blade on the mesh of the others.
-        readings: (n_points*dim, q + p) of the families and of the root.
-    """
-    foot = foot_of(run.mesh, run.modes, families)
-    tuned = held_aerofoil(run.scene, run.mesh, foot, families, run.clamped)
-    scene = _given_blades(run.scene)[blade]
-    other = held_aerofoil(scene, build_mesh(scene), foot, families)
-    fields = motion.harmonics
-    return own_stress(tuned, other, fields.reshape(len(fields), -1) @ readings)
 
 
 def _run_deviations(run: SolvedRun) -> BladeDeviations:

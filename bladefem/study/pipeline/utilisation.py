@@ -9,7 +9,6 @@ from geometry.mesh import Mesh
 from ...errors import InputError
 from ...util.message import warning
 from ..fatigue import Utilisation, fatigue_utilisation, haigh_diagram
-from .damped_motion import DampedStress
 from .run_records import SolvedRun
 
 
@@ -34,7 +33,8 @@ def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
 
 
 def wheel_utilisation(run: SolvedRun) -> list[Utilisation]:
-    """The utilisation at the nodes of the blade that moves most, of each load of the whole wheel.
+    """The utilisation at the nodes of the blade that moves most, of each load of the whole wheel;
+    of a blade of another shape at those of its own mesh.
 
     Empty where all blades are alike or the scene gives no diagram.
 
@@ -44,10 +44,14 @@ def wheel_utilisation(run: SolvedRun) -> list[Utilisation]:
     diagram = haigh_diagram(run.scene.fatigue)
     if diagram is None or run.wheel is None:
         return []
-    blade = blade_nodes(run.mesh)
-    points = run.mesh.points[blade]
-    mean = run.strength.mean[blade]
-    return [fatigue_utilisation(diagram, points, r.stress.field[blade], mean) for r in run.wheel]
+    used = []
+    for response in run.wheel:
+        own = response.own_stress
+        mesh, mean = (run.mesh, run.strength.mean) if own is None else (own.mesh, own.mean)
+        blade = blade_nodes(mesh)
+        field = response.worst.field[blade]
+        used.append(fatigue_utilisation(diagram, mesh.points[blade], field, mean[blade]))
+    return used
 
 
 def blade_nodes(mesh: Mesh) -> np.ndarray:
@@ -89,11 +93,14 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
     known.
     """
     try:
-        found = wheel_utilisation(run)
         tuned = run_utilisation(run)
     except InputError:
         # the tuned wheel's message says why
         return ""
+    try:
+        found = wheel_utilisation(run)
+    except InputError as error:
+        return warning(f"the utilisation of the mistuned wheel is not known: {error}")
     if not found or run.wheel is None:
         return ""
     number = run.response.best_curve
@@ -102,7 +109,7 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
         f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
         f"{response.peak.blade + 1}: {_worst_place(used)}, against "
         f"{tuned[number].used.max():.3g} of the tuned wheel; "
-        f"{highest_use(run, number, used, response.stress):.3g} with the upper ends "
+        f"{highest_use(run, number, used, response.worst.mesh_error):.3g} with the upper ends "
         "of the error of the mesh and of the loading history"
     )
 
@@ -111,18 +118,21 @@ def highest_use(
     run: SolvedRun,
     number: int,
     used: Utilisation,
-    stress: DampedStress | None = None,
+    mesh_error: float | None = None,
 ) -> float:
     """The largest utilisation with the estimated error of the mesh and the largest amplitude that
     a loading history can leave, or a march from an unstable motion.
 
     Args:
         number: of the curve under the same load.
-        stress: that of the tuned wheel at the curve's resonance when left out.
+        mesh_error: estimated relative error of the stress by the mesh; that of the tuned wheel at
+            the curve's resonance when left out.
     """
     curve = run.response.curves[number]
     # stresses are those of the balance
     share = curve.over_balance
     if curve.interval is not None:
         share = max(curve.interval.highest / curve.balance_amplitude, share)
-    return float(used.used[used.worst] * share * (1 + (stress or run.damped[number]).mesh_error))
+    if mesh_error is None:
+        mesh_error = run.damped[number].mesh_error
+    return float(used.used[used.worst] * share * (1 + mesh_error))

@@ -1,0 +1,167 @@
+"""Dampers of a mistuned wheel that nothing but friction holds: twelve lumped blades with a free mass
+between neighbours, against plain marching in time and the tuned sector.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import linalg
+from test_marching import ring_matrices
+
+from bladefem.data import Elements, RigidBody
+from bladefem.hbm.model import Damping
+from bladefem.hbm.solve import solve
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.wheel.lumped import PLATFORM, TIP, LumpedBlades, lumped_matrices, lumped_pattern
+from bladefem.wheel.model import engine_order, tuned_wheel
+from bladefem.wheel.solve import solve_wheel
+from bladefem.wheel.tuned import tuned_sector
+
+COUNT, ORDER = 12, 3
+BLADES = LumpedBlades(count=COUNT, damping=0.02)
+KT, MASS = 2e5, 0.02
+# of orders 3 and 6, whose phases make the motion other forth than back, and their phase
+FORCES, PHASE = (10.0, 40.0), 0.7
+LIMITS = np.array([2.0, 1.6])
+TIGHT = replace(DEFAULT_OPTIONS, tolerance=1e-13)
+
+
+def free_dampers(limits=LIMITS):
+    """Each mass rubs on the platform before it and on the one behind."""
+    M, K, to_next = lumped_matrices(BLADES)
+    ports = {
+        "contact": np.eye(3)[[PLATFORM, PLATFORM]],
+        "blade": np.array([[0.0, -1.0, 1.0], [-1.0, 1.0, 0.0]]),
+        "load": np.array([TIP]),
+        "probe": np.array([TIP]),
+    }
+    sectors = {}
+    for d in range(COUNT // 2 + 1):
+        turn = np.exp(2j * np.pi * d / COUNT)
+        stiffness = K + to_next * turn + to_next.T * turn.conj()
+        stiffness = stiffness.real if 2 * d % COUNT == 0 else stiffness
+        sectors[d] = port_model_from_matrices(M, stiffness, ports, nodal_diameter=d)
+    excitation = {
+        h: engine_order(COUNT, h * ORDER, np.array([force]), PHASE * (h - 1))
+        for h, force in enumerate(FORCES, 1)
+    }
+    return tuned_wheel(
+        COUNT,
+        sectors,
+        slice(1, 2),
+        Elements(np.full(2, KT), np.zeros(2), np.ones(2), limits, tangents=1),
+        excitation,
+        damping=Damping(ratio=BLADES.damping),
+        damper=RigidBody(np.array([[MASS]]), np.ones((2, 1))),
+    )
+
+
+def resonance():
+    M, K, _ = lumped_matrices(BLADES)
+    return 1.01 * float(np.sqrt(linalg.eigh(K, M)[0][0]))
+
+
+def march(omega, deviation, limits, periods=80, steps=1000):
+    """Harmonics 1 to 4 of all tips (N, 4), and how far each damper goes on in the last period.
+
+    Args:
+        limits: (2, N) friction limits of the two contacts of each damper.
+    """
+    mass, C, K = ring_matrices(deviation)
+    dt = 2 * np.pi / omega / steps
+    platform, tip = 3 * np.arange(COUNT) + PLATFORM, 3 * np.arange(COUNT) + TIP
+    following = np.roll(platform, -1)
+    around = 2 * np.pi * ORDER * np.arange(COUNT) / COUNT
+    left = linalg.inv(np.diag(mass) / dt**2 + C / (2 * dt))
+    now_matrix = left @ (2 * np.diag(mass) / dt**2 - K)
+    old_matrix = -left @ (np.diag(mass) / dt**2 - C / (2 * dt))
+    x, old = np.zeros((2, 3 * COUNT))
+    y, before = np.zeros((2, COUNT))
+    slider = np.zeros((2, COUNT))
+    harmonics = np.zeros((COUNT, 4), dtype=complex)
+    places = []
+    for step in range(steps * periods):
+        w = np.array([x[platform], x[following]]) - y
+        slider = np.clip(slider, w - limits / KT, w + limits / KT)
+        f = KT * (w - slider)
+        angle = omega * step * dt
+        load = np.zeros(3 * COUNT)
+        load[tip] = FORCES[0] * np.cos(angle + around)
+        load[tip] += FORCES[1] * np.cos(2 * (angle + around) + PHASE)
+        load[platform] -= f[0]
+        load[following] -= f[1]
+        if step >= steps * (periods - 1):
+            turn = np.exp(-1j * angle * np.arange(1, 5))
+            harmonics += 2 / steps * x[tip, None] * turn
+        if step % steps == 0:
+            places.append(y)
+        x, old = now_matrix @ x + old_matrix @ old + left @ load, x
+        y, before = 2 * y - before + dt**2 / MASS * f.sum(axis=0), y
+    return harmonics, places[-1] - places[-2]
+
+
+def test_tuned_wheel_walks_as_its_sector():
+    wheel = free_dampers()
+    one = solve(tuned_sector(wheel, 7), resonance(), 7, 512, options=TIGHT)
+    found = solve_wheel(wheel, resonance(), 7, 512, options=TIGHT)
+    assert one.converged and found.converged and one.walk is not None
+    np.testing.assert_allclose(found.drift, one.drift, rtol=1e-9)
+    turn = np.exp(2j * np.pi * ORDER / COUNT * np.outer(np.arange(COUNT), np.arange(8)))
+    expected = (one.probe[:, 0] * turn)[:, 1:]
+    scale = abs(expected).max()
+    np.testing.assert_allclose(found.probe[:, 1:, 0], expected, rtol=0, atol=1e-9 * scale)
+
+
+@pytest.fixture(scope="module")
+def deviation():
+    return 0.02 * np.random.default_rng(1).normal(size=COUNT)
+
+
+def test_walks_of_a_mistuned_wheel_are_those_of_a_march(deviation):
+    """Held means are 1.3 % off."""
+    wheel, omega = free_dampers(), resonance()
+    tips, steps = march(omega, deviation, LIMITS[:, None])
+    pattern = lumped_pattern(BLADES, deviation)
+    found = solve_wheel(wheel, omega, 15, 1024, pattern=pattern)
+    assert found.converged and found.walk.dampers.all()
+    assert np.ptp(abs(steps)) > 0.2 * abs(steps).max()
+    # blade against damper: the other way
+    np.testing.assert_allclose(-found.walk.steps(found.w)[:, 0] * scale_of(found), steps, rtol=2e-3)
+    np.testing.assert_allclose(found.drift, abs(steps) * omega / (2 * np.pi), rtol=2e-3)
+    largest = abs(tips).max()
+    np.testing.assert_allclose(found.probe[:, 1:5, 0], tips, rtol=0, atol=2e-4 * largest)
+    # no mean force is left on a damper
+    assert abs(found.f[..., 0].sum(axis=(1, 2))).max() < 1e-5 * abs(found.f).max()
+    held = solve_wheel(replace(wheel, coupled=False), omega, 15, 1024, pattern=pattern)
+    assert abs(held.probe[:, 1, 0] - tips[:, 0]).max() > 0.01 * largest
+
+
+def scale_of(found):
+    """Displacement of the contacts by a unit step."""
+    return found.walk.motions[0, 0, 0]
+
+
+def test_only_dampers_that_slip_everywhere_walk(deviation):
+    """Three of them have a contact with friction enough to hold."""
+    wheel, omega = free_dampers(), resonance()
+    held = [1, 6, 7]
+    limits = np.tile(LIMITS[:, None], COUNT)
+    limits[1, held] = 200.0
+    every = wheel.all_elements
+    pattern = replace(
+        lumped_pattern(BLADES, deviation), elements=replace(every, n0=limits.T.ravel())
+    )
+    tips, steps = march(omega, deviation, limits, periods=160)
+    found = solve_wheel(wheel, omega, 15, 1024, pattern=pattern)
+    assert found.converged, found.reason
+    np.testing.assert_array_equal(np.flatnonzero(~found.walk.dampers), held)
+    assert abs(steps[held]).max() < 1e-3 * abs(steps).max()
+    assert (found.drift[held] == 0).all()
+    np.testing.assert_allclose(
+        np.delete(found.drift, held),
+        np.delete(abs(steps), held) * omega / (2 * np.pi),
+        rtol=5e-3,
+    )
+    np.testing.assert_allclose(found.probe[:, 1:5, 0], tips, rtol=0, atol=5e-4 * abs(tips).max())
