@@ -22,6 +22,8 @@ from .ring_contacts import displace, subtract_moved, violation
 # most sweeps over the blades in a step, and new inverses of a blade
 BLADE_SWEEPS = 30
 RENEWALS = 6
+# most steps that are taken blade by blade before one node by node is tried again
+MOST_STEPS = 256
 # share of the violation that a whole step has to take away, else its inverse is renewed; shares of
 # the step that are tried then, each half of the one before
 FALL = 0.5
@@ -35,8 +37,9 @@ class BladeInverses(NamedTuple):
 
     # (r, 3 width, 3 width) of 1 + B F
     inverse: np.ndarray
-    # (1,) whether a step was not found node by node
-    used: np.ndarray
+    # (2,) steps that are still taken blade by blade before one node by node is tried again, and how
+    # many it will be the next time that such a step is not found
+    steps: np.ndarray
 
 
 def no_inverses(blades: int, size: int) -> BladeInverses:
@@ -44,7 +47,19 @@ def no_inverses(blades: int, size: int) -> BladeInverses:
 
     An inverse of zeros makes no step, and is renewed.
     """
-    return BladeInverses(np.zeros((blades, size, size)), np.zeros(1, dtype=bool))
+    return BladeInverses(np.zeros((blades, size, size)), np.array([0, 1]))
+
+
+@njit(**INNER_KERNEL)
+def note_step(kept, found):
+    """A step was tried node by node: the next ones are taken blade by blade where it was not found,
+    each time twice as many, and half as many where it was.
+    """
+    if found:
+        kept.steps[1] = max(kept.steps[1] // 2, 1)
+    else:
+        kept.steps[0] = kept.steps[1]
+        kept.steps[1] = min(2 * kept.steps[1], MOST_STEPS)
 
 
 @njit(**INNER_KERNEL)

@@ -17,7 +17,7 @@ from numba import njit
 from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, node_steps
 from ..util.numba_options import INNER_KERNEL, KERNEL
-from .blade_forces import by_blades
+from .blade_forces import by_blades, note_step
 from .ring_contacts import displace, subtract_moved, violation
 
 # most sweeps over the nodes in a step
@@ -58,9 +58,11 @@ def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
     limit = SETTLED * largest
     ahead = f.copy()
     found = False
-    if not kept.used[0]:
+    if kept.steps[0] > 0:
+        kept.steps[0] -= 1
+    else:
         found = _by_blocks(c, contacts, w, f, before, load1, limit, work)
-        kept.used[0] = not found
+        note_step(kept, found)
     if not found:
         # steps that do not settle lead away
         f[:] = ahead
