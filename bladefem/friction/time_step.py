@@ -69,13 +69,12 @@ def step_2d(px, py, dx, dy, N0, N1, mu):
     mean = 0.5 * (before + stick * grow + after)
     cosine = (px * dx + py * dy) / (size * path)
     sine = (dx * py - dy * px) / (size * path)
-    # tan(psi / 2) falls exponentially; a force right against the motion stays so
-    if cosine <= -1.0:
-        return -after * dx / path, -after * dy / path, 1.0
-    half = sine / (1.0 + cosine) * np.exp(-(1.0 - stick) * path / mean)
-    scale = after / (path * (1.0 + half * half))
-    along = scale * (1.0 - half * half)
-    across = scale * 2.0 * half
+    # tan(psi / 2) falls exponentially; a fraction, since there is none where they are opposite
+    rise, run = (sine, 1.0 + cosine) if cosine > 0.0 else (1.0 - cosine, sine)
+    rise *= np.exp(-(1.0 - stick) * path / mean)
+    scale = after / (path * (run * run + rise * rise))
+    along = scale * (run * run - rise * rise)
+    across = scale * 2.0 * run * rise
     return along * dx - across * dy, along * dy + across * dx, 1.0
 
 

@@ -104,6 +104,27 @@ def test_slip_and_lift_off_agree_with_a_march_in_time(omega, n0, state):
     assert stability_verdict(model, point).verdict == STABLE
 
 
+def test_contacts_that_share_a_basis_are_those_of_few():
+    """Each of the two contacts as many small ones side by side."""
+    model = rotor(n0=0.1)
+    few = solve(model, 1.2, 5, 256, options=TIGHT)
+    assert few.converged and few.states["lift"] == 2
+    parts = 20
+    e = model.elements
+    small = {name: np.tile(getattr(e, name), parts) / parts for name in ("kt", "kn", "n0")}
+    M, K, C = matrices()
+    ports = {
+        "contact": np.tile(READINGS, (parts, 1)),
+        "load": np.eye(SIZE)[:1],
+        "probe": np.eye(SIZE)[-1:],
+    }
+    side = port_model_from_matrices(M, K, ports, C=C, unsymmetric=True)
+    elements = replace(e, mu=np.tile(e.mu, parts), **small)
+    many = solve(replace(model, sides=(side,), elements=elements), 1.2, 5, 256, options=TIGHT)
+    assert many.converged
+    np.testing.assert_allclose(many.probe, few.probe, atol=1e-9 * abs(few.probe).max())
+
+
 def test_work_of_the_unsymmetric_stiffness_closes_the_balance():
     """It is lost or gained in the bodies."""
     point = solve(rotor(n0=0.2), 0.9, 15, 2048, options=TIGHT)

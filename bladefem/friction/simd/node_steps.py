@@ -69,18 +69,19 @@ def _slipping(
     )
     hx, hy = px + share * dx, py + share * dy
     both = (hx * hx + hy * hy).sqrt() * path
-    apart = both + hx * dx + hy * dy
     x = (1.0 - share) * path / (0.5 * (before + share * grow + after))
     kept = _decay(x)
-    # tan(psi / 2) of the angle between force and motion
-    half = (dx * hy - dy * hx) / apart * kept
-    scale = after / (path * (1.0 + half * half))
-    along, across = scale * (1.0 - half * half), 2.0 * scale * half
+    inverse = 1.0 / both
+    cosine = (hx * dx + hy * dy) * inverse
+    sine = (dx * hy - dy * hx) * inverse
+    # tan(psi / 2) of the angle between force and motion as a fraction: none where they are opposite
+    rise = cosine.above(0.0, sine, 1.0 - cosine) * kept
+    run = cosine.above(0.0, 1.0 + cosine, sine)
+    scale = after / (path * (run * run + rise * rise))
+    along, across = scale * (run * run - rise * rise), 2.0 * scale * run * rise
     tx, ty = px + dx, py + dy
     radial = after / (tx * tx + ty * ty).sqrt()
-    against = -1.0 * after / path
-    fx = apart.above(0.0, along * dx - across * dy, against * dx)
-    fy = apart.above(0.0, along * dy + across * dx, against * dy)
+    fx, fy = along * dx - across * dy, along * dy + across * dx
     # at the limit there, which follows the exact slope more closely than the mean one does
     x = (1.0 - share) * path / after
     followed = x.above(SHORT_PATH, (1.0 - _decay(x)) / x, 1.0 - 0.5 * x)

@@ -54,7 +54,9 @@ def _circulatory_parts(
     S = joined_circulation(model, H)
     flexible = mean_modal_flexibility(bodies.own[0], S[0])
     shapes = bodies.contact[0]
-    G = (bodies.residual[0] + shapes @ flexible @ shapes.conj().T).real
+    # the packed bodies have none where all harmonics share a basis
+    residual = sum(stack.residual[0, stack.contact, stack.contact] for stack in bodies_of(model, H))
+    G = (residual + shapes @ flexible @ shapes.conj().T).real
     free = (bodies.direct[0] + shapes @ (flexible @ bodies.push[0])).real
     A, stuck = with_springs(G, free, model.springs.ravel(), bodies.B, bodies.g)
     mean = np.ascontiguousarray(A), stuck.astype(complex), np.ascontiguousarray(G)
