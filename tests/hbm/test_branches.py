@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from models import FOLDING, folding_pair, rebounding
 
-from bladefem.hbm import band_path
 from bladefem.hbm import branches as branches_module
 from bladefem.hbm import path_maxima as maxima_module
 from bladefem.hbm import sweep as sweep_module
+from bladefem.hbm.band_path import PathLimits
 from bladefem.hbm.branches import find_branches
 from bladefem.hbm.model import Damping
 from bladefem.hbm.solution import size
@@ -126,10 +126,9 @@ def test_motions_that_no_path_reached_are_kept(folding, monkeypatch):
     assert all(p.branch > 0 for p in found.points)
 
 
-def test_a_path_through_a_maze_of_folds_is_left(folding, monkeypatch):
-    monkeypatch.setattr(band_path, "MAX_FOLDS", 0)
+def test_a_path_through_a_maze_of_folds_is_left(folding):
     swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
-    found = find_branches(folding, BAND, swept, 3, 128)
+    found = find_branches(folding, BAND, swept, 3, 128, limits=PathLimits(folds=0))
     assert any("folds" in note for note in found.notes)
 
 

@@ -101,7 +101,7 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
     band = module.KeptBand(380.0, lowest, highest, 200, reason)
     elsewhere = SimpleNamespace(
-        kept=band, peak_amplitude=1.0, in_time=None, keeps_unstable=False, marched_instead=False
+        kept=band, curve_amplitude=1.0, in_time=None, keeps_unstable=False, marched_instead=False
     )
     assert Curve.marched.fget(elsewhere) == pytest.approx(share)
     assert Curve.marched.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0

@@ -12,7 +12,7 @@ from wheels import bodies
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
-from bladefem.fem.stress import nodal_stress, von_mises
+from bladefem.fem.stress import gauss_and_nodal_stress, nodal_stress, von_mises
 from bladefem.hbm.model import Damping
 from bladefem.scene.tables import Material
 from bladefem.study.modes.linear_response import (
@@ -252,7 +252,7 @@ def test_table_of_stresses_has_the_extremes_of_every_state():
 def test_ranks_share_out_the_stresses(monkeypatch):
     """Each state is one rank's work, and the table is the same as that of one rank."""
     done = []
-    recorded = nodal_stress
+    recorded = gauss_and_nodal_stress
 
     def counted(body, u, large=False, heated=False):
         done.append(1)
@@ -261,7 +261,7 @@ def test_ranks_share_out_the_stresses(monkeypatch):
     together, alone = (bodies(comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
     states = stress_states(alone, wheel_modes(alone, 3, [2])[0], 3)
     reference, fields, cells = stress_table(alone, states)
-    monkeypatch.setattr("bladefem.fem.stress.nodal_stress", counted)
+    monkeypatch.setattr("bladefem.fem.stress.gauss_and_nodal_stress", counted)
     table, shared_fields, shared_cells = stress_table(together, states)
     assert MPI.COMM_WORLD.allreduce(len(done)) == len(states)
     pd.testing.assert_frame_equal(table, reference)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from bladefem.errors import NotSolvedError
+from bladefem.hbm.band_path import USUAL_LIMITS, PathLimits
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
@@ -136,9 +137,12 @@ def test_many_folds_are_looked_at_with_more_samples(found, monkeypatch):
         monkeypatch.setattr(curve_module, "peak_from", _refusing(curve_module.peak_from))
     _, curve = curve_of_seed(17)
     few = asked[-2][0]
-    assert few < curve_module.FOLDED_SAMPLES and asked[-2] == (few, 0)
+    assert few < curve_module.FOLDED_SAMPLES and asked[-2] == (
+        few,
+        PathLimits(0, curve_module.MANY_POINTS),
+    )
     wanted = curve_module.FOLDED_SAMPLES if found else few
-    assert asked[-1] == (wanted, None)
+    assert asked[-1] == (wanted, USUAL_LIMITS)
     assert curve.settings.samples == wanted
     assert {p.samples for p in curve.points if p.converged} == {wanted}
 

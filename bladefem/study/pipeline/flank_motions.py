@@ -31,7 +31,7 @@ MAX_HUMPS = 4
 # neighbours is always a little higher
 MAX_STEPS_BESIDE = 3
 # operations that one march may need, some 2.5 s
-MAX_COUNTED = 1.5e10
+MAX_COUNTED = 2.5e10
 
 
 @dataclass(frozen=True)
