@@ -28,6 +28,8 @@ MOST_STEPS = 256
 # the step that are tried then, each half of the one before
 FALL = 0.5
 HALVINGS = 5
+# share of the limit within which changes by kept inverses count as none
+OF_KEPT = 0.05
 # operations of the law and its derivatives at a node, by numbers alone
 VIOLATION_OPERATIONS = 500.0
 
@@ -75,6 +77,7 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
     last = 0.0
     for _ in range(BLADE_SWEEPS):
         largest = 0.0
+        kept_on = bool(0)
         for b in range(blades):
             start = before[0][b], before[1][b], before[2][b]
             size = _violations(contacts.table, start, load1[b], w[b], f[b], gap)
@@ -91,15 +94,16 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
             if share == 0.0:
                 # a kink may have to be passed before it gets better
                 share = 1.0
+            kept_on = kept_on or renewals[b] == 0
             for a in range(3):
                 for i in range(width):
+                    largest = max(largest, abs(step[a, i]))
                     step[a, i] *= share
                     f[b, a, i] += step[a, i]
-                    largest = max(largest, abs(step[a, i]))
             for first in range(0, width, LANES_PER_VECTOR):
                 subtract_moved(contacts.columns, b, first, step, first, w, work)
         ahead = largest * min(largest / last, 1.0) if last > 0.0 else largest
-        if ahead <= limit:
+        if ahead <= (OF_KEPT * limit if kept_on else limit):
             return True
         if not np.isfinite(largest):
             return False

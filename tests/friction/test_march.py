@@ -108,3 +108,13 @@ def test_a_force_meets_a_limit_that_falls_about_as_fast_as_it_moves(path):
         fine = np.array(step_2d(*fine, *(way / 10000), before, after, 0.3)[:2])
     found = step_2d(*start, *way, loads[0], loads[-1], 0.3)[:2]
     np.testing.assert_allclose(found, fine, atol=0.05)
+
+
+def test_a_force_right_against_the_motion_stays_so_in_any_direction():
+    """On a line a limit that falls faster than the force is that of one tangent, to rounding."""
+    for turn in np.linspace(0.0, 2 * np.pi, 500):
+        along = np.array([np.cos(turn), np.sin(turn)])
+        for force, way, after in ((2.0, -0.3, 0.9), (1.9, -0.8, 0.5), (2.0, 0.4, 1.1)):
+            found = step_2d(*(force * along), *(way * along), 2.0, after, 1.0)[:2]
+            line = step_1d(force + way, 2.0, after, 1.0)
+            np.testing.assert_allclose(found, line * along, atol=1e-12)

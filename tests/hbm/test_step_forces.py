@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 
 from bladefem.friction.simd.node_steps import node_steps
-from bladefem.friction.time_step import step_2d
+from bladefem.friction.time_step import step_1d, step_2d
 from bladefem.hbm.blade_forces import no_inverses
 from bladefem.hbm.ring_contacts import (
     in_places,
@@ -163,6 +163,29 @@ def test_steps_of_eight_nodes_are_those_of_each(seed):
     # of up to 0.13; how long a node slips in the step is taken a little differently
     assert abs(np.array(apart)).max() < 0.06
     assert abs(np.array(apart)).mean() < 0.002
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_eight_nodes_that_move_on_lines_have_the_law_of_one_tangent(turned):
+    """With loads that fall and rise faster than the forces, so that these lie against the motion."""
+    generator = np.random.default_rng(7)
+    for _ in range(100):
+        table, before, old, load0, w, load1 = nodes_of_eight(generator)
+        table[1] = 0.0
+        turn = generator.uniform(0, 2 * np.pi, 8) * turned
+        line = np.array([np.cos(turn), np.sin(turn)])
+        limits = table[2] * np.maximum(load0, 0.0)
+        force = generator.choice([-1.0, -0.6, 0.0, 1.0], 8) * limits
+        way = 0.3 * generator.standard_normal(8)
+        before[0], before[1:] = np.maximum(load0, 0.0), force * line
+        old[8:] = 0.0
+        w[8:] = (way / table[0] * line).ravel()
+        f, step = before.copy(), np.zeros((3, 8))
+        block_steps(table, np.zeros((9, 8)), before, old, load0, load1, w, f, step)
+        nodes = zip(force + way, load0, load1, table[2], strict=True)
+        wanted = [step_1d(*node) for node in nodes]
+        np.testing.assert_allclose(f[1:], np.array(wanted) * line, atol=1e-11)
+        np.testing.assert_allclose(f[0], np.maximum(load1, 0.0))
 
 
 def contact_forces_of(case, w, f, extra, preload=None, blades=1):
