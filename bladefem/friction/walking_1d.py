@@ -125,8 +125,6 @@ def walking_batch(w, ramp, load, nodes, tab, limit, jacobian, F, J, shares, cycl
         shares[e, 0] = 1.0 - shares[e, 1] - shares[e, 2]
         if not jacobian:
             continue
-        if not rests:
-            row[:] = 0.0
         # the row of the period's start is that of its end
         for _ in range(2):
             _carry_rows(row, g, N, step, node, tab.at, friction, states, rows)

@@ -17,7 +17,7 @@ from numba import njit
 from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import node_steps
 from ..util.numba_options import INNER_KERNEL
-from .ring_contacts import displace, subtract_moved, violation
+from .ring_contacts import NODE_OPERATIONS, displace, of_blade, subtract_moved, violation
 
 # most sweeps over the blades in a step, and new inverses of a blade
 BLADE_SWEEPS = 30
@@ -77,11 +77,11 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
     last = 0.0
     for _ in range(BLADE_SWEEPS):
         largest = 0.0
-        kept_on = bool(0)
+        by_kept = bool(0)
         for b in range(blades):
-            start = before[0][b], before[1][b], before[2][b]
+            start = of_blade(before, b)
             size = _violations(contacts.table, start, load1[b], w[b], f[b], gap)
-            work[0] += 2.0 * m**2 + 100.0 * width
+            work[0] += 2.0 * m**2 + NODE_OPERATIONS * width
             if size <= limit:
                 continue
             blade = contacts, start, load1[b], w[b], f[b]
@@ -94,7 +94,7 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
             if share == 0.0:
                 # a kink may have to be passed before it gets better
                 share = 1.0
-            kept_on = kept_on or renewals[b] == 0
+            by_kept = by_kept or renewals[b] == 0
             for a in range(3):
                 for i in range(width):
                     largest = max(largest, abs(step[a, i]))
@@ -103,7 +103,7 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
             for first in range(0, width, LANES_PER_VECTOR):
                 subtract_moved(contacts.columns, b, first, step, first, w, work)
         ahead = largest * min(largest / last, 1.0) if last > 0.0 else largest
-        if ahead <= (OF_KEPT * limit if kept_on else limit):
+        if ahead <= (OF_KEPT * limit if by_kept else limit):
             return True
         if not np.isfinite(largest):
             return False

@@ -19,6 +19,8 @@ from .linearised_flow import slopes_2d
 
 # nodes of a block whose forces change from which on it is faster to take all of them at once
 FULL_BLOCK = 6
+# operations of the friction law and the step of one node
+NODE_OPERATIONS = 100.0
 
 
 class RingContacts(NamedTuple):
@@ -85,6 +87,25 @@ def ring_contacts(table: np.ndarray, flexibility: np.ndarray, preload: np.ndarra
         load,
         load @ columns.sum(axis=1),
     )
+
+
+def forces_in_places(forces: np.ndarray, blades: int) -> np.ndarray:
+    """(r, 3, width) contact forces from those of all nodes (r n, 3), blade by blade."""
+    of_blades = forces.reshape(blades, -1, 3).swapaxes(1, 2)
+    return in_places(of_blades, places_of_nodes(of_blades.shape[2]))
+
+
+def forces_of_nodes(forces: np.ndarray, nodes: int) -> np.ndarray:
+    """(r n, 3) contact forces of the n nodes of each blade from those in places (r, 3, width)."""
+    place = np.argsort(places_of_nodes(nodes))[-nodes:]
+    return forces[:, :, place].swapaxes(1, 2).reshape(-1, 3)
+
+
+@njit(**INNER_KERNEL)
+def of_blade(before, b):
+    """Forces, displacements and loads of one blade from those of all."""
+    forces, displacements, loads = before
+    return forces[b], displacements[b], loads[b]
 
 
 @njit(**INNER_KERNEL)

@@ -24,7 +24,14 @@ from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_en
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
-from .ring_contacts import in_places, places_of_directions, places_of_nodes, ring_contacts
+from .ring_contacts import (
+    forces_in_places,
+    forces_of_nodes,
+    in_places,
+    places_of_directions,
+    places_of_nodes,
+    ring_contacts,
+)
 from .ring_readings import displacements, modal_forces, ring_readings
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
@@ -121,9 +128,7 @@ def march_ring(
     r = _system(model).blades
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
-    nodes = places_of_nodes(len(start.forces) // r)
-    y = start.modal.copy()
-    forces = in_places(start.forces.reshape(r, -1, 3).swapaxes(1, 2), nodes)
+    y, forces = start.modal.copy(), forces_in_places(start.forces, r)
     resolved, prepared = _prepared(model, start, S)
     motion = np.empty((periods, S, r))
     work = np.zeros(1)
@@ -136,7 +141,7 @@ def march_ring(
     while settled and done < periods:
         # the first period tells what the others take
         following = min(done - done % at_once + at_once, periods) if done else 1
-        settled = bool(_march(y, forces, *prepared, motion[done:following], work))
+        settled = _marched(y, forces, prepared, motion[done:following], work)
         done = following
         operations = of_bodies + work[0] * periods / done
         if operations > most:
@@ -153,9 +158,27 @@ def march_ring(
                 _leap(_system(model), start.drive.omega, leap, y, prepared)
                 envelope, leapt = [], done
     marched = motion[leapt:done].transpose(0, 2, 1)
-    ended = forces[:, :, np.argsort(nodes)[np.count_nonzero(nodes < 0) :]]
-    end = RingState(start.drive, y, ended.swapaxes(1, 2).reshape(-1, 3))
+    end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
     return RingMarch(marched, done, settled, resolved, operations, end)
+
+
+def _marched(
+    y: np.ndarray,
+    forces: np.ndarray,
+    prepared: tuple[Any, ...],
+    motion: np.ndarray,
+    work: np.ndarray,
+) -> bool:
+    """Fill motion (periods, S, r), and move state and forces along; False where the forces of a
+    step were not found, or are no numbers.
+    """
+    try:
+        found = bool(_march(y, forces, *prepared, motion, work))
+    except np.linalg.LinAlgError:
+        # of a Newton step that is not determined
+        motion[:] = np.nan
+        return False
+    return found and bool(np.isfinite(motion).all())
 
 
 def _leap(

@@ -18,15 +18,13 @@ from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, node_steps
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import by_blades, note_step
-from .ring_contacts import displace, subtract_moved, violation
+from .ring_contacts import NODE_OPERATIONS, displace, of_blade, subtract_moved, violation
 
 # most sweeps over the nodes in a step
 SWEEPS = 20
 # change of a force in a sweep that counts as none, over the largest force
 SETTLED = 1e-6
 
-# of the friction law and the step of one node
-NODE_OPERATIONS = 100.0
 # Newton steps of all nodes together, and halvings of one
 NEWTON_STEPS = 40
 HALVINGS = 10
@@ -123,7 +121,7 @@ def _by_blocks(c, contacts, w, f, before, load1, limit, work):
     for _ in range(SWEEPS):
         largest_step = 0.0
         for b in range(blades):
-            old = before[0][b], before[1][b], before[2][b]
+            old = of_blade(before, b)
             for first in range(0, width, LANES_PER_VECTOR):
                 if _are_open(contacts.table[KN], w[b], f[b], load1[b], first):
                     continue
@@ -225,7 +223,7 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
     for b in range(blades):
         for i in range(width):
             own, (b00, b10, b20, b11, b12, b22) = violation(
-                w[b], f[b], i, contacts.table, (before[0][b], before[1][b], before[2][b]), load1[b]
+                w[b], f[b], i, contacts.table, of_blade(before, b), load1[b]
             )
             slopes = ((b00, 0.0, 0.0), (b10, b11, b12), (b20, b12, b22))
             for a in range(3):

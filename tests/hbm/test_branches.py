@@ -126,6 +126,18 @@ def test_motions_that_no_path_reached_are_kept(folding, monkeypatch):
     assert all(p.branch > 0 for p in found.points)
 
 
+def test_paths_with_an_end_for_points_are_given_up_there(folding):
+    """Their points and folds tell; without such an end nothing is given up."""
+    swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
+    limits = PathLimits(folds=50, points=6)
+    few = find_branches(folding, BAND, swept, 3, 128, limits=limits)
+    assert len(few.points) == 6 and limits.given_up(few.points)
+    every = find_branches(folding, BAND, swept, 3, 128)
+    assert PathLimits(folds=1, points=10000).given_up(every.points)
+    assert not PathLimits(folds=50, points=10000).given_up(every.points)
+    assert not PathLimits(folds=0).given_up(every.points)
+
+
 def test_a_path_through_a_maze_of_folds_is_left(folding):
     swept = list(response(folding, np.linspace(*BAND, 15), 3, 128))
     found = find_branches(folding, BAND, swept, 3, 128, limits=PathLimits(folds=0))

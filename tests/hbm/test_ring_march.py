@@ -73,6 +73,17 @@ def test_a_march_that_its_first_period_shows_to_be_too_long_is_left():
     assert len(march_ring(model, start, 50, most=2 * whole.operations).motion) == 50
 
 
+def test_a_march_from_no_number_is_not_settled():
+    model = bouncing()
+    start = state_of_solution(model, solve(model, 1.3, 7, 256))
+    assert march_ring(model, start, 1).settled
+    for state in (
+        replace(start, modal=np.nan * start.modal),
+        replace(start, forces=np.nan * start.forces),
+    ):
+        assert not march_ring(model, state, 1).settled
+
+
 def test_a_march_that_goes_on_from_its_end_is_one_march():
     model = bouncing()
     start = state_of_solution(model, solve(model, 1.3, 7, 256), 1e-3)

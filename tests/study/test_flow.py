@@ -14,7 +14,7 @@ from bladefem.report.flow import flow_drawing, flow_headlines, flow_tables
 from bladefem.scene.aerodynamics import refuse_flow, wave_influence
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
-from bladefem.study.mistuning.blade_stress import WheelShapes, all_modes, blade_motion
+from bladefem.study.mistuning.blade_stress import SolvedWheel, WheelShapes, all_modes, blade_motion
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import flutter as subject
 from bladefem.study.pipeline import pipeline
@@ -76,7 +76,8 @@ def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced, finest):
     pattern = frequency_pattern(sector.families, np.zeros((COUNT, 3)))
     _, readings = blade_readings(bodies, reduced.clamped, 3)
     shapes = WheelShapes(bodies, patches, all_modes(bodies), readings)
-    blade = blade_motion(shapes, wheel, pattern, case, found, 5, settings.points)
+    solved = SolvedWheel(shapes, wheel, pattern, case, found, settings.points)
+    blade = blade_motion(solved, 5)
     assert blade.mismatch < 2e-3
 
 

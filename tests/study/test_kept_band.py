@@ -104,7 +104,7 @@ def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, 
         kept=band, curve_amplitude=1.0, in_time=None, keeps_unstable=False, marched_instead=False
     )
     assert Curve.marched.fget(elsewhere) == pytest.approx(share)
-    assert Curve.marched.fget(SimpleNamespace(kept=None, peak_amplitude=1.0)) == 0.0
+    assert Curve.marched.fget(SimpleNamespace(kept=None, curve_amplitude=1.0)) == 0.0
     here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True})
     beside = 0.0 if reason else max(abs(lowest - 1), abs(highest - 1))
     assert Curve.marched.fget(here) == pytest.approx(beside)

@@ -25,6 +25,7 @@ from bladefem.study.adaptive.family import family_member
 from bladefem.study.adaptive.settings import first_settings
 from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram
 from bladefem.study.mistuning.blade_stress import (
+    SolvedWheel,
     WheelShapes,
     all_modes,
     blade_motion,
@@ -163,8 +164,9 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes, 
     place = run.mesh.points[blade]
     mean = run.strength.mean[blade]
     tuned = fatigue_utilisation(diagram, place, stress.field[blade], mean)
+    solved = SolvedWheel(shapes, wheel, pattern, case, found, points)
     for number in (0, 17):
-        motion = blade_motion(shapes, wheel, pattern, case, found, number, points)
+        motion = blade_motion(solved, number)
         own = stress_of_motion(shapes.bodies, case, motion)
         used = fatigue_utilisation(diagram, place, own.field[blade], mean)
         np.testing.assert_allclose(used.used, tuned.used, rtol=0, atol=1e-9 * tuned.used.max())
@@ -180,13 +182,14 @@ def test_blade_of_a_mistuned_wheel_moves_as_in_the_balance(reduced, shapes):
     pattern = frequency_pattern(sector.families, deviation)
     point = solve_wheel(wheel, omega, 3, 72, pattern=pattern)
     assert point.converged and np.ptp(point.size()) > 0.05 * point.size().max()
+    solved = SolvedWheel(shapes, wheel, pattern, case, point, settings.points)
     for number in (0, int(np.argmax(point.size()))):
-        motion = blade_motion(shapes, wheel, pattern, case, point, number, settings.points)
+        motion = blade_motion(solved, number)
         assert motion.mismatch < 2e-3
         assert abs(motion.probe[0]) == pytest.approx(abs(point.probe[number, 1, 0]), rel=2e-3)
     # the deviations' own forces are not negligible: without them the motion is another one
     tuned = replace(pattern, stiffness=np.zeros_like(pattern.stiffness))
-    other = blade_motion(shapes, wheel, tuned, case, point, number, settings.points)
+    other = blade_motion(replace(solved, pattern=tuned), number)
     assert other.mismatch > 0.02
 
 
@@ -207,9 +210,8 @@ def test_blade_of_another_shape_that_is_the_same_has_the_others_stress(reduced):
     pattern = Pattern(stiffness)
     point = solve_wheel(wheel, 0.99 * wheel.sectors[9].omega[0], 3, 72, pattern=pattern)
     shapes = WheelShapes(bodies, patches, all_modes(bodies), readings)
-    motion, own = odd_blade_stress(
-        run, shapes, wheel, pattern, case, point, 4, settings.points, scene
-    )
+    solved = SolvedWheel(shapes, wheel, pattern, case, point, settings.points)
+    motion, own = odd_blade_stress(run, solved, 4, scene)
     stress = stress_of_motion(bodies, case, motion)
     assert own.largest == pytest.approx(stress.largest, rel=2e-6)
     np.testing.assert_allclose(own.field, stress.field, rtol=0, atol=1e-4 * stress.largest)

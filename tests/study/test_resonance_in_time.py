@@ -13,11 +13,12 @@ from bladefem.hbm.branches import find_branches
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
-from bladefem.report.response_points import MARCHED, points_of
+from bladefem.report.response_points import FOLLOWED, MARCHED, points_of
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.pipeline import resonance_in_time as module
+from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.resonance_in_time import ResonanceInTime, resonance_in_time
 
 BAND = (249.0, 431.0)
@@ -91,21 +92,51 @@ def test_where_nothing_can_be_marched_there_is_no_resonance(folding):
     assert resonance_in_time(family_of(model), SETTINGS, point) is None
 
 
-def test_a_resonance_sought_in_time_is_the_one_of_the_curve(monkeypatch):
+def one_point(**given):
+    """A curve of one point, 1 mm at 100 Hz."""
+    names = (
+        "frequency amplitude first converged method route residual iterations slipping drift "
+        "dissipated imbalance estimated tolerated checked"
+    )
+    peak = SimpleNamespace(
+        frequency=100.0,
+        omega=200 * np.pi,
+        probe=np.array([[0.0], [1e-3]]),
+        harmonics=1,
+        states={"slip": 0, "lift": 3},
+    )
+    columns = {name: np.ones(1) for name in names.split()}
+    marks = {"stability": np.array(["stable"]), "bifurcation": np.array([""])}
+    columns |= marks | {"multiplier": np.ones(1), "branch": np.zeros(1, int)}
+    return loads_module.Curve(load=9.0, mass=None, **{"peak": peak, **columns, **given})
+
+
+def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     sought = ResonanceInTime(101.0, 1.9e-3, 2e-3, 0.07, 8, 5, 900)
-    curve = loads_module.Curve(
-        load=9.0, mass=None, settings=replace(SETTINGS, error=np.inf), sought=sought,
-        peak=SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1,
-                             states={"slip": 0, "lift": 3}),
-        halved=0.3, stability=np.array(["stable"]), multiplier=np.ones(1),
-        bifurcation=np.array([""]), branch=np.zeros(1, int),
-        **{name: np.ones(1) for name in ("frequency", "amplitude", "first", "converged", "method",
-           "route", "residual", "iterations", "slipping", "drift", "dissipated", "imbalance",
-           "estimated", "tolerated", "checked")},
-    )  # fmt: skip
+    curve = one_point(settings=replace(SETTINGS, error=np.inf), sought=sought, halved=0.3)
     assert (curve.peak_frequency, curve.peak_amplitude) == (101.0, 2e-3)
     assert curve.balance_amplitude == 1e-3 and curve.error == pytest.approx(0.07)
     row = points_of(curve).iloc[-1]
     assert (row["method"], row["frequency"], row["amplitude"]) == (MARCHED, 101.0, 2e-3)
     assert points_of(replace(curve, sought=None))["method"].tolist() == [1.0]
     assert "at 101 Hz the blade keeps between 1900 and 2000 um" in sought.sentence
+
+
+def test_the_resonance_of_a_stiff_layer_is_the_one_of_the_curve():
+    """Where it was reached; what a march from the curve's own motion keeps to is scaled with it."""
+    curve = one_point(
+        settings=replace(SETTINGS, error=0.04), halved=np.nan, layer_law=0.01, layer_shift=0.02
+    )
+    assert (curve.peak_frequency, curve.peak_amplitude) == (100.0, 1e-3)
+    reached = replace(curve, layer_height=-0.1)
+    assert reached.peak_frequency == pytest.approx(102.0)
+    assert reached.peak_amplitude == pytest.approx(0.9e-3)
+    assert reached.over_balance == pytest.approx(0.9)
+    assert reached.error == curve.error == pytest.approx(0.05)
+    row = points_of(reached).iloc[-1]
+    assert row["method"] == FOLLOWED and row["amplitude"] == pytest.approx(0.9e-3)
+    band = KeptBand(100.0, 0.8e-3, 1.1e-3, 200)
+    higher = replace(reached, kept=band)
+    assert higher.marched == pytest.approx(0.1)
+    instead = replace(higher, marched_instead=True)
+    assert instead.peak_amplitude == pytest.approx(0.99e-3)

@@ -1,8 +1,9 @@
 """Newton steps of single nodes towards the forces at the end of a step in time, eight nodes at a
 time, and what they move.
 
-The law is that of `bladefem.friction.time_step.step_2d`, which `bladefem.hbm.step_forces` has one
-node at a time. Arrays have rows of ``width`` numbers, one a node, filled up to a multiple of eight.
+The law is that of `bladefem.friction.time_step.step_2d`, which `bladefem.hbm.ring_contacts` has for
+one node at a time. Arrays have rows of ``width`` numbers, one a node, filled up to a multiple of
+eight.
 """
 
 from __future__ import annotations

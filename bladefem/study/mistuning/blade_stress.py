@@ -48,6 +48,20 @@ class WheelShapes:
     readings: np.ndarray
 
 
+@dataclass(frozen=True)
+class SolvedWheel:
+    """A motion of a wheel, and what the motion of its nodes follows from."""
+
+    shapes: WheelShapes
+    wheel: Wheel
+    # that the solution was made with
+    pattern: Pattern
+    case: LoadCase
+    solution: WheelSolution
+    # friction elements on each patch that it was made with; None for all
+    points: int | None = None
+
+
 def all_modes(bodies: Bodies, reduced: int = 0) -> list[ModeSet]:
     """The modes of all nodal diameters, found once.
 
@@ -59,27 +73,15 @@ def all_modes(bodies: Bodies, reduced: int = 0) -> list[ModeSet]:
     return bodies.kept[SHAPES_KEY]
 
 
-def blade_motion(
-    shapes: WheelShapes,
-    wheel: Wheel,
-    pattern: Pattern,
-    case: LoadCase,
-    solution: WheelSolution,
-    blade: int,
-    points: int | None = None,
-) -> DampedMotion:
-    """The displacements of one blade, of all waves.
-
-    Args:
-        pattern: that the solution was made with.
-        blade: number of the blade, from 0.
-        points: friction elements on each patch that it was made with; None for all.
+def blade_motion(solved: SolvedWheel, blade: int) -> DampedMotion:
+    """The displacements of one blade, numbered from 0, of all waves.
 
     Raises:
         NotSolvedError: the modes do not cover a harmonic.
     """
+    shapes, solution = solved.shapes, solved.solution
     ports = wheel_ports(shapes)
-    forces = port_forces(shapes, ports, wheel, pattern, case, solution, points)
+    forces = port_forces(solved, ports)
     omega = solution.omega * np.arange(1, forces.shape[1] + 1)
     return seen_motion(ports, wave_fields(shapes, ports, forces, omega, blade), solution, blade)
 
@@ -148,19 +150,12 @@ def seen_motion(
     return DampedMotion(solution.frequency, fields, probe, mismatch)
 
 
-def port_forces(
-    shapes: WheelShapes,
-    ports: Ports,
-    wheel: Wheel,
-    pattern: Pattern,
-    case: LoadCase,
-    solution: WheelSolution,
-    points: int | None,
-) -> ComplexArray:
+def port_forces(solved: SolvedWheel, ports: Ports) -> ComplexArray:
     """(N, H, P) forces on each blade at its ports in harmonics 1..H [N].
 
     Damper s presses blade s with its patch "this" and blade s + 1 with its patch "next".
     """
+    shapes, case, solution = solved.shapes, solved.case, solved.solution
     count = sector_of(shapes.bodies.mesh).count
     H = solution.probe.shape[1] - 1
     forces = np.zeros((count, H, ports.matrix.shape[1]), complex)
@@ -168,12 +163,12 @@ def port_forces(
     contact = ports.names["contact"]
     following = np.arange(contact.start, contact.stop)[len(shapes.patches[0].area) * dim :]
     for s in range(count):
-        by_harmonic = node_forces(case, shapes.patches, solution.f[s], points)[1:]
+        by_harmonic = node_forces(case, shapes.patches, solution.f[s], solved.points)[1:]
         forces[s, :, contact] = -(case.selection @ by_harmonic.reshape(H, -1).T).T
     forces[:, :, following] = np.roll(forces[:, :, following], 1, axis=0)
-    for h, amplitudes in wheel.excitation.items():
+    for h, amplitudes in solved.wheel.excitation.items():
         if 1 <= h <= H:
             forces[:, h - 1, ports.names["load"]] = amplitudes
-    deviating = deviation_forces(wheel, pattern, solution)
+    deviating = deviation_forces(solved.wheel, solved.pattern, solution)
     forces[:, :, ports.names["blade"]] = deviating[:, :, 1:].swapaxes(1, 2)
     return forces

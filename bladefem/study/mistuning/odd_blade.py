@@ -5,38 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from ...scene.tables import Scene
-from ...wheel.model import Pattern, Wheel
-from ...wheel.solve import WheelSolution
 from ..modes.linear_response import static_offset
-from ..pipeline.assemble_model import LoadCase
 from ..pipeline.damped_motion import DampedMotion
 from ..pipeline.run_records import ReducedRun
 from ..pipeline.scene_mesh import build_mesh
-from .blade_stress import WheelShapes, port_forces, seen_motion, wave_fields, wheel_ports
+from .blade_stress import SolvedWheel, port_forces, seen_motion, wave_fields, wheel_ports
 from .other_blades import foot_of, held_aerofoil
 from .own_stress import KnownMotion, OwnStress, own_stress, steady_root_forces
 
 
 def odd_blade_stress(
     run: ReducedRun,
-    shapes: WheelShapes,
-    wheel: Wheel,
-    pattern: Pattern,
-    case: LoadCase,
-    solution: WheelSolution,
+    solved: SolvedWheel,
     blade: int,
-    points: int | None,
     scene: Scene,
 ) -> tuple[DampedMotion, OwnStress]:
     """The motion of a blade of another shape on the mesh of the others, and its stress on its own.
 
     Args:
-        shapes: whose readings have the motions of the root after those of the families.
-        pattern: that the solution was made with.
+        solved: whose readings have the motions of the root after those of the families.
         blade: number of the blade, from 0.
-        points: friction elements on each patch that it was made with; None for all.
         scene: of that blade.
     """
+    shapes, solution = solved.shapes, solved.solution
     families = run.scene.mistuning.families
     foot = foot_of(run.mesh, run.modes, families)
     tuned = held_aerofoil(run.scene, run.mesh, foot, families, run.clamped)
@@ -46,7 +37,7 @@ def odd_blade_stress(
     read = shapes.readings.T @ offset.ravel()
     pull = steady_root_forces(tuned, other, run.scene.operation.speed, read[families:])
     ports = wheel_ports(shapes)
-    forces = port_forces(shapes, ports, wheel, pattern, case, solution, points)
+    forces = port_forces(solved, ports)
     # the steady pull as one more column, of no frequency
     steady = np.zeros_like(forces[:, :1])
     root = ports.names["blade"]

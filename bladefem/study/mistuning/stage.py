@@ -33,7 +33,7 @@ from ..pipeline.run_records import SolvedRun
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_material import deviation_pattern
-from .blade_stress import WheelShapes, all_modes, blade_motion
+from .blade_stress import SolvedWheel, WheelShapes, all_modes, blade_motion
 from .drawn_wheels import drawn_statistics, drawn_wheels
 from .engine_orders import own_harmonic
 from .odd_blade import odd_blade_stress
@@ -131,10 +131,10 @@ def _best_response(
         patches = list(run.contact.problem.patches)
         shapes = WheelShapes(alone, patches, all_modes(alone), readings)
         points = curve.settings.points
-        solved = shapes, wheel, pattern, case, solution, blade, points
+        solved = SolvedWheel(shapes, wheel, pattern, case, solution, points)
         if others is None or blade not in others.changes:
-            return stress_of_motion(alone, case, blade_motion(*solved)), None
-        motion, own = odd_blade_stress(run, *solved, _given_blades(run.scene)[blade])
+            return stress_of_motion(alone, case, blade_motion(solved, blade)), None
+        motion, own = odd_blade_stress(run, solved, blade, _given_blades(run.scene)[blade])
         return stress_of_motion(alone, case, motion), own
 
     shared = replace(wheel, comm=comm)
