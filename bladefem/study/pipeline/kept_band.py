@@ -46,7 +46,7 @@ MAX_MARCH = 1e11
 # and of those that its first periods show to be needed, some 10 s; more of it where no fewer
 # contact points are left to march with: the shipped wedge with ground faces needs 1e11 to 1.4e11
 # under 1100 N, and keeps 486 um of 531
-MAX_COUNTED = 1e11
+MAX_COUNTED = 6e10
 MAX_COUNTED_LAST = 2e11
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
