@@ -11,21 +11,18 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...errors import InputError
 from ...hbm.linear.condensation import condense
-from ...hbm.model import ReducedModel
 from ...hbm.solution import Solution, size
 from ...hbm.solve import as_solution
 from ...hbm.solver.fallback import Attempt
 from ...hbm.solver.newton import Newton
 from ...hbm.solver.residual import Balance, evaluate_balance
-from ...hbm.time_model import time_system
 from ..adaptive.choice import Checked
 from ..adaptive.choice_in_time import COVERED_IN_TIME, MarchedBand
 from ..adaptive.family import Family, Member, carried_displacements, family_member
 from ..adaptive.settings import Settings
 from .kept_band import KeptBand, affordable_march, band_by_steps
-from .stability import in_one_body, model_in_time, settings_in_time
+from .stability import model_in_time, settings_in_time
 
 # relative, of an error that was summed twice
 ROUNDING = 1e-9
@@ -43,13 +40,15 @@ class Marches:
     done: dict[tuple[Settings, float, float], KeptBand] = field(default_factory=dict)
 
     def band(self, settings: Settings, point: Solution) -> KeptBand | None:
-        """What the blade keeps to after a motion; None where a march by steps is not affordable, or
-        an exact one is possible, which takes far longer.
+        """What the blade keeps to after a motion; None where a march by steps is not affordable.
+
+        Steps serve small models too: an exact march takes some 30 times as long there, 10 s for a
+        resonance of the plane blades under 8 N, and tells the same (4.79 and 4.77 um).
         """
         key = replace(settings, error=None), point.omega, size(point)
         if key not in self.done:
             model = model_in_time(self.models, settings_in_time(self.models, settings))
-            if not _marched_by_steps(model, point):
+            if not affordable_march(model):
                 return None
             self.done[key] = band_by_steps(model, point)
         return self.done[key]
@@ -126,15 +125,6 @@ def _finer_settings(models: Family, settings: Settings) -> Settings | None:
     finer = replace(settings, points=2 * settings.points)
     before, after = (len(family_member(models, s).model.springs) for s in (settings, finer))
     return finer if after > before else None
-
-
-def _marched_by_steps(model: ReducedModel, top: Solution) -> bool:
-    """A march by steps is affordable, and no exact one is possible, which would take far longer."""
-    try:
-        time_system(in_one_body(model), top.harmonics)
-    except InputError:
-        return affordable_march(model)
-    return False
 
 
 def carried_motion(
