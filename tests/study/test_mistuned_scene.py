@@ -223,6 +223,7 @@ def test_blade_of_another_shape_that_is_the_same_has_the_others_stress(reduced):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
+    """Holds the stages that several tests have in common."""
     return tmp_path_factory.mktemp("run")
 
 
@@ -256,7 +257,7 @@ def test_a_second_run_finds_the_wheel(folder):
     assert not any(text.startswith("whole_wheel: found") for text in drawn.messages)
 
 
-def test_blades_of_another_shape(tmp_path):
+def test_blades_of_another_shape(folder, tmp_path):
     """Two of one shape, meshed anew, on a wheel that is tuned otherwise."""
     entry = "aerofoil.chord_tip = 41 mm"
     overrides = [f"mistuning.blades=3: {entry}, 20: {entry}", "mistuning.pattern=none.csv"]
@@ -264,7 +265,7 @@ def test_blades_of_another_shape(tmp_path):
     overrides += ["model.harmonics=3", "model.samples=128"]
     scene = vary(load_scene(MISTUNED, [*COARSE_MISTUNED, *overrides]), mistuning__pattern=None)
     scene = vary(scene, mistuning__scatter=None)
-    run = with_whole_wheel(pipeline.run(scene, tmp_path))
+    run = with_whole_wheel(pipeline.run(scene, folder))
     (found,) = run.wheel
     odd = [2, 19]
     assert set(found.others.changes) == set(odd)
@@ -295,19 +296,21 @@ def test_blades_of_another_shape(tmp_path):
     assert (tmp_path / "fatigue_of_the_worst_blade.vtu").exists()
     # the coarse scene's own curves hold means too, and cannot say what free ones change
     assert any("what free ones change is not known" in text for text in run.messages)
-    again = with_whole_wheel(pipeline.run(scene, tmp_path))
+    again = with_whole_wheel(pipeline.run(scene, folder))
     assert any(text.startswith("other_blades: found") for text in again.messages)
 
 
-def test_blades_of_another_stiffness_and_mass(tmp_path):
+def test_blades_of_another_stiffness_and_mass(folder, tmp_path):
     """A file with a density a blade, and a stiffness a family."""
     rng = np.random.default_rng(4)
     values = 0.01 * rng.normal(size=(36, 4))
     file = tmp_path / "pattern.csv"
     rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(values)]
     file.write_text("\n".join(["blade, mass, 1F stiffness, 2F stiffness, 1T stiffness", *rows]))
-    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, f"mistuning.pattern={file}"])
-    run = with_whole_wheel(pipeline.run(scene, tmp_path))
+    # more of them are what this is not about
+    fixed = ["model.harmonics=3", "model.samples=128", f"mistuning.pattern={file}"]
+    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, *fixed])
+    run = with_whole_wheel(pipeline.run(scene, folder))
     (found,) = run.wheel
     alone = np.sqrt((1 + values[:, 1:]) / (1 + values[:, :1])) - 1
     np.testing.assert_allclose(found.deviation, alone, atol=1e-12)
@@ -317,7 +320,7 @@ def test_blades_of_another_stiffness_and_mass(tmp_path):
     # frequencies alone are another wheel: that of the same root
     rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(alone)]
     file.write_text("\n".join(["blade, 1F, 2F, 1T", *rows]))
-    other = with_whole_wheel(pipeline.run(scene, tmp_path)).wheel[0]
+    other = with_whole_wheel(pipeline.run(scene, folder)).wheel[0]
     np.testing.assert_allclose(other.deviation, alone, atol=1e-12)
     assert other.factor == pytest.approx(found.factor, rel=0.1)
     assert other.peak.height != found.peak.height
@@ -348,12 +351,12 @@ def test_error_by_harmonics_knows_the_third_of_each_order(excited, H, more):
     assert richer_balance(wheel, H, 64) == (more, max(128, 8 * (more + 1)))
 
 
-def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(tmp_path):
+def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(folder):
     """Order 6 next to 9, with hardly a force: harmonics 3, 6, 9 of three periods a revolution, and
     the answer of harmonics 1, 2, 3 of nine.
     """
     fixed = [*COARSE_MISTUNED, "model.harmonics=1", "model.samples=64"]
-    run = pipeline.run(load_scene(MISTUNED, fixed), tmp_path)
+    run = pipeline.run(load_scene(MISTUNED, fixed), folder)
     one = with_whole_wheel(run)
     faint = vary(run.scene, mistuning__orders=("6: 1e-9 N",))
     both = with_whole_wheel(replace(run, scene=faint))
@@ -383,17 +386,17 @@ def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     np.testing.assert_array_equal(scatter_of_run(run).peak, found.peak)
 
 
-def test_the_damper_law_knows_blades_of_another_shape(tmp_path):
+def test_the_damper_law_knows_blades_of_another_shape(folder):
     """Two wide blades, 1 % off in frequency, next to a small scatter: amplification as of the whole
     wheel, which it is not without these blades.
     """
     scene = load_scene(MISTUNED, COARSE_MISTUNED)
     scene = vary(scene, mistuning__level="damper law", mistuning__wheels=3, mistuning__checks=3)
     scene = vary(scene, mistuning__scatter=0.001, mistuning__pattern=None)
-    alike = scatter_of_run(pipeline.run(scene, tmp_path))
+    alike = scatter_of_run(pipeline.run(scene, folder))
     entry = "aerofoil.chord_tip = 41 mm"
     scene = vary(scene, mistuning__blades=(f"3: {entry}", f"20: {entry}"))
-    found = scatter_of_run(pipeline.run(scene, tmp_path))
+    found = scatter_of_run(pipeline.run(scene, folder))
     assert abs(found.check_errors).max() < 0.05
     assert (found.factor > 1.03 * alike.factor.max()).all()
     assert set(found.blade.ravel()) <= {2, 19}
