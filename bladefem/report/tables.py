@@ -41,6 +41,7 @@ COLUMNS = {
     "searched_amplitude": Column("highest balance by the search", "m", "µm", 1e6),
     "tuned_amplitude": Column("tuned wheel", "m", "µm", 1e6),
     "highest_amplitude": Column("highest blade", "m", "µm", 1e6),
+    "highest_amplitude_held": Column("the same, dampers held in the mean", "m", "µm", 1e6),
     "highest_amplitude_low": Column("from", "m", "µm", 1e6),
     "highest_amplitude_high": Column("to", "m", "µm", 1e6),
     "highest_blade": Column("its number"),

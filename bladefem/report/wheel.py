@@ -38,6 +38,7 @@ def pattern_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
                 **({} if r.mass is None else {"mass": r.mass}),
                 "tuned_amplitude": r.tuned,
                 "highest_amplitude": r.peak.height,
+                **_held_amplitude(r),
                 "highest_blade": r.peak.blade + 1,
                 "peak_frequency": r.peak.omega / (2 * np.pi),
                 "amplification": r.factor,
@@ -49,6 +50,11 @@ def pattern_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
             for r in found
         ]
     )
+
+
+def _held_amplitude(r: PatternResponse) -> dict[str, float]:
+    """The column of the highest amplitude with held means, where it is another one."""
+    return {} if r.free_means is None else {"highest_amplitude_held": r.free_means.held}
 
 
 def blade_table(found: Sequence[PatternResponse]) -> pd.DataFrame:

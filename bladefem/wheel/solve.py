@@ -127,8 +127,8 @@ def _walking(
     start: WheelSolution | None,
     options: Options,
 ) -> tuple[WheelBalance, WheelNewton, str] | None:
-    """The solution in which exactly those dampers walk on which no contact sticks, and its balance;
-    None where none does, or it is not found.
+    """The solution in which exactly those dampers walk on which no contact sticks, and its balance,
+    without fallbacks also where it did not converge; None where none does, or it is not found.
     """
     wheel = balance.wheel
     H = balance.stuck.shape[3] // 2
@@ -158,9 +158,10 @@ def _walking(
         end = newton_wheel(own, w, options)
         iterations += end.iterations
         products += end.products
-        if not end.converged:
-            return None
         end = replace(end, iterations=iterations, products=products)
+        if not end.converged:
+            # dampers that slip throughout have no other balance: to look for one takes longest
+            return None if options.fallbacks else (own, end, "newton, walking")
         slips = slipping_dampers(end.state.forces.shares)
         if (slips == walks).all():
             return own, end, "newton, walking"

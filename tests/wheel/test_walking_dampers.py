@@ -3,6 +3,7 @@ between neighbours, against plain marching in time and the tuned sector.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +15,12 @@ from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.wheel.local_peak import LocalBalances, find_local_peak
 from bladefem.wheel.lumped import PLATFORM, TIP, LumpedBlades, lumped_matrices, lumped_pattern
 from bladefem.wheel.model import engine_order, tuned_wheel
+from bladefem.wheel.resonance import find_wheel_peak
 from bladefem.wheel.solve import solve_wheel
+from bladefem.wheel.statistics import wheel_respond
 from bladefem.wheel.tuned import tuned_sector
 
 COUNT, ORDER = 12, 3
@@ -28,7 +32,7 @@ LIMITS = np.array([2.0, 1.6])
 TIGHT = replace(DEFAULT_OPTIONS, tolerance=1e-13)
 
 
-def free_dampers(limits=LIMITS):
+def free_dampers(limits=LIMITS, phase=PHASE):
     """Each mass rubs on the platform before it and on the one behind."""
     M, K, to_next = lumped_matrices(BLADES)
     ports = {
@@ -44,7 +48,7 @@ def free_dampers(limits=LIMITS):
         stiffness = stiffness.real if 2 * d % COUNT == 0 else stiffness
         sectors[d] = port_model_from_matrices(M, stiffness, ports, nodal_diameter=d)
     excitation = {
-        h: engine_order(COUNT, h * ORDER, np.array([force]), PHASE * (h - 1))
+        h: engine_order(COUNT, h * ORDER, np.array([force]), phase * (h - 1))
         for h, force in enumerate(FORCES, 1)
     }
     return tuned_wheel(
@@ -63,7 +67,7 @@ def resonance():
     return 1.01 * float(np.sqrt(linalg.eigh(K, M)[0][0]))
 
 
-def march(omega, deviation, limits, periods=80, steps=1000):
+def march(omega, deviation, limits, periods=80, steps=1000, phase=PHASE):
     """Harmonics 1 to 4 of all tips (N, 4), and how far each damper goes on in the last period.
 
     Args:
@@ -89,7 +93,7 @@ def march(omega, deviation, limits, periods=80, steps=1000):
         angle = omega * step * dt
         load = np.zeros(3 * COUNT)
         load[tip] = FORCES[0] * np.cos(angle + around)
-        load[tip] += FORCES[1] * np.cos(2 * (angle + around) + PHASE)
+        load[tip] += FORCES[1] * np.cos(2 * (angle + around) + phase)
         load[platform] -= f[0]
         load[following] -= f[1]
         if step >= steps * (periods - 1):
@@ -165,3 +169,87 @@ def test_only_dampers_that_slip_everywhere_walk(deviation):
         rtol=5e-3,
     )
     np.testing.assert_allclose(found.probe[:, 1:5, 0], tips, rtol=0, atol=5e-4 * abs(tips).max())
+
+
+def test_searched_peak_is_the_highest_of_marches(deviation):
+    """At its frequency and on both sides; held means are 1.1 % higher."""
+    limits, phase = np.array([4.0, 2.0]), 1.5
+    free = free_dampers(limits, phase)
+    held = replace(free, coupled=False)
+    pattern = lumped_pattern(BLADES, deviation)
+    grid = resonance() * np.linspace(0.95, 1.05, 11)
+    first = find_wheel_peak(wheel_respond(held, pattern, 15, 1024), grid, 1e-3)
+    found = find_local_peak(LocalBalances(free, pattern, 15, 1024), first, 1e-3)
+    around = found.peak.omega * np.array([0.995, 1.0, 1.005])
+    marched = np.array(
+        [
+            np.linalg.norm(march(w, deviation, limits[:, None], phase=phase)[0], axis=1)
+            for w in around
+        ]
+    )
+    assert marched.max(axis=1).argmax() == 1
+    assert marched[1].argmax() == found.peak.blade == found.solution.size().argmax()
+    assert found.peak.height == pytest.approx(marched[1].max(), rel=3e-4)
+    assert found.solution.walk.dampers.all()
+    assert first.height > 1.008 * marched.max()
+    assert found.change == pytest.approx(marched[1].max() / first.height - 1, abs=1e-3)
+    # few more than the search with held means took
+    assert found.points <= 5 < len(first.omegas)
+
+
+class Curves:
+    """Amplitudes of two blades with a resonance each, in place of balances."""
+
+    def __init__(self, centres, heights, lost=()):
+        self.centres, self.heights, self.lost = np.array(centres), np.array(heights), lost
+        self.points = {}
+
+    def __call__(self, omega):
+        self.points[float(omega)] = SimpleNamespace(omega=omega)
+        if any(abs(omega - at) < 1e-6 for at in self.lost):
+            return np.full(2, np.nan)
+        return self.heights / np.hypot(1, (omega - self.centres) / 0.01)
+
+
+HELD = find_wheel_peak(Curves([1.0, 1.2], [1.0, 0.98]), np.linspace(0.9, 1.3, 21), 1e-4)
+
+
+@pytest.mark.parametrize(
+    ("centres", "heights", "blade"),
+    [
+        # blade 0 falls below the other resonance
+        ([1.0, 1.2], [0.95, 0.97], 1),
+        # the other one rises above it
+        ([1.0, 1.2], [0.99, 1.0], 1),
+        # far outside of the bracket of held means
+        ([1.04, 1.2], [1.0, 0.9], 0),
+        ([0.96, 1.2], [1.0, 0.9], 0),
+    ],
+)
+def test_free_means_can_make_another_peak_the_highest(centres, heights, blade):
+    curves = Curves(centres, heights)
+    found = find_local_peak(curves, HELD, 1e-4)
+    assert found.peak.blade == blade
+    assert found.peak.height == pytest.approx(heights[blade], rel=2e-4)
+    assert found.peak.omega == pytest.approx(centres[blade], abs=1e-3)
+    assert found.change == pytest.approx(heights[blade] / HELD.height - 1, abs=1e-3)
+    assert found.solution.omega == found.peak.omega
+    assert found.points < 2 * len(HELD.omegas)
+    assert (np.diff(found.peak.omegas) > 0).all() and found.peak.unsolved == 0
+
+
+def test_a_peak_without_a_balance_is_not_searched_again():
+    assert find_local_peak(Curves([1.0, 1.2], [1.0, 0.9], [HELD.omega]), HELD, 1e-4) is None
+
+
+def test_peak_of_a_blade_that_is_not_the_highest():
+    """Its own frequency and height, and what the others do there."""
+    curves = Curves([1.013, 1.213], [1.0, 0.5])
+    first = find_wheel_peak(curves, np.linspace(0.9, 1.3, 21), 1e-4)
+    found = find_local_peak(curves, first, 1e-4, blades=np.array([1]))
+    assert found.peak.blade == 1
+    assert found.peak.omega == pytest.approx(1.213, abs=1e-3)
+    assert found.peak.height == pytest.approx(0.5, rel=2e-4)
+    assert found.peak.by_blade == pytest.approx([1.0, 0.5], rel=2e-4)
+    # the first search did not close it in
+    assert found.change > 0.02

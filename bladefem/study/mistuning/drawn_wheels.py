@@ -22,12 +22,12 @@ from ..pipeline.loads import Curve
 from .engine_orders import own_harmonic
 from .law_level import law_level, with_checks
 from .other_blades import OtherBlades
-from .pattern_response import (
+from .pattern_response import frequency_grid
+from .peak_choice import (
     SEARCH_TOLERANCE,
     ChosenPeak,
     chosen_peak,
     first_balance,
-    frequency_grid,
     in_common_period,
     wanted_truncation,
 )

@@ -39,12 +39,9 @@ from .engine_orders import own_harmonic
 from .odd_blade import odd_blade_stress
 from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
 from .own_stress import OwnStress
-from .pattern_response import (
-    PatternResponse,
-    pattern_response,
-    pattern_sentences,
-    wanted_truncation,
-)
+from .pattern_response import PatternResponse, pattern_response
+from .pattern_sentences import pattern_sentences
+from .peak_choice import wanted_truncation
 from .scatter_use import ScatteredUse, scattered_use
 from .validate import refuse_scatter, scene_deviations
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel

@@ -110,8 +110,9 @@ def whole_wheel(
 ) -> Wheel:
     """The tuned wheel under one load, with the modes, contact points and damper of the settings.
 
-    Mean displacements are held in the preload state: dampers that slip throughout walk, each by a
-    step of its own, which takes a further solution at each point and moves the vibration little.
+    Mean displacements are held in the preload state, for the search over a band: dampers that slip
+    throughout walk, each by a step of its own, which takes a further solution at each point and
+    moves the vibration little. A peak is searched again with free ones (`wheel.local_peak`).
     """
     reduced = with_coriolis(scene, with_damper_mass(sector.reduced, case.mass))
     count = reduced.sectors

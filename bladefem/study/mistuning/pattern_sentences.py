@@ -1,0 +1,77 @@
+"""Sentences on the response of all blades of a wheel with one pattern."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from .other_blades import other_blade_sentences
+from .pattern_response import PatternResponse
+
+# relative change of the highest amplitude by free means from which both amplitudes are told
+NOTICEABLE_CHANGE = 0.005
+
+
+def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> list[str]:
+    """What a reader has to know.
+
+    Args:
+        held_means: of the sector's own curves too, which then say nothing about free ones.
+    """
+    sentences = []
+    for r in found:
+        error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
+        place = ", ".join(f"{1e3 * x:.1f}" for x in r.worst.place)
+        text = (
+            f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
+            f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
+            f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
+            f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
+            f"stress is {1e-6 * r.worst.largest:.4g} MPa at ({place}) mm, estimated error of the "
+            f"mesh there {100 * r.worst.mesh_error:.2g} %"
+        )
+        if not r.peak.closed_in:
+            text += "; the highest point is an end of the band, the resonance may be higher"
+        if r.own_stress is not None:
+            text += (
+                "; that blade has another shape, and its stress is that of its own mesh, where "
+                f"{1e-6 * r.stress.largest:.4g} MPa is that of the same motion on the others'; "
+                "wheel and blade disagree about its own motion by "
+                f"{100 * r.own_stress.mismatch:.2g} % of its inertia"
+            )
+        sentences.append(text)
+    if found[0].others is not None:
+        sentences.extend(other_blade_sentences(found[0].others))
+    sentences.extend(_mean_sentence(r, held_means) for r in found)
+    return sentences
+
+
+def _mean_sentence(r: PatternResponse, held_means: bool) -> str:
+    """How the mean displacements of the dampers count at the highest point."""
+    free = r.free_means
+    if free is not None and not np.isnan(free.change):
+        walks = (
+            f"{free.walking} of {len(r.deviation)} dampers walk there, by up to "
+            f"{1e3 * free.speed:.2g} mm/s"
+            if free.walking
+            else "no damper walks there"
+        )
+        if abs(free.change) < NOTICEABLE_CHANGE:
+            against = f"the same within {100 * NOTICEABLE_CHANGE:g} %"
+        else:
+            against = f"{1e6 * free.held:.4g} um, from which free ones differ by " + (
+                f"{100 * free.change:+.2g} %"
+            )
+        return (
+            "the highest point of the whole wheel has free mean displacements, searched again "
+            f"round that of held ones; {walks}; held in the preload state they give {against}"
+        )
+    if np.isnan(r.sector_difference):
+        moved = "where engine orders beyond the tuned sector's excite as well"
+    elif held_means:
+        moved = "as the tuned curves do (model.static): what free ones change is not known"
+    else:
+        moved = f"which moves the tuned resonance by {100 * abs(r.sector_difference):.2g} %"
+    lost = "" if free is None else "; with free ones no balance was found at its resonance"
+    return f"the whole wheel holds mean displacements in the preload state, {moved}{lost}"

@@ -1,0 +1,221 @@
+"""The peak of a wheel with one pattern, by as many harmonics and samples as its error asks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...hbm.solver.newton import Options
+from ...scene.tables import Scene
+from ...wheel.local_peak import LocalBalances, LocalPeak, find_local_peak
+from ...wheel.model import Pattern, Wheel
+from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
+from ...wheel.solve import WheelSolution, solve_wheel
+from ...wheel.statistics import wheel_respond
+from ..pipeline.loads import Curve
+
+# harmonics of the engine order beyond which the indicator asks for no more
+MOST_HARMONICS = 15
+# harmonics that judge the error at least where one is excited: a higher one may meet a lightly
+# damped mode, of which the next one alone knows nothing
+JUDGING_HARMONICS = 7
+# flexibility products of one point up to which all points of a search may be solved like it
+MOST_SEARCH_PRODUCTS = 400
+# relative error of a peak's height by the search over frequencies
+SEARCH_TOLERANCE = 0.01
+
+
+def in_common_period(respond: Respond, harmonic: int) -> Respond:
+    """What a wheel answers at a circular frequency of its own engine order, from what it answers at
+    that of the common period of all orders.
+    """
+    return lambda omega: respond(omega / harmonic)
+
+
+@dataclass(frozen=True)
+class ChosenPeak:
+    """A peak with the harmonics and samples that were taken for it."""
+
+    # with held means
+    held: WheelPeak
+    # there, in harmonics of the common period
+    held_solution: WheelSolution
+    harmonics: int
+    samples: int
+    # relative change of the height by `judging_balances`, of free means where these are known; NaN:
+    # not solved
+    truncation: float
+    # with free means; None where they were not asked for, or no balance was found
+    free: LocalPeak | None = None
+
+    @property
+    def peak(self) -> WheelPeak:
+        """The highest point, with free means where these are known."""
+        return self.held if self.free is None else self.free.peak
+
+    @property
+    def solution(self) -> WheelSolution:
+        """At the peak."""
+        return self.held_solution if self.free is None else self.free.solution
+
+
+def first_balance(wheel: Wheel, curve: Curve, harmonic: int) -> tuple[int, int]:
+    """Harmonics and samples of the common period that the settings of a curve mean."""
+    settings = curve.settings
+    H = max(harmonic * settings.harmonics, *wheel.excitation)
+    return H, max(harmonic * settings.samples, 8 * (H + 1))
+
+
+def wanted_truncation(scene: Scene) -> float | None:
+    """Estimated error by harmonics and samples above which a wheel takes more of them; None: those
+    that the scene gives are kept.
+    """
+    return scene.accuracy / 2 if scene.model.harmonics is None else None
+
+
+def chosen_peak(
+    wheel: Wheel,
+    pattern: Pattern,
+    grid: np.ndarray,
+    first: tuple[int, int],
+    harmonic: int,
+    options: Options,
+    wanted: float | None,
+    most: int = MOST_HARMONICS,
+    free: Wheel | None = None,
+) -> ChosenPeak:
+    """The peak with as many harmonics and samples as its error asks for.
+
+    Args:
+        wheel: with held means.
+        grid: (k,) circular frequencies of the scene's engine order to look at first [rad/s].
+        first: harmonics and samples of the common period to begin with.
+        harmonic: of the scene's engine order.
+        wanted: estimated error by harmonics and samples above which there are more of them; None:
+            those given are kept.
+        most: harmonics of the engine order.
+        free: the same wheel with free means, by which the peak is searched again.
+    """
+    H, samples = first
+    limit = most * harmonic
+    # what Newton does not reach from the nearest walking balance nothing else is likely to
+    simply = replace(options, fallbacks=False)
+    while True:
+        held, solution = _peak_of_pattern(wheel, pattern, grid, H, samples, harmonic, options)
+        found = ChosenPeak(held, solution, H, samples, float("nan"))
+        own, own_options = wheel, options
+        if free is not None:
+            balances = LocalBalances(free, pattern, H, samples, simply, solution)
+            found = replace(found, free=local_peak(balances, held, harmonic))
+            if found.free is not None:
+                # how far dampers walk depends on the high harmonics
+                own, own_options = free, simply
+        judged = _judged(own, pattern, found.solution, (H, samples), own_options, wanted, limit)
+        # of NaN nothing says that richer settings are solved
+        if not _asks_for_more(judged, wanted, limit):
+            return replace(found, truncation=judged.change)
+        H, samples = judged.harmonics, judged.samples
+
+
+def local_peak(
+    balances: LocalBalances,
+    first: WheelPeak,
+    harmonic: int,
+    blades: np.ndarray | None = None,
+) -> LocalPeak | None:
+    """`find_local_peak` in circular frequencies of the scene's engine order."""
+    found = find_local_peak(balances, _scaled(first, 1 / harmonic), SEARCH_TOLERANCE, blades)
+    return None if found is None else replace(found, peak=_scaled(found.peak, harmonic))
+
+
+def _scaled(peak: WheelPeak, factor: float) -> WheelPeak:
+    """A peak with all frequencies times a factor."""
+    return replace(peak, omega=factor * peak.omega, omegas=factor * peak.omegas)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What a richer balance changes at a peak."""
+
+    harmonics: int
+    samples: int
+    # relative, of the highest blade; NaN: not solved
+    change: float
+    # flexibility products of its point
+    products: int
+
+
+def _asks_for_more(judged: Judged, wanted: float | None, most: int) -> bool:
+    """A search with the richer balance is wanted, and affordable."""
+    return (
+        wanted is not None
+        and judged.change > wanted
+        and judged.harmonics <= most
+        and judged.products <= MOST_SEARCH_PRODUCTS
+    )
+
+
+def richer_balance(wheel: Wheel, H: int, samples: int) -> tuple[int, int]:
+    """Harmonics and samples that tell what the present ones leave: at least twice as many, and with
+    the next odd multiple of the highest excited harmonic, which friction excites most.
+    """
+    top = max(wheel.excitation)
+    more = max(2 * H + 1, top * (2 * (H // top) + 1))
+    return more, max(2 * samples, 8 * (more + 1))
+
+
+def _peak_of_pattern(
+    wheel: Wheel,
+    pattern: Pattern,
+    grid: np.ndarray,
+    H: int,
+    samples: int,
+    harmonic: int,
+    options: Options,
+) -> tuple[WheelPeak, WheelSolution]:
+    """The peak and its solution."""
+    solved = in_common_period(wheel_respond(wheel, pattern, H, samples, options), harmonic)
+    peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
+    omega = peak.omega / harmonic
+    return peak, solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
+
+
+def _judged(
+    wheel: Wheel,
+    pattern: Pattern,
+    solution: WheelSolution,
+    present: tuple[int, int],
+    options: Options,
+    wanted: float | None,
+    most: int,
+) -> Judged:
+    """What the last one of `judging_balances` of the present harmonics and samples changes at a
+    peak, or the first one that asks for a search of its own; NaN where one before it is not solved.
+    """
+    found = Judged(*present, 0.0, 0)
+    point = solution
+    for number, more in enumerate(judging_balances(wheel, *present)):
+        products = 0
+        if point.converged:
+            # where the poorer balance is no start for the richer one nothing else is likely to be
+            own = options if number == 0 else replace(options, fallbacks=False)
+            point = solve_wheel(
+                wheel, solution.omega, *more, pattern=pattern, start=point, options=own
+            )
+            products = point.products
+        change = abs(point.size().max() / solution.size().max() - 1)
+        found = Judged(*more, float(change) if point.converged else float("nan"), products)
+        if _asks_for_more(found, wanted, most):
+            break
+    return found
+
+
+def judging_balances(wheel: Wheel, H: int, samples: int) -> list[tuple[int, int]]:
+    """Harmonics and samples that judge the present ones, each started from the one before: the next
+    richer ones, and JUDGING_HARMONICS where harmonic 1 alone is excited and these are more.
+    """
+    found = [richer_balance(wheel, H, samples)]
+    if set(wheel.excitation) == {1} and found[0][0] < JUDGING_HARMONICS:
+        found.append((JUDGING_HARMONICS, max(found[0][1], 32 * (JUDGING_HARMONICS + 1))))
+    return found
