@@ -96,10 +96,12 @@ CAPTIONS = {
     "wheel/scatter_histogram": "How often an amplification occurs at the tuned wheel's best load.",
     "wheel/wheel_motion": "The wheel at its highest point, seen along its axis. On the screen: all "
     "blades in motion as plates that bend by the amplitude at the probe; play, or move the phase.",
-    "wheel/fatigue_of_the_worst_blade": "The places of the highest blade that use most of what the "
-    "material lasts, as for the tuned wheel.",
-    "wheel/utilisation_of_the_worst_blade": "Alternating stress of the highest blade over the "
-    "amplitude that lasts at the mean stress there.",
+    "wheel/fatigue_of_the_worst_blade": "The places that use most of what the material lasts, as "
+    "for the tuned wheel, on the blade that uses most: the highest one, or that of another shape.",
+    "wheel/utilisation_of_the_shapes": "The highest blade of each shape where it moves most, on "
+    "the mesh of its shape: that which uses most of what its material lasts decides.",
+    "wheel/utilisation_of_the_worst_blade": "Alternating stress of the blade that uses most over "
+    "the amplitude that lasts at the mean stress there.",
     "contact/pressure_on_both_seats": "Contact pressure on both seats under the load in the "
     "title, seen along their normals.",
     "contact/pressure": "Seats under each static load: normal force, pressed share and pressure.",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from ..study.fatigue import Utilisation, haigh_diagram
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
+    BladeUse,
     blade_nodes,
     highest_use,
     run_utilisation,
@@ -33,9 +35,9 @@ def known_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
         return {}
 
 
-def known_wheel_use(run: SolvedRun) -> list[tuple[PatternResponse, Utilisation]]:
-    """Each response of the whole wheel with the utilisation of its highest blade; empty where it is
-    not known, which the run's messages say.
+def known_wheel_use(run: SolvedRun) -> list[tuple[PatternResponse, list[BladeUse]]]:
+    """Each response of the whole wheel with the utilisation of its highest blades, the blade that
+    decides first; empty where it is not known, which the run's messages say.
     """
     if run.wheel is None or not known_utilisation(run):
         return []
@@ -46,8 +48,9 @@ def known_wheel_use(run: SolvedRun) -> list[tuple[PatternResponse, Utilisation]]
 
 
 def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
-    """The worst places of the blade at each resonance whose whole motion is known, and those of the
-    worst blade of a mistuned wheel; no table without a diagram.
+    """The worst places of the blade at each resonance whose whole motion is known, those of the
+    blade that decides on a mistuned wheel, and where shapes differ one row for each; no table
+    without a diagram.
     """
     found = known_utilisation(run)
     if not found:
@@ -59,12 +62,29 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
     tables = {"modes/fatigue": pd.DataFrame(rows)}
     number = run.response.best_curve
     rows = []
-    for response, used in known_wheel_use(run):
-        first = {"load": response.load, "blade": response.peak.blade + 1}
-        rows += _worst_rows(
-            run, first, used, highest_use(run, number, used, response.worst.mesh_error)
-        )
-    return {**tables, "wheel/fatigue_of_the_worst_blade": pd.DataFrame(rows)} if rows else tables
+    blades = []
+    for response, uses in known_wheel_use(run):
+        for use in uses:
+            bound = highest_use(run, number, use.used, use.blade.worst.mesh_error)
+            first = {"load": response.load, "blade": use.blade.blade + 1}
+            if use is uses[0]:
+                rows += _worst_rows(run, first, use.used, bound)
+            if len(uses) > 1:
+                blades.append(
+                    {
+                        **first,
+                        "highest_amplitude": use.blade.height,
+                        "peak_frequency": use.blade.frequency,
+                        "alternating_stress": use.blade.worst.largest,
+                        "utilisation": use.highest,
+                        "utilisation_bound": bound,
+                    }
+                )
+    if rows:
+        tables["wheel/fatigue_of_the_worst_blade"] = pd.DataFrame(rows)
+    if blades:
+        tables["wheel/utilisation_of_the_shapes"] = pd.DataFrame(blades)
+    return tables
 
 
 def _worst_rows(
@@ -99,21 +119,34 @@ def _worst_rows(
     ]
 
 
-def worst_utilisation(run: SolvedRun) -> list[tuple[float, float, float]]:
-    """Of each response of the whole wheel: the utilisation of its highest blade, the same with the
-    upper ends of its errors, and that of the tuned wheel; empty where it is not known.
-    """
+@dataclass(frozen=True)
+class WorstUse:
+    """The highest utilisation of a mistuned wheel."""
+
+    # number from 0
+    blade: int
+    value: float
+    # with the upper ends of its errors
+    bound: float
+    # on the tuned wheel
+    tuned: float
+
+
+def worst_utilisation(run: SolvedRun) -> list[WorstUse]:
+    """Of each response of the whole wheel; empty where it is not known."""
     tuned = known_utilisation(run)
     if not tuned:
         return []
     number = run.response.best_curve
+    beside = float(tuned[number].used[tuned[number].worst])
     return [
-        (
-            float(used.used[used.worst]),
-            highest_use(run, number, used, response.worst.mesh_error),
-            float(tuned[number].used[tuned[number].worst]),
+        WorstUse(
+            worst.blade.blade,
+            worst.highest,
+            highest_use(run, number, worst.used, worst.blade.worst.mesh_error),
+            beside,
         )
-        for response, used in known_wheel_use(run)
+        for _, (worst, *_) in known_wheel_use(run)
     ]
 
 
@@ -129,20 +162,18 @@ def utilisation_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
     drawings: dict[str, Callable[[Path], object]] = {
         "modes/utilisation": lambda file: draw_utilisation(run.mesh, field, title, file)
     }
-    for response, used in known_wheel_use(run):
-        words = f"utilisation of blade {response.peak.blade + 1} under {response.load:.4g} N"
-        # of a blade of another shape its own mesh
-        mesh = run.mesh if response.own_stress is None else response.own_stress.mesh
-        worst = _on_mesh(mesh, used.used)
+    for response, (worst, *_) in known_wheel_use(run):
+        words = f"utilisation of blade {worst.blade.blade + 1} under {response.load:.4g} N"
+        values = _on_mesh(worst.mesh, worst.used.used)
         drawings["wheel/utilisation_of_the_worst_blade"] = partial(
-            draw_utilisation, mesh, worst, words
+            draw_utilisation, worst.mesh, values, words
         )
     return drawings
 
 
 def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
     """Mean and alternating stress and utilisation of each known resonance, for ParaView; of a
-    highest blade of another shape in a file of its own.
+    deciding blade of another shape in a file of its own.
     """
     found = known_utilisation(run)
     if not found:
@@ -152,19 +183,18 @@ def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
         load = f"{run.response.curves[number].load:g} N"
         fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run.mesh, used.alternating)
         fields[f"utilisation, {load} [1]"] = _on_mesh(run.mesh, used.used)
-    for response, used in known_wheel_use(run):
-        own = response.own_stress
-        mesh = run.mesh if own is None else own.mesh
-        name = f"blade {response.peak.blade + 1}, {response.load:g} N"
-        worst = {
+    for response, (worst, *_) in known_wheel_use(run):
+        mesh, used = worst.mesh, worst.used
+        name = f"blade {worst.blade.blade + 1}, {response.load:g} N"
+        own = {
             f"alternating stress, {name} [Pa]": _on_mesh(mesh, used.alternating),
             f"utilisation, {name} [1]": _on_mesh(mesh, used.used),
         }
-        if own is None:
-            fields |= worst
+        if worst.blade.own_stress is None:
+            fields |= own
         else:
-            worst["mean stress [Pa]"] = _on_mesh(mesh, used.mean)
-            save_vtu(mesh, file.with_name(f"{file.stem}_of_the_worst_blade{file.suffix}"), worst)
+            own["mean stress [Pa]"] = _on_mesh(mesh, used.mean)
+            save_vtu(mesh, file.with_name(f"{file.stem}_of_the_worst_blade{file.suffix}"), own)
     save_vtu(run.mesh, file, fields)
 
 

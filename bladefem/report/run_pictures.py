@@ -104,7 +104,7 @@ def _motions(result: SolvedRun) -> dict[str, ComplexArray]:
     if result.wheel is not None:
         r = shown_response(result.wheel)
         name = f"blade {r.peak.blade + 1} of the mistuned wheel, {r.load:.4g} N"
-        found[name] = r.stress.motion
+        found[name] = r.highest.stress.motion
     return found
 
 

@@ -21,6 +21,7 @@ from ..wheel.statistics import (
     quantile_interval,
     robust_optimum,
 )
+from .fatigue import WorstUse
 from .headlines import Headline
 
 # all blades at the highest point
@@ -43,7 +44,7 @@ def pattern_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
                 "peak_frequency": r.peak.omega / (2 * np.pi),
                 "amplification": r.factor,
                 "amplification_free": r.free_factor,
-                "alternating_stress": r.worst.largest,
+                "alternating_stress": r.highest.worst.largest,
                 "estimated_error": r.truncation,
                 "unconverged": r.peak.unsolved,
             }
@@ -78,13 +79,12 @@ def blade_table(found: Sequence[PatternResponse]) -> pd.DataFrame:
 
 def pattern_headlines(
     found: Sequence[PatternResponse],
-    used: Sequence[tuple[float, float, float]] = (),
+    used: Sequence[WorstUse] = (),
 ) -> list[Headline]:
     """First numbers of the mistuned wheel.
 
     Args:
-        used: of each response the utilisation of its highest blade, the same with the upper ends of
-            its errors, and that of the tuned wheel; empty where it is not known.
+        used: of each response the highest utilisation; empty where it is not known.
     """
     numbers = []
     for i, r in enumerate(found):
@@ -97,10 +97,13 @@ def pattern_headlines(
         value = f"{1e6 * r.peak.height:.4g} µm"
         numbers.append(Headline("highest blade of the mistuned wheel", value, error, remark))
         if i < len(used):
-            own, highest, tuned = used[i]
-            remark = f"under {r.load:.4g} N; {tuned:.3g} on the tuned wheel"
-            upper = f"up to {highest:.3g} with the errors of mesh and loading history"
-            numbers.append(Headline("utilisation of that blade", f"{own:.3g}", upper, remark))
+            use = used[i]
+            remark = f"under {r.load:.4g} N; {use.tuned:.3g} on the tuned wheel"
+            upper = f"up to {use.bound:.3g} with the errors of mesh and loading history"
+            name = "utilisation of that blade"
+            if use.blade != r.peak.blade:
+                name = f"utilisation of blade {use.blade + 1}, whose shape uses most"
+            numbers.append(Headline(name, f"{use.value:.3g}", upper, remark))
     return numbers
 
 

@@ -24,6 +24,7 @@ from bladefem.report.wheel import (
     scatter_sentences,
     scatter_table,
 )
+from bladefem.scene.other_blades import other_blades
 from bladefem.scene.tables import Fatigue
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
@@ -35,12 +36,14 @@ from bladefem.study.mistuning.blade_stress import (
     all_modes,
     blade_motion,
 )
+from bladefem.study.mistuning.deciding_blades import blade_groups
 from bladefem.study.mistuning.drawn_wheels import scatter_balance
 from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
 from bladefem.study.mistuning.odd_blade import odd_blade_stress
+from bladefem.study.mistuning.other_blades import BladeChange, OtherBlades
 from bladefem.study.mistuning.peak_choice import richer_balance
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
-from bladefem.study.mistuning.validate import refuse_scatter
+from bladefem.study.mistuning.validate import refuse_scatter, scene_deviations
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
@@ -51,6 +54,7 @@ from bladefem.study.pipeline.utilisation import (
     blade_nodes,
     run_utilisation,
     wheel_utilisation,
+    wheel_utilisation_message,
 )
 from bladefem.wheel.model import Pattern, frequency_pattern
 from bladefem.wheel.solve import free_wheel, solve_wheel
@@ -241,7 +245,8 @@ def test_a_second_run_finds_the_wheel(folder):
         assert not any(text.startswith(f"{name}: found") for text in first.messages)
         assert any(text.startswith(f"{name}: found") for text in again.messages)
     np.testing.assert_array_equal(first.wheel[0].peak.by_blade, again.wheel[0].peak.by_blade)
-    (used,) = wheel_utilisation(again)
+    ((use,),) = wheel_utilisation(again)
+    used = use.used
     number = again.response.best_curve
     tuned = run_utilisation(again)[number]
     assert used.used.max() > tuned.used.max()
@@ -251,10 +256,10 @@ def test_a_second_run_finds_the_wheel(folder):
     tables = utilisation_table(again)
     assert tables["wheel/fatigue_of_the_worst_blade"]["utilisation"][0] == used.used.max()
     assert "wheel/utilisation_of_the_worst_blade" in utilisation_drawing(again)
-    value, highest, beside = worst_utilisation(again)[0]
-    assert value == used.used.max() <= highest and beside == tuned.used.max()
+    (worst,) = worst_utilisation(again)
+    assert worst.value == used.used.max() <= worst.bound and worst.tuned == tuned.used.max()
     numbers = pattern_headlines(again.wheel, worst_utilisation(again))
-    assert [number.value for number in numbers][1] == f"{value:.3g}"
+    assert [number.value for number in numbers][1] == f"{worst.value:.3g}"
     # another pattern is another response of the same sector
     other = vary(scene, mistuning__pattern=None, mistuning__seed=1)
     drawn = with_whole_wheel(pipeline.run(other, folder))
@@ -280,17 +285,19 @@ def test_blades_of_another_shape(folder, tmp_path):
     assert not found.deviation[np.setdiff1d(np.arange(36), odd)].any()
     assert found.factor > 1.0
     # the motion of all finite elements with the deviations' forces is that of the reduced wheel
-    assert found.stress.mismatch < 5e-3
+    assert found.highest.stress.mismatch < 5e-3
     said = [text for text in run.messages if text.startswith("blades 3, 20 of another shape")]
     assert f"{100 * shift[0]:+.3g} %" in said[0]
     # one of these is the highest; its own aerofoil is a little narrower
     assert found.peak.blade in odd
-    own = found.own_stress
-    assert own.largest == pytest.approx(found.stress.largest, rel=0.1)
+    own = found.highest.own_stress
+    assert own.largest == pytest.approx(found.highest.stress.largest, rel=0.1)
     assert own.mismatch < 5e-3
     assert any("its stress is that of its own mesh" in text for text in run.messages)
     # the number that is signed is that of its own elements, in vibration and rotation
-    (used,) = wheel_utilisation(run)
+    ((use, _),) = wheel_utilisation(run)
+    assert use.blade is found.highest
+    used = use.used
     nodes = blade_nodes(own.mesh)
     assert len(nodes) != len(blade_nodes(run.mesh))
     np.testing.assert_array_equal(used.points, own.mesh.points[nodes])
@@ -321,7 +328,7 @@ def test_blades_of_another_stiffness_and_mass(folder, tmp_path):
     np.testing.assert_allclose(found.deviation, alone, atol=1e-12)
     assert found.factor > 1.0 and found.peak.unsolved == 0
     # the motion of all finite elements with the deviations' forces is that of the reduced wheel
-    assert found.stress.mismatch < 5e-3
+    assert found.highest.stress.mismatch < 5e-3
     # frequencies alone are another wheel: that of the same root
     rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(alone)]
     file.write_text("\n".join(["blade, 1F, 2F, 1T", *rows]))
@@ -372,7 +379,7 @@ def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(folder):
     assert s.frequency == pytest.approx(r.frequency, rel=1e-5)
     assert s.factor == pytest.approx(r.factor, rel=1e-3)
     assert s.free_factor == pytest.approx(r.free_factor, rel=1e-6)
-    assert s.stress.largest == pytest.approx(r.stress.largest, rel=5e-3)
+    assert s.highest.stress.largest == pytest.approx(r.highest.stress.largest, rel=5e-3)
     np.testing.assert_allclose(np.exp(1j * (s.phase - r.phase)), 1, atol=0.02)
     assert any("engine orders beyond the tuned sector's" in text for text in both.messages)
 
@@ -512,8 +519,87 @@ def test_the_reported_peak_has_dampers_that_walk(tmp_path):
     assert found.solution.drift.max() == free.speed > 0
     # tuned dampers walk as well: as in the sector's own curve
     assert abs(found.sector_difference) < 2e-3
-    assert found.stress.mismatch < 5e-3
+    assert found.highest.stress.mismatch < 5e-3
     said = [text for text in run.messages if "free mean displacements" in text]
     assert f"{1e6 * free.held:.4g} um" in said[0] and "36 of 36 dampers walk" in said[0]
     table = pattern_table(run.wheel)
     assert table["highest_amplitude_held"][0] == free.held < table["highest_amplitude"][0]
+
+
+@pytest.fixture(scope="module")
+def narrow_blade(tmp_path_factory):
+    """A run with one blade of another shape that is not the highest."""
+    overrides = ["mistuning.blades=3: aerofoil.chord_tip = 38 mm"]
+    overrides += ["model.harmonics=1", "model.samples=64"]
+    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, *overrides])
+    return with_whole_wheel(pipeline.run(scene, tmp_path_factory.mktemp("narrow")))
+
+
+def test_a_blade_of_another_shape_is_judged_where_it_moves_most(narrow_blade):
+    """Against a plain sweep over the band, the stress at its highest point, and Goodman's line."""
+    run, scene = narrow_blade, narrow_blade.scene
+    (found,) = run.wheel
+    highest, odd = found.blades
+    assert highest.blade == found.peak.blade != odd.blade == 2 and not found.lost_blades
+    assert odd.height < 0.8 * highest.height
+    assert abs(odd.frequency / found.frequency - 1) > 5e-3
+    bodies, patches = Bodies(scene, run.mesh), list(run.contact.problem.patches)
+    (case,) = load_cases(scene, run.mesh, run.contact)
+    (curve,) = run.response.curves
+    sector = reduce_wheel(bodies, patches, 6, run.clamped, 3, run.modes, root=True)
+    wheel = whole_wheel(scene, run.mesh, sector, patches, case, curve.settings)
+    deviation = scene_deviations(scene, 36, 3).frequency
+    pattern = found.others.added(frequency_pattern(sector.families, deviation), 36)
+    points = [
+        solve_wheel(wheel, omega, 1, 64, pattern=pattern)
+        for omega in 2 * np.pi * odd.frequency * np.linspace(0.97, 1.03, 61)
+    ]
+    assert all(point.converged for point in points)
+    top = max(points, key=lambda point: point.size()[2])
+    # what the search does not look for is 1 %
+    assert odd.height == pytest.approx(top.size()[2], rel=0.01)
+    assert odd.frequency == pytest.approx(top.frequency, rel=2e-3)
+    _, readings = blade_readings(bodies, run.clamped, 3, run.modes, root=True)
+    shapes = WheelShapes(bodies, patches, all_modes(bodies), readings)
+    solved = SolvedWheel(shapes, wheel, pattern, case, top, curve.settings.points)
+    _, own = odd_blade_stress(run, solved, 2, other_blades(scene, 36)[2])
+    assert odd.own_stress.largest == pytest.approx(own.largest, rel=0.01)
+    nodes = blade_nodes(own.mesh)
+    goodman = own.field / (scene.fatigue.endurance * (1 - own.mean / scene.fatigue.ultimate))
+    ((first, second),) = wheel_utilisation(run)
+    assert (first.blade, second.blade) == (highest, odd)
+    assert second.highest == pytest.approx(goodman[nodes].max(), rel=0.01)
+    # that of the wheel's own peak would be another one
+    there = abs(found.solution.probe[2, 1, 0])
+    assert there < 0.97 * odd.height
+
+
+def test_the_blade_that_uses_most_is_told(narrow_blade, tmp_path):
+    """Though another one moves more: the same run, with more stress in the narrow blade."""
+    run = narrow_blade
+    (found,) = run.wheel
+    highest, odd = found.blades
+    own = replace(odd.own_stress, field=3 * odd.own_stress.field)
+    run = replace(run, wheel=[replace(found, blades=(highest, replace(odd, own_stress=own)))])
+    ((first, second),) = wheel_utilisation(run)
+    assert (first.blade.blade, second.blade.blade) == (2, found.peak.blade)
+    (worst,) = worst_utilisation(run)
+    assert worst.blade == 2 and worst.value == first.highest > second.highest
+    assert "blade 3: " in wheel_utilisation_message(run)
+    assert pattern_headlines(run.wheel, [worst])[1].what.startswith("utilisation of blade 3")
+    tables = utilisation_table(run)
+    assert set(tables["wheel/fatigue_of_the_worst_blade"]["blade"]) == {3}
+    both = tables["wheel/utilisation_of_the_shapes"]
+    assert list(both["blade"]) == [3, found.peak.blade + 1]
+    np.testing.assert_array_equal(both["utilisation"], [first.highest, second.highest])
+    save_fatigue_vtu(run, tmp_path / "fatigue.vtu")
+    assert (tmp_path / "fatigue_of_the_worst_blade.vtu").exists()
+
+
+def test_blades_are_grouped_by_their_shapes():
+    one, other = (BladeChange(k * np.eye(2), np.eye(2), np.zeros(1), np.ones(1)) for k in (1, 2))
+    same = replace(one, stiffness=one.stiffness.copy())
+    groups = blade_groups(OtherBlades({4: one, 1: other, 0: same}), 6)
+    assert [group.tolist() for group in groups] == [[2, 3, 5], [0, 4], [1]]
+    assert [group.tolist() for group in blade_groups(None, 2)] == [[0, 1]]
+    assert [group.tolist() for group in blade_groups(OtherBlades({0: one, 1: one}), 2)] == [[0, 1]]

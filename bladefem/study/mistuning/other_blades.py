@@ -96,6 +96,14 @@ class OtherBlades:
             mass[number] += change.mass
         return replace(pattern, stiffness=stiffness, mass=mass)
 
+    def shapes(self) -> list[tuple[BladeChange, list[int]]]:
+        """Each shape with the numbers of its blades, ascending."""
+        found: dict[bytes, tuple[BladeChange, list[int]]] = {}
+        for number, change in sorted(self.changes.items()):
+            key = change.stiffness.tobytes() + change.mass.tobytes()
+            found.setdefault(key, (change, []))[1].append(number)
+        return list(found.values())
+
     def frequencies(self, count: int, families: int) -> np.ndarray:
         """(N, q) relative deviations of the blade-alone frequencies."""
         found = np.zeros((count, families))
@@ -285,11 +293,9 @@ def _size_of_face(mesh: Mesh, face: str) -> tuple[float, np.ndarray]:
 
 def other_blade_sentences(found: OtherBlades) -> Sequence[str]:
     """What a reader has to know, one sentence a shape."""
-    shapes: dict[bytes, tuple[BladeChange, list[int]]] = {}
-    for number, change in found.changes.items():
-        shapes.setdefault(change.stiffness.tobytes(), (change, []))[1].append(number + 1)
     said = []
-    for change, numbers in shapes.values():
+    for change, blades in found.shapes():
+        numbers = [number + 1 for number in blades]
         who = f"blade{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
         shift = ", ".join(f"{100 * x:+.3g} %" for x in change.frequency)
         said.append(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -17,10 +16,9 @@ from ...wheel.solve import WheelSolution, free_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
 from ...wheel.walking import walking_motions
-from ..pipeline.damped_motion import DampedStress
 from ..pipeline.loads import Curve
+from .deciding_blades import BladeStress, DecidingBlade, SearchedWheel, deciding_blades
 from .other_blades import OtherBlades
-from .own_stress import OwnStress
 from .peak_choice import (
     SEARCH_TOLERANCE,
     ChosenPeak,
@@ -78,19 +76,19 @@ class PatternResponse:
     # relative difference of the tuned peak from that of the sector's own curve, whose means are
     # free; NaN where that curve knows fewer engine orders
     sector_difference: float
-    # of the blade that moves most, at its resonance
-    stress: DampedStress
+    # the highest blade of each shape at its resonance, that of the peak first
+    blades: tuple[DecidingBlade, ...]
     # None where the scene holds means, or no damper has a motion that friction alone resists
     free_means: FreeMeans | None = None
     # blades of another shape
     others: OtherBlades | None = None
-    # of that blade on its own mesh, where it has another shape
-    own_stress: OwnStress | None = None
+    # numbers of the blades of a shape whose own peak was not found
+    lost_blades: tuple[int, ...] = ()
 
     @property
-    def worst(self) -> DampedStress | OwnStress:
-        """The stress of the highest blade on the mesh of its own shape."""
-        return self.stress if self.own_stress is None else self.own_stress
+    def highest(self) -> DecidingBlade:
+        """The blade of the peak."""
+        return self.blades[0]
 
     @property
     def factor(self) -> float:
@@ -159,7 +157,7 @@ def pattern_response(
     pattern: Pattern,
     deviation: np.ndarray,
     curve: Curve,
-    stress: Callable[[Pattern, WheelSolution, int], tuple[DampedStress, OwnStress | None]],
+    stress: BladeStress,
     others: OtherBlades | None = None,
     options: Options = DEFAULT_OPTIONS,
     harmonic: int = 1,
@@ -194,9 +192,9 @@ def pattern_response(
         free=free,
     )
     found, tuned = _with_tuned(wheel, free, found, curve, options, harmonic)
-    peak, solution = found.peak, found.solution
     one_order = len(wheel.excitation) == 1
-    alternating, own = stress(pattern, solution, peak.blade)
+    searched = SearchedWheel(wheel, free, pattern, harmonic, options)
+    blades, lost = deciding_blades(searched, found, others, stress)
     return PatternResponse(
         curve.load,
         curve.mass,
@@ -204,15 +202,15 @@ def pattern_response(
         harmonic,
         tuned.height,
         tuned.omega / (2 * pi),
-        peak,
-        solution,
+        found.peak,
+        found.solution,
         _free_factor(wheel, pattern, grid, harmonic),
         found.truncation,
         tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
-        alternating,
+        blades,
         None if free is None else _free_means(found),
         others,
-        own,
+        lost,
     )
 
 

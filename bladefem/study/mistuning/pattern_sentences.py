@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...util.message import warning
+from .deciding_blades import DecidingBlade
 from .other_blades import other_blade_sentences
 from .pattern_response import PatternResponse
 
@@ -21,30 +23,66 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
     """
     sentences = []
     for r in found:
-        error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
-        place = ", ".join(f"{1e3 * x:.1f}" for x in r.worst.place)
-        text = (
-            f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
-            f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
-            f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
-            f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
-            f"stress is {1e-6 * r.worst.largest:.4g} MPa at ({place}) mm, estimated error of the "
-            f"mesh there {100 * r.worst.mesh_error:.2g} %"
-        )
-        if not r.peak.closed_in:
-            text += "; the highest point is an end of the band, the resonance may be higher"
-        if r.own_stress is not None:
-            text += (
-                "; that blade has another shape, and its stress is that of its own mesh, where "
-                f"{1e-6 * r.stress.largest:.4g} MPa is that of the same motion on the others'; "
-                "wheel and blade disagree about its own motion by "
-                f"{100 * r.own_stress.mismatch:.2g} % of its inertia"
-            )
-        sentences.append(text)
+        sentences.append(_peak_sentence(r))
+        sentences.extend(_shape_sentences(r))
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))
     sentences.extend(_mean_sentence(r, held_means) for r in found)
     return sentences
+
+
+def _peak_sentence(r: PatternResponse) -> str:
+    """The highest blade, and its stress."""
+    error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
+    text = (
+        f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
+        f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
+        f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
+        f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "
+        f"stress is {_stress_words(r.highest)}"
+    )
+    if not r.peak.closed_in:
+        text += "; the highest point is an end of the band, the resonance may be higher"
+    return text + _own_mesh_words(r.highest)
+
+
+def _shape_sentences(r: PatternResponse) -> list[str]:
+    """The highest blades of the other shapes, and those whose peak was not found."""
+    said = [
+        f"of the blades of another shape than blade {r.peak.blade + 1}'s, blade {one.blade + 1} "
+        f"moves most, {1e6 * one.height:.4g} um at {one.frequency:.5g} Hz; its alternating stress "
+        f"there is {_stress_words(one)}{_own_mesh_words(one)}"
+        for one in r.blades[1:]
+    ]
+    if r.lost_blades:
+        numbers = ", ".join(str(number + 1) for number in r.lost_blades)
+        said.append(
+            warning(
+                f"no balance was found at the resonance of blades {numbers}, which have another "
+                f"shape than blade {r.peak.blade + 1}: their stress and utilisation are not known"
+            )
+        )
+    return said
+
+
+def _stress_words(one: DecidingBlade) -> str:
+    place = ", ".join(f"{1e3 * x:.1f}" for x in one.worst.place)
+    return (
+        f"{1e-6 * one.worst.largest:.4g} MPa at ({place}) mm, estimated error of the mesh there "
+        f"{100 * one.worst.mesh_error:.2g} %"
+    )
+
+
+def _own_mesh_words(one: DecidingBlade) -> str:
+    """What there is to say of a blade of another shape, empty for one of the tuned shape."""
+    if one.own_stress is None:
+        return ""
+    return (
+        "; that blade has another shape, and its stress is that of its own mesh, where "
+        f"{1e-6 * one.stress.largest:.4g} MPa is that of the same motion on the others'; "
+        "wheel and blade disagree about its own motion by "
+        f"{100 * one.own_stress.mismatch:.2g} % of its inertia"
+    )
 
 
 def _mean_sentence(r: PatternResponse, held_means: bool) -> str:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from geometry.mesh import Mesh
@@ -10,6 +13,9 @@ from ...errors import InputError
 from ...util.message import warning
 from ..fatigue import Utilisation, fatigue_utilisation, haigh_diagram
 from .run_records import SolvedRun
+
+if TYPE_CHECKING:
+    from ..mistuning.deciding_blades import DecidingBlade
 
 
 def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
@@ -32,26 +38,46 @@ def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
     }
 
 
-def wheel_utilisation(run: SolvedRun) -> list[Utilisation]:
-    """The utilisation at the nodes of the blade that moves most, of each load of the whole wheel;
-    of a blade of another shape at those of its own mesh.
+@dataclass(frozen=True)
+class BladeUse:
+    """The utilisation at the nodes of one blade of a mistuned wheel."""
+
+    blade: DecidingBlade
+    # its own mesh, where it has another shape
+    mesh: Mesh
+    used: Utilisation
+
+    @property
+    def highest(self) -> float:
+        """[1]"""
+        return float(self.used.used[self.used.worst])
+
+
+def wheel_utilisation(run: SolvedRun) -> list[list[BladeUse]]:
+    """Of each load of the whole wheel the utilisation of the highest blade of each shape, where
+    that moves most; the blade that decides first.
 
     Empty where all blades are alike or the scene gives no diagram.
 
     Raises:
-        InputError: the diagram does not reach a mean stress of the blade.
+        InputError: the diagram does not reach a mean stress of a blade.
     """
     diagram = haigh_diagram(run.scene.fatigue)
     if diagram is None or run.wheel is None:
         return []
-    used = []
+    found = []
     for response in run.wheel:
-        own = response.own_stress
-        mesh, mean = (run.mesh, run.strength.mean) if own is None else (own.mesh, own.mean)
-        blade = blade_nodes(mesh)
-        field = response.worst.field[blade]
-        used.append(fatigue_utilisation(diagram, mesh.points[blade], field, mean[blade]))
-    return used
+        uses = []
+        for one in response.blades:
+            own = one.own_stress
+            mesh, mean = (run.mesh, run.strength.mean) if own is None else (own.mesh, own.mean)
+            nodes = blade_nodes(mesh)
+            used = fatigue_utilisation(
+                diagram, mesh.points[nodes], one.worst.field[nodes], mean[nodes]
+            )
+            uses.append(BladeUse(one, mesh, used))
+        found.append(sorted(uses, key=lambda use: -use.highest))
+    return found
 
 
 def blade_nodes(mesh: Mesh) -> np.ndarray:
@@ -104,14 +130,21 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
     if not found or run.wheel is None:
         return ""
     number = run.response.best_curve
-    response, used = run.wheel[0], found[0]
-    return (
+    response, (first, *others) = run.wheel[0], found[0]
+    said = (
         f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
-        f"{response.peak.blade + 1}: {_worst_place(used)}, against "
+        f"{first.blade.blade + 1}: {_worst_place(first.used)}, against "
         f"{tuned[number].used.max():.3g} of the tuned wheel; "
-        f"{highest_use(run, number, used, response.worst.mesh_error):.3g} with the upper ends "
-        "of the error of the mesh and of the loading history"
+        f"{highest_use(run, number, first.used, first.blade.worst.mesh_error):.3g} with the upper "
+        "ends of the error of the mesh and of the loading history"
     )
+    for use in others:
+        said += (
+            f"; the highest blade of another shape than that, {use.blade.blade + 1}, uses "
+            f"{use.highest:.3g} where it moves most, "
+            f"{highest_use(run, number, use.used, use.blade.worst.mesh_error):.3g} with these"
+        )
+    return said
 
 
 def highest_use(
