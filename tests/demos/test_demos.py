@@ -1,4 +1,5 @@
 """Each demo runs in its coarse setting, alone and on 2 and 4 ranks, and ends in the same number.
+The longest runs on 2 only: what it shares out are loads, as tests/hbm/test_share.py does on 4 too.
 
 The pinned numbers stand on gmsh 4.15.2; another mesher may move them a little, hence 0.5 % against
 the pin and 1e-8 between rank counts. Remake them with: BLADEFEM_COARSE=1 ./run demos/NAME.py
@@ -34,6 +35,9 @@ PINNED = {
 # estimated error of 20 %
 BETWEEN_MESHES = {"change_geometry": 1.5e-2, "forced_response": 1.5e-2}
 
+# those of four take as long again on two cores
+MOST_RANKS = {"forced_response": 2}
+
 
 def final_number(name: str, ranks: int) -> float:
     """The last number that a demo prints."""
@@ -53,5 +57,5 @@ def final_number(name: str, ranks: int) -> float:
 def test_demo_ends_in_its_number_on_any_number_of_ranks(name: str) -> None:
     alone = final_number(name, 1)
     assert alone == pytest.approx(PINNED[name], rel=BETWEEN_MESHES.get(name, 5e-3))
-    for ranks in (2, 4):
+    for ranks in (2, 4)[: MOST_RANKS.get(name, 4) // 2]:
         assert final_number(name, ranks) == pytest.approx(alone, rel=1e-8)
