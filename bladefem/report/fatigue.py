@@ -15,13 +15,12 @@ from geometry.mesh import Mesh
 from ..errors import InputError
 from ..study.fatigue import Utilisation, haigh_diagram
 from ..study.mistuning.pattern_response import PatternResponse
+from ..study.mistuning.wheel_utilisation import BladeUse, wheel_utilisation
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
-    BladeUse,
     blade_nodes,
     highest_use,
     run_utilisation,
-    wheel_utilisation,
 )
 from ..view.fatigue import draw_utilisation
 from ..view.mesh import save_vtu

@@ -44,6 +44,10 @@ from bladefem.study.mistuning.other_blades import BladeChange, OtherBlades
 from bladefem.study.mistuning.peak_choice import richer_balance
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter, scene_deviations
+from bladefem.study.mistuning.wheel_utilisation import (
+    wheel_utilisation,
+    wheel_utilisation_message,
+)
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
@@ -53,8 +57,6 @@ from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.utilisation import (
     blade_nodes,
     run_utilisation,
-    wheel_utilisation,
-    wheel_utilisation_message,
 )
 from bladefem.wheel.model import Pattern, frequency_pattern
 from bladefem.wheel.solve import free_wheel, solve_wheel

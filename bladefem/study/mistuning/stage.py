@@ -31,7 +31,6 @@ from ..pipeline.damped_motion import DampedStress, stress_of_motion
 from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.stage_inputs import stage_key
-from ..pipeline.utilisation import wheel_utilisation_message
 from .blade_material import deviation_pattern
 from .blade_stress import SolvedWheel, WheelShapes, all_modes, blade_motion
 from .drawn_wheels import drawn_statistics, drawn_wheels
@@ -44,6 +43,7 @@ from .pattern_sentences import pattern_sentences
 from .peak_choice import wanted_truncation
 from .scatter_use import ScatteredUse, scattered_use
 from .validate import refuse_scatter, scene_deviations
+from .wheel_utilisation import wheel_utilisation_message
 from .whole_wheel import WheelSector, blade_readings, reduce_wheel, whole_wheel
 
 
