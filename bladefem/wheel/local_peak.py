@@ -22,6 +22,8 @@ MOST_WIDENINGS = 6
 # of the frequency: from the peak of held means to the first points on both sides, at most. On the
 # shipped wheel points 0.07 % apart take 2 s each, and one 0.4 % away is not reached from the peak
 FIRST_REACH = 1e-3
+# of that: where a point at it is not solved
+NEARER_REACH = 0.5
 # over the largest relative change by free means that was seen: the change at other peaks
 CHANGE_MARGIN = 2.0
 
@@ -133,7 +135,8 @@ def _bracket(respond: Respond, omegas: np.ndarray, i: int) -> np.ndarray | None:
     reach = FIRST_REACH * omegas[i]
     below = min(reach, omegas[i] - omegas[i - 1]) if i > 0 else reach
     above = min(reach, omegas[i + 1] - omegas[i]) if i + 1 < len(omegas) else reach
-    grid = [omegas[i] - below, omegas[i], omegas[i] + above]
+    sides = [_solved_beside(respond, omegas[i], reach) for reach in (-below, above)]
+    grid = [sides[0], omegas[i], sides[1]]
     for _ in range(MOST_WIDENINGS):
         sizes = np.array([respond(w) for w in grid])
         heights = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
@@ -146,6 +149,14 @@ def _bracket(respond: Respond, omegas: np.ndarray, i: int) -> np.ndarray | None:
         else:
             break
     return np.array(grid)
+
+
+def _solved_beside(respond: Respond, omega: float, reach: float) -> float:
+    """The circular frequency that far from another, or nearer where only that one is solved."""
+    far, near = omega + reach, omega + NEARER_REACH * reach
+    if not np.isfinite(respond(far)).all() and np.isfinite(respond(near)).all():
+        return near
+    return far
 
 
 def _joined(

@@ -45,8 +45,11 @@ class WheelPeak:
 
     @property
     def closed_in(self) -> bool:
-        """The maximum lies inside the band."""
-        return self.omegas[0] < self.omega < self.omegas[-1]
+        """The maximum lies between two points next to it that were solved."""
+        place = int(np.searchsorted(self.omegas, self.omega))
+        if place in (0, len(self.omegas) - 1):
+            return False
+        return bool(np.isfinite(self.sizes[[place - 1, place + 1]]).all())
 
 
 def find_wheel_peak(

@@ -15,7 +15,12 @@ from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.reduction.matrices import port_model_from_matrices
-from bladefem.wheel.local_peak import LocalBalances, find_local_peak
+from bladefem.wheel.local_peak import (
+    FIRST_REACH,
+    NEARER_REACH,
+    LocalBalances,
+    find_local_peak,
+)
 from bladefem.wheel.lumped import PLATFORM, TIP, LumpedBlades, lumped_matrices, lumped_pattern
 from bladefem.wheel.model import engine_order, tuned_wheel
 from bladefem.wheel.resonance import find_wheel_peak
@@ -240,6 +245,22 @@ def test_free_means_can_make_another_peak_the_highest(centres, heights, blade):
 
 def test_a_peak_without_a_balance_is_not_searched_again():
     assert find_local_peak(Curves([1.0, 1.2], [1.0, 0.9], [HELD.omega]), HELD, 1e-4) is None
+
+
+FAR, NEAR = HELD.omega * (1 + FIRST_REACH), HELD.omega * (1 + NEARER_REACH * FIRST_REACH)
+
+
+def test_a_nearer_point_takes_the_place_of_one_that_is_not_solved():
+    found = find_local_peak(Curves([HELD.omega + 1e-4, 1.2], [1.0, 0.9], [FAR]), HELD, 1e-4)
+    assert found.peak.height == pytest.approx(1.0, rel=2e-4)
+    assert found.peak.closed_in and found.peak.unsolved == 1
+
+
+def test_a_peak_next_to_points_that_are_not_solved_is_not_closed_in():
+    """The resonance is beyond them, and higher."""
+    curves = Curves([HELD.omega + 0.02, 1.2], [1.0, 0.1], [FAR, NEAR])
+    found = find_local_peak(curves, HELD, 1e-4)
+    assert found.peak.height < 0.5 and not found.peak.closed_in
 
 
 def test_peak_of_a_blade_that_is_not_the_highest():

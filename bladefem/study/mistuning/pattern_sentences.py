@@ -42,7 +42,10 @@ def _peak_sentence(r: PatternResponse) -> str:
         f"stress is {_stress_words(r.highest)}"
     )
     if not r.peak.closed_in:
-        text += "; the highest point is an end of the band, the resonance may be higher"
+        text += (
+            "; the highest point is an end of the band or next to a frequency that was not solved, "
+            "the resonance may be higher"
+        )
     return text + _own_mesh_words(r.highest)
 
 
