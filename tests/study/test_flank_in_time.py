@@ -21,7 +21,7 @@ from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.error_in_time import Marches
 from bladefem.study.pipeline.flank_motions import flank_motions
-from bladefem.study.pipeline.kept_band import kept_band
+from bladefem.study.pipeline.kept_band import band_by_steps, kept_band
 from bladefem.study.pipeline.stability import in_one_body, stability_of
 from verification.paper.plane_row import row_of_blades, whole_model
 
@@ -96,11 +96,15 @@ def truth(model, points):
     return heights.min(), heights.max()
 
 
+def settings_of(family):
+    """Those of the points."""
+    given = first_for(family.modes)
+    return replace(given, harmonics=HARMONICS, samples=256, points=None, chosen=())
+
+
 def test_the_blade_keeps_far_more_beside_the_resonance_than_at_it(model, points, truth):
     family = family_of(model)
-    settings = replace(
-        first_for(family.modes), harmonics=HARMONICS, samples=256, points=None, chosen=()
-    )
+    settings = settings_of(family)
     top = max(points, key=size)
     curve = Checked(settings, [points[0], top], {})
     marks = stability_of(model, curve.points)
@@ -112,8 +116,30 @@ def test_the_blade_keeps_far_more_beside_the_resonance_than_at_it(model, points,
     assert found.kept.lowest == pytest.approx(truth[0], rel=0.1)
 
 
+def test_steps_keep_to_the_band_of_the_plain_march(model, points, truth):
+    """Also where an exact march is possible, which takes far longer."""
+    family = family_of(model)
+    band = Marches(family).band(settings_of(family), points[0])
+    assert band.reason == ""
+    assert band.highest == pytest.approx(truth[1], rel=0.1)
+    assert band.lowest == pytest.approx(truth[0], rel=0.1)
+
+
 def test_the_exact_march_goes_on_until_the_band_is_that_of_the_plain_one(model, points, truth):
     band = kept_band(model, points[0])
     assert band.reason == ""
     assert band.highest == pytest.approx(truth[1], rel=0.1)
     assert band.lowest == pytest.approx(truth[0], rel=0.1)
+
+
+def test_steps_and_the_exact_march_keep_to_one_band_on_a_stiff_contact():
+    """All contacts lift off, and no period is like another."""
+    scene = load_scene("scenes/plane.toml", ["contact.kt=1e8 N/m"])
+    row = row_of_blades(vary(scene, mesh__contact_size=scene.plane.seat_width / 4))
+    stiff = in_one_body(whole_model(scene, row, 8.0))
+    (point,) = response(stiff, 2 * np.pi * np.array([1100.0]), HARMONICS, 256)
+    assert point.converged and point.states["lift"] == len(stiff.springs)
+    exact, by_steps = kept_band(stiff, point), band_by_steps(stiff, point)
+    assert exact.highest > 1.02 * exact.lowest
+    assert by_steps.highest == pytest.approx(exact.highest, rel=3e-3)
+    assert by_steps.lowest == pytest.approx(exact.lowest, rel=3e-3)
