@@ -41,6 +41,7 @@ from bladefem.study.mistuning.drawn_wheels import scatter_balance
 from bladefem.study.mistuning.engine_orders import order_forces, own_harmonic
 from bladefem.study.mistuning.odd_blade import odd_blade_stress
 from bladefem.study.mistuning.other_blades import BladeChange, OtherBlades
+from bladefem.study.mistuning.pattern_sentences import pattern_sentences
 from bladefem.study.mistuning.peak_choice import richer_balance
 from bladefem.study.mistuning.stage import scatter_of_run, with_whole_wheel
 from bladefem.study.mistuning.validate import refuse_scatter, scene_deviations
@@ -260,6 +261,12 @@ def test_a_second_run_finds_the_wheel(folder):
     assert "wheel/utilisation_of_the_worst_blade" in utilisation_drawing(again)
     (worst,) = worst_utilisation(again)
     assert worst.value == used.used.max() <= worst.bound and worst.tuned == tuned.used.max()
+    # any blade within the estimated error of the highest may be that
+    (response,) = again.wheel
+    second = np.sort(response.peak.by_blade)[-2] / response.peak.height
+    for error, told in ((1.01 * (1 - second), True), (0.99 * (1 - second), False)):
+        sentence = pattern_sentences([replace(response, truncation=error)], False)[0]
+        assert ("within that error of the highest: blade" in sentence) == told
     numbers = pattern_headlines(again.wheel, worst_utilisation(again))
     assert [number.value for number in numbers][1] == f"{worst.value:.3g}"
     # another pattern is another response of the same sector

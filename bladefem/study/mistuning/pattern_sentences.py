@@ -46,7 +46,16 @@ def _peak_sentence(r: PatternResponse) -> str:
             "; the highest point is an end of the band or next to a frequency that was not solved, "
             "the resonance may be higher"
         )
-    return text + _own_mesh_words(r.highest)
+    return text + _near_words(r) + _own_mesh_words(r.highest)
+
+
+def _near_words(r: PatternResponse) -> str:
+    """The blades that are lower by less than the error by harmonics; empty where there are none."""
+    if np.isnan(r.truncation):
+        return ""
+    near = np.flatnonzero(r.peak.by_blade > (1 - r.truncation) * r.peak.height)
+    numbers = ", ".join(str(number + 1) for number in near if number != r.peak.blade)
+    return f"; within that error of the highest: blade {numbers}" if numbers else ""
 
 
 def _shape_sentences(r: PatternResponse) -> list[str]:
