@@ -19,6 +19,7 @@ from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.choice import Checked
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline import error_in_time
 from bladefem.study.pipeline.error_in_time import Marches
 from bladefem.study.pipeline.flank_motions import flank_motions
 from bladefem.study.pipeline.kept_band import band_by_steps, kept_band
@@ -123,6 +124,15 @@ def test_steps_keep_to_the_band_of_the_plain_march(model, points, truth):
     assert band.reason == ""
     assert band.highest == pytest.approx(truth[1], rel=0.1)
     assert band.lowest == pytest.approx(truth[0], rel=0.1)
+
+
+def test_the_exact_march_is_asked_where_steps_come_to_no_end(model, points, truth, monkeypatch):
+    lost = replace(band_by_steps(model, points[0]), reason="forces of a step were not found")
+    monkeypatch.setattr(error_in_time, "band_by_steps", lambda *_: lost)
+    family = family_of(model)
+    band = Marches(family).band(settings_of(family), points[0])
+    assert band.reason == ""
+    assert band.highest == pytest.approx(truth[1], rel=0.1)
 
 
 def test_the_exact_march_goes_on_until_the_band_is_that_of_the_plain_one(model, points, truth):

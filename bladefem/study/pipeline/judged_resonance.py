@@ -143,11 +143,9 @@ def _at_the_highest(
 
 
 def _marched(marches: Marches, settings: Settings, point: Solution) -> KeptBand:
-    """What the blade keeps to after an unstable motion: by steps, or where these come to no end,
-    with fewer contact points or exactly.
-    """
+    """What the blade keeps to after an unstable motion."""
     kept = marches.band(settings, point)
-    if kept is None or kept.reason:
+    if kept is None or kept.too_long:
         kept = kept_of_family(marches.models, settings, point)
     return kept
 

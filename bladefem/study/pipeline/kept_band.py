@@ -210,10 +210,15 @@ def kept_band(model: ReducedModel, point: Solution, counted: float = MAX_COUNTED
     Args:
         counted: operations that a march by steps may need, as its first periods show.
     """
+    return exact_band(model, point) or band_by_steps(model, point, counted)
+
+
+def exact_band(model: ReducedModel, point: Solution) -> KeptBand | None:
+    """The same by an exact march; None where contacts have two tangents, or waves travel."""
     try:
         system = time_system(in_one_body(model), point.harmonics)
     except InputError:
-        return band_by_steps(model, point, counted)
+        return None
     periods = LEFT_PERIODS + KEPT_PERIODS
     steps = periods * max(SAMPLES_PER_PERIOD, 2 * np.pi * system.fastest / point.omega)
     if steps > MAX_STEPS:
