@@ -26,6 +26,7 @@ from typing import Any
 import numpy as np
 
 import bladefem
+from bladefem.cli.ranks import exit_code_of
 
 HERE = Path(__file__).resolve()
 ROOT = HERE.parent.parent
@@ -44,11 +45,10 @@ HEADER = (
 )
 
 
-def timed(work: Callable[[], Any]) -> tuple[float, float, Any]:
+def timed(comm: Any, work: Callable[[], Any]) -> tuple[float, float, Any]:
     """Wall-clock time, the largest CPU time of a rank [s], and what came out."""
     from bladefem.fem.compat import MPI
 
-    comm = MPI.COMM_WORLD
     comm.Barrier()
     wall = time.perf_counter()
     cpu = time.process_time()
@@ -58,8 +58,12 @@ def timed(work: Callable[[], Any]) -> tuple[float, float, Any]:
     return time.perf_counter() - wall, used, result
 
 
-def on_ranks(folder: Path) -> None:
-    """The row of one number of ranks, written by rank 0."""
+def on_ranks(folder: Path, given: Any) -> None:
+    """The row of one number of ranks, written by rank 0.
+
+    Args:
+        given: the ranks that work, None for one.
+    """
     from bladefem.fem.compat import MPI
     from bladefem.study.pipeline.bodies import Bodies
     from bladefem.study.pipeline.damper_contact import contact_patches
@@ -67,7 +71,7 @@ def on_ranks(folder: Path) -> None:
     from bladefem.study.pipeline.reduced_sector import reduce_sector
     from geometry.mesh import sector_of
 
-    comm = MPI.COMM_WORLD
+    comm = given or MPI.COMM_WORLD
     scene, mesh = pickle.loads((folder / "mesh.pkl").read_bytes())
     patches = contact_patches(mesh)
     bodies = Bodies(scene, mesh, comm)
@@ -80,14 +84,14 @@ def on_ranks(folder: Path) -> None:
         own = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
         return comm.allreduce(own, MPI.MAX)
 
-    row = dict(zip(("modes", "modes_cpu", "frequencies"), timed(modes), strict=True))
+    row = dict(zip(("modes", "modes_cpu", "frequencies"), timed(comm, modes), strict=True))
     row["memory_modes"] = memory()
-    reduction = timed(lambda: reduce_sector(bodies, patches, DIAMETERS, MODES))
+    reduction = timed(comm, lambda: reduce_sector(bodies, patches, DIAMETERS, MODES))
     row |= dict(zip(("reduction", "reduction_cpu"), reduction[:2], strict=True))
     row["residual"] = [reduction[2].sector[n].residual for n in DIAMETERS]
     row["memory"] = memory()
     if comm.rank == 0:
-        (folder / f"row{comm.size}.pkl").write_bytes(pickle.dumps(row))
+        (folder / f"row{MPI.COMM_WORLD.size}.pkl").write_bytes(pickle.dumps(row))
 
 
 def difference(row: dict[str, Any], one: dict[str, Any]) -> float:
@@ -130,8 +134,9 @@ def main() -> None:
     parser.add_argument("--child", help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.child:
-        on_ranks(Path(options.child))
-        return
+        folder = Path(options.child)
+        # as the command line does: more ranks than cores wait
+        sys.exit(exit_code_of(lambda comm: on_ranks(folder, comm), options))
     from geometry.isolated_process import build_isolated
 
     scene = bladefem.load_scene(options.scene, [f"mesh.size={SIZE}", *options.set])

@@ -21,9 +21,6 @@ from .split_cells import split_cells, vertex_order
 from .topology import CORNERS, DIMENSION, EDGES, FACETS, FAMILY, NODES
 from .whole_cells import padded_cells
 
-# what becomes of linear solids
-LINEAR_SOLID_CHOICES = ("refuse", "promote", "keep")
-
 
 @dataclass(frozen=True)
 class SolidCells:

@@ -1,5 +1,5 @@
 """What goes wrong becomes one sentence and an exit code, on one rank or on many; no rank waits for
-ever.
+ever. Ranks beyond the machine's cores wait without taking one from the others.
 """
 
 from __future__ import annotations
@@ -13,15 +13,21 @@ import time
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any
 
 from ..errors import InputError, NotSolvedError
 from ..util.communicator import Communicator
+from ..util.cores import VARIABLE, ranks_with_cores
 
 # [s] that a failed rank waits for the others to fail as well
 WAIT_FOR_RANKS_SECONDS = 10.0
 # [s] after which a signal that got lost comes again
 REPEAT_SECONDS = 0.1
+# [s] between two looks of a rank without a core
+IDLE_SECONDS = 0.05
+# of the message by which such a rank learns the exit code
+CODE_TAG = 1
 
 
 def communicator() -> Any:
@@ -46,9 +52,58 @@ def exit_code_of(action: Callable[[Any], None], options: argparse.Namespace) -> 
 
 
 def _run_guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
+    """The exit code of an action on the ranks that have cores of their own, which the others wait
+    for.
+    """
     comm = None
     try:
         comm = communicator()
+        working = ranks_with_cores(comm) if comm else [0]
+        if comm is None or len(working) == comm.size:
+            return _run_on(comm, action, stopped)
+        part = comm.Split(0 if comm.rank in working else 1, comm.rank)
+        if comm.rank not in working:
+            return _wait_for_code(comm)
+    except KeyboardInterrupt:
+        return _stop_ranks(comm, stopped)
+    except InputError as error:
+        return _print_error(comm, str(error), 2)
+    if comm.rank == 0:
+        print(
+            f"bladefem: {comm.size} ranks, of which {len(working)} have a core and work; the others "
+            f"wait ({VARIABLE}=1: all work)",
+            file=sys.stderr,
+            flush=True,
+        )
+    code = _run_on(part, partial(_after_petsc, action), stopped)
+    if comm.rank == 0:
+        for rank in sorted(set(range(comm.size)) - set(working)):
+            comm.send(code, rank, CODE_TAG)
+    return code
+
+
+def _after_petsc(action: Callable[[Any], None], comm: Any) -> None:
+    """The action, once PETSc has started on its ranks: it would wait for all of them later."""
+    from ..fem.petsc_start import start_petsc
+
+    start_petsc(comm)
+    action(comm)
+
+
+def _wait_for_code(comm: Any) -> int:
+    """The exit code of rank 0, waited for without taking a core from the ranks that work."""
+    while not comm.Iprobe(source=0, tag=CODE_TAG):
+        time.sleep(IDLE_SECONDS)
+    return int(comm.recv(source=0, tag=CODE_TAG))
+
+
+def _run_on(
+    comm: Any,
+    action: Callable[[Any], None],
+    stopped: list[int],
+) -> int:
+    """The exit code of an action on these ranks, all of which work."""
+    try:
         meeting = comm.Dup() if comm else None
         action(comm)
         return _flush_output()

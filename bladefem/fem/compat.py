@@ -29,10 +29,9 @@ _setdlopenflags = sys.setdlopenflags
 # not even during the import: HDF5's symbols would stay global
 sys.setdlopenflags = lambda flags: None
 try:
-    import petsc4py
+    from .petsc_start import start_petsc
 
-    # else a reader that closes the pipe (| head) aborts MPI
-    petsc4py.init(["bladefem", "-no_signal_handler"])
+    start_petsc()
     import dolfinx
     import dolfinx.fem.petsc
     import ufl

@@ -30,7 +30,6 @@ NUMPY_NEWTON = "NumPy Newton"
 DENSE_LU = "dense LU"
 ITERATIONS = "iterations"
 ITERATIONS_THEN_LU = "iterations, then dense LU"
-ROUTES = (COMPILED_POINT, COMPILED_NEWTON, NUMPY_NEWTON)
 
 # Contact degrees of freedom up to which a point is one compiled call. NumPy's overhead, 0.4 ms a
 # point, is 90 % of a point with one contact and 22 % at 48 degrees of freedom; beyond 200 it is
