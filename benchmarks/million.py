@@ -34,7 +34,7 @@ import json, pickle, sys, time
 from bladefem.fem import body, memory
 if sys.argv[2] != "auto":
     plan = memory.MemoryPlan(1.0, 1.0 if sys.argv[2] == "disk" else 0.0)
-    body.check_memory = lambda dofs, comm: plan
+    body.check_memory = lambda dofs, comm, cut=0: plan
 from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material

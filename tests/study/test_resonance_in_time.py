@@ -47,6 +47,17 @@ def test_the_peak_of_a_fold_is_found_from_a_motion_far_below(folding, omega):
     assert found.frequency == pytest.approx(52.6, rel=5e-3)
 
 
+def test_where_no_period_is_like_another_the_end_is_marched_on(folding, monkeypatch):
+    """As if the band of a steady motion were wide: it keeps what it is."""
+    start = solve(folding.model, 360.0, 15, 512)
+    found = resonance_in_time(family_of(folding.model), SETTINGS, start)
+    monkeypatch.setattr(module, "WIDE_BAND", -1.0)
+    longer = resonance_in_time(family_of(folding.model), SETTINGS, start)
+    assert longer.periods == found.periods + module.CALMING_PERIODS
+    assert longer.highest == pytest.approx(found.highest, rel=2e-3)
+    assert longer.error == found.error
+
+
 def test_a_search_that_is_not_closed_in_says_so(folding):
     """From far below the resonance, where the low amplitude makes the steps far too long."""
     start = solve(folding.model, 250.0, 15, 512)
