@@ -22,6 +22,11 @@ class Library:
     packed: str
     version: str
 
+    @property
+    def megabytes(self) -> float:
+        """What it adds to a page [MB]."""
+        return len(self.packed) / 1e6
+
 
 @lru_cache(maxsize=1)
 def chart_library() -> Library | None:
