@@ -135,7 +135,9 @@ def test_a_march_contradicts_a_balance_of_another_amplitude_than_its_highest(
 def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypatch, kept_to, given):
     """Else it moves most there: 224.9 um that a march brings to 212.8 are not 204 um elsewhere."""
     points = [
-        SimpleNamespace(omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]))
+        SimpleNamespace(
+            omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]), states={"lift": 0}
+        )
         for k, a in enumerate((0.5, 0.9, 1.2))
     ]
     for point in points:
@@ -384,7 +386,9 @@ def test_a_motion_that_more_contact_points_leave_is_marched_with_them(monkeypatc
     the point that is given say so.
     """
     points = [
-        SimpleNamespace(omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]))
+        SimpleNamespace(
+            omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]), states={"lift": 0}
+        )
         for k, a in enumerate((0.5, 1.2, 0.9))
     ]
     for point in points:

@@ -21,6 +21,7 @@ from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
 from .kept_band import KeptBand, kept_of_family
 from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
+from .strong_drive import band_of_strong_drives
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,8 @@ def judged_resonance(
     marches: Marches, curve: Checked, scene: Scene, sought: bool = False
 ) -> JudgedResonance:
     """Judge a curve, and march from its highest point where that is unstable, be it with more
-    contact points than the curve has, and from unstable motions beside the resonance.
+    contact points than the curve has, from unstable motions beside the resonance, and from strong
+    drives where contacts lift off.
 
     That one gives way to the highest that was judged and is not, where the blade is known to keep
     to less than that: else the blade moves most next to the unstable one.
@@ -79,7 +81,12 @@ def judged_resonance(
     if sought:
         return JudgedResonance(highest, marks)
     judged = _at_the_highest(marches, curve, scene, marks, place)
-    return _with_flanks(marches, curve, judged, highest, scene.accuracy)
+    judged = _with_flanks(marches, curve, judged, highest, scene.accuracy)
+    driven = band_of_strong_drives(marches, curve, judged.amplitude)
+    if driven is None:
+        return judged
+    point, kept = driven
+    return JudgedResonance(point, marks, kept, contradicted=True, unmarched=judged.unmarched)
 
 
 def _with_flanks(

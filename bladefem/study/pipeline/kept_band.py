@@ -104,6 +104,10 @@ class KeptBand:
     too_long: bool = False
     # it went on widening to the end of the march
     widens: bool = False
+    # times its own excitation by which the blade was driven before, and the amplitude that it keeps
+    # at most without that [m]
+    drive: float = 1.0
+    without_drive: float = np.nan
 
     def holds(self, amplitude: float, accuracy: float) -> bool:
         """It is known, and within a relative accuracy of an amplitude."""
@@ -116,11 +120,15 @@ class KeptBand:
         if self.reason:
             return f"what the blade does there is not known: {self.reason}"
         coarse = "" if self.points is None else f" with {self.points} contact points a seat"
+        more = ", and the band still widens" if self.widens else ""
+        if self.drive > 1:
+            coarse += f" after {self.drive:g} times its excitation"
+            more += f"; without such a start it keeps {1e6 * self.without_drive:.4g} um at most"
         if self.highest <= (1 + ONE_MOTION) * self.lowest:
             return (
                 f"marched in time{coarse}, it ends on a motion of {1e6 * self.highest:.4g} um there"
+                f"{more}"
             )
-        more = ", and the band still widens" if self.widens else ""
         return (
             f"marched in time{coarse} over {self.periods} periods, it keeps between "
             f"{1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um there{more}"

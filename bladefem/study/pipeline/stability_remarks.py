@@ -187,10 +187,11 @@ def _from_a_flank(curve: Curve) -> str:
         return ""
     top = int(np.where(curve.converged, curve.amplitude, 0.0).argmax())
     judged = "was not judged" if curve.stability[top] == UNKNOWN else "lasts"
+    driven = curve.kept is not None and curve.kept.drive > 1
+    why = "a strong drive leads to a higher one" if driven else "motions beside it do not last"
     return (
         f"load {curve.load:g} N: the highest motion, {1e6 * curve.amplitude[top]:.4g} um at "
-        f"{curve.frequency[top]:.5g} Hz, {judged}, and motions beside it do not last; "
-        f"{_marched_from_flank(curve)}"
+        f"{curve.frequency[top]:.5g} Hz, {judged}, and {why}; {_marched_from_flank(curve)}"
     )
 
 

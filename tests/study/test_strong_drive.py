@@ -1,0 +1,45 @@
+"""Motions that a blade keeps only after a strong drive, against all motions of the balance."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from models import folding_pair, rebounding
+
+from bladefem.hbm.branches import find_branches
+from bladefem.hbm.solution import size
+from bladefem.hbm.solve import solve
+from bladefem.hbm.sweep import response
+from bladefem.study.pipeline.kept_band import band_by_steps
+from bladefem.study.pipeline.strong_drive import STRONG_DRIVE, band_after_strong_drive
+
+BAND = (249.0, 431.0)
+
+
+def test_the_high_motion_beside_a_low_one_is_found():
+    """Two masses and a gap: a march from the low motion stays, one from a strong drive does not."""
+    model = folding_pair()
+    omega = 340.0
+    low = solve(model, omega, 15, 512)
+    assert low.converged
+    stays = band_by_steps(model, low)
+    assert stays.highest == pytest.approx(size(low), rel=1e-2)
+    found = band_after_strong_drive(model, low, 1.02 * size(low))
+    assert found is not None and found.drive == STRONG_DRIVE
+    # the highest of all motions near that frequency
+    sweep = [p for p in response(model, np.linspace(*BAND, 40), 7, 256) if p.converged]
+    points = find_branches(model, BAND, sweep, 7, 256, peak=1e-4).points
+    near = sorted(points, key=lambda p: abs(p.omega - omega))[:6]
+    highest = max(near, key=size)
+    assert size(highest) > 2 * size(low)
+    at_omega = solve(model, omega, 15, 512, start=highest)
+    assert at_omega.converged
+    assert found.highest == pytest.approx(size(at_omega), rel=2e-2)
+    assert found.lowest > 0.98 * found.highest
+
+
+def test_where_one_motion_is_all_there_is_none_is_told():
+    """A contact so far open that it never closes."""
+    model = rebounding(1.0, 1e3, 0.04)
+    point = solve(model, 0.985, 1, 64)
+    assert band_after_strong_drive(model, point, 1.02 * size(point)) is None
