@@ -30,7 +30,9 @@ MULTIPLIERS = np.array([1.03, 1.04, 1.06, 1.05, 1.0, 1.01, 2.0])
 
 def point_at(omega, height):
     probe = np.array([[0.0], [height]])
-    return SimpleNamespace(omega=omega, frequency=omega, probe=probe, converged=True)
+    return SimpleNamespace(
+        omega=omega, frequency=omega, probe=probe, converged=True, states={"lift": 0}
+    )
 
 
 @pytest.fixture

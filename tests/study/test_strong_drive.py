@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from models import folding_pair, rebounding
@@ -10,15 +13,29 @@ from bladefem.hbm.branches import find_branches
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
+from bladefem.study.adaptive.family import family_of
+from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline.error_in_time import Marches
 from bladefem.study.pipeline.kept_band import band_by_steps
-from bladefem.study.pipeline.strong_drive import STRONG_DRIVE, band_after_strong_drive
+from bladefem.study.pipeline.strong_drive import (
+    STRONG_DRIVE,
+    _same_band,
+    band_after_strong_drive,
+    band_of_strong_drives,
+)
 
 BAND = (249.0, 431.0)
 
 
-def test_the_high_motion_beside_a_low_one_is_found():
-    """Two masses and a gap: a march from the low motion stays, one from a strong drive does not."""
-    model = folding_pair()
+@pytest.fixture(scope="module")
+def folding():
+    """Two masses and a gap."""
+    return folding_pair()
+
+
+def test_the_high_motion_beside_a_low_one_is_found(folding):
+    """A march from the low motion stays there, one from a strong drive does not."""
+    model = folding
     omega = 340.0
     low = solve(model, omega, 15, 512)
     assert low.converged
@@ -43,3 +60,38 @@ def test_where_one_motion_is_all_there_is_none_is_told():
     model = rebounding(1.0, 1e3, 0.04)
     point = solve(model, 0.985, 1, 64)
     assert band_after_strong_drive(model, point, 1.02 * size(point)) is None
+
+
+def test_both_amplitudes_are_told(folding):
+    """That after a strong drive is given, with that without it in the sentence."""
+    low = solve(folding, 340.0, 15, 512)
+    # as if it lifted off
+    low = replace(low, states={**low.states, "lift": 1})
+    curve = SimpleNamespace(points=[low], settings=Settings(10, 15, 512, "rigid"))
+    point, kept = band_of_strong_drives(Marches(family_of(folding)), curve, size(low))
+    assert point is low and kept.highest > 2 * size(low)
+    assert "after 16 times its excitation" in kept.sentence
+    assert f"without such a start it keeps {1e6 * size(low):.4g} um" in kept.sentence
+
+
+def test_closed_contacts_are_not_driven_hard():
+    """Where nothing lifts off there is one motion."""
+    curve = SimpleNamespace(
+        points=[SimpleNamespace(probe=np.array([[0.0], [1.0]]), states={"lift": 0}, converged=True)]
+    )
+    assert band_of_strong_drives(None, curve, 1.0) is None
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ([7.0, 7.1], [7.02, 7.1], True),
+        # wide, and as wide as before
+        ([2.1, 7.28], [2.0, 7.25], True),
+        # its ends come together
+        ([9.88, 10.64], [10.1, 10.5], False),
+        ([5.0, 7.3], [5.0, 6.9], False),
+    ],
+)
+def test_a_band_that_narrows_is_on_its_way_down(one, other, same):
+    assert _same_band(np.array(one), np.array(other)) == same
