@@ -19,7 +19,6 @@ from bladefem.study.pipeline.error_in_time import Marches
 from bladefem.study.pipeline.kept_band import band_by_steps
 from bladefem.study.pipeline.strong_drive import (
     STRONG_DRIVE,
-    _same_band,
     band_after_strong_drive,
     band_of_strong_drives,
 )
@@ -80,18 +79,3 @@ def test_closed_contacts_are_not_driven_hard():
         points=[SimpleNamespace(probe=np.array([[0.0], [1.0]]), states={"lift": 0}, converged=True)]
     )
     assert band_of_strong_drives(None, curve, 1.0) is None
-
-
-@pytest.mark.parametrize(
-    ("one", "other", "same"),
-    [
-        ([7.0, 7.1], [7.02, 7.1], True),
-        # wide, and as wide as before
-        ([2.1, 7.28], [2.0, 7.25], True),
-        # its ends come together
-        ([9.88, 10.64], [10.1, 10.5], False),
-        ([5.0, 7.3], [5.0, 6.9], False),
-    ],
-)
-def test_a_band_that_narrows_is_on_its_way_down(one, other, same):
-    assert _same_band(np.array(one), np.array(other)) == same
