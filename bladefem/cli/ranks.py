@@ -70,8 +70,8 @@ def _run_guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
         return _print_error(comm, str(error), 2)
     if comm.rank == 0:
         print(
-            f"bladefem: {comm.size} ranks, of which {len(working)} have a core and work; the others "
-            f"wait ({VARIABLE}=1: all work)",
+            f"bladefem: {comm.size} ranks, of which {len(working)} have a core and work; "
+            f"the others wait ({VARIABLE}=1: all work)",
             file=sys.stderr,
             flush=True,
         )
