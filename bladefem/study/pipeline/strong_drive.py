@@ -52,8 +52,8 @@ FINE_LOOKS = 4
 # relative rise over the resonance that counts
 WORTHWHILE_RISE = 0.02
 # operations of all marches of a curve, some 8 s of plane blades with eight points a seat. The
-# shipped wedge would need more: under 18, 36, 73 and 121 N, with 8 points a seat at four
-# frequencies, 8 times its excitation led to no other motion
+# shipped wedge would need more: under 18, 36, 73 and 121 N, 8 times its excitation led to no
+# other motion at two to seven frequencies
 MOST_OPERATIONS = 1.5e10
 
 
