@@ -21,7 +21,7 @@ from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
 from .kept_band import KeptBand, kept_of_family
 from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
-from .strong_drive import band_of_strong_drives
+from .strong_drive import strong_drives
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class JudgedResonance:
     beside: float = 0.0
     # why not all marches from unstable motions beside it are known; else ""
     unmarched: str = ""
+    # contacts lift off, and marches after a strong drive take too long
+    undriven: bool = False
 
     @property
     def amplitude(self) -> float:
@@ -82,11 +84,12 @@ def judged_resonance(
         return JudgedResonance(highest, marks)
     judged = _at_the_highest(marches, curve, scene, marks, place)
     judged = _with_flanks(marches, curve, judged, highest, scene.accuracy)
-    driven = band_of_strong_drives(marches, curve, judged.amplitude)
-    if driven is None:
-        return judged
-    point, kept = driven
-    return JudgedResonance(point, marks, kept, contradicted=True, unmarched=judged.unmarched)
+    driven = strong_drives(marches, curve, judged.amplitude)
+    if driven.point is None:
+        return replace(judged, undriven=driven.too_long)
+    return JudgedResonance(
+        driven.point, marks, driven.kept, contradicted=True, unmarched=judged.unmarched
+    )
 
 
 def _with_flanks(

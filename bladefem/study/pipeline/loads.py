@@ -112,6 +112,8 @@ class Curve:
     beside: float = 0.0
     # why not all of these marches are known; else ""
     unmarched: str = ""
+    # contacts lift off, and marches after a strong drive take too long: a higher motion may exist
+    undriven: bool = False
     # a march from the resonance that its estimated error was taken from; None where richer balances
     # tell it
     in_time: KeptBand | None = None
@@ -360,6 +362,7 @@ def curve_of(
         marched_instead=judged.contradicted,
         beside=judged.beside,
         unmarched=judged.unmarched,
+        undriven=judged.undriven,
         in_time=in_time,
         sought=sought,
         interval=_interval_of(scene, model, curve, top),

@@ -21,6 +21,7 @@ from .stability_remarks import (
     ripple_sentence,
     stability_sentence,
     unjudged_sentence,
+    undriven_sentence,
     unmarched_sentence,
     unstable_sentence,
 )
@@ -69,7 +70,8 @@ def response_remarks(
     if scene.study.stability:
         verdicts = [(c.stability, c.multiplier) for c in curves]
         remarks.append(method(stability_sentence(verdicts, judged)))
-    remarks.extend(map(method, filter(None, [ripple_sentence(curves, scene.accuracy)])))
+    told = ripple_sentence(curves, scene.accuracy), undriven_sentence(curves)
+    remarks.extend(map(method, filter(None, told)))
     remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
     unstable = (unstable_sentence(c, scene.accuracy) for c in curves)
     remarks.extend(warning(text) for text in unstable if text)

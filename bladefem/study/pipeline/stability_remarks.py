@@ -218,6 +218,17 @@ def unmarched_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
+def undriven_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances beside which no motion was sought that only a strong drive leads to, or ""."""
+    loads = ", ".join(f"{c.load:g} N" for c in curves if c.undriven)
+    if not loads:
+        return ""
+    return (
+        f"under {loads} contacts lift off, and motions that only a strong drive leads to were not "
+        "sought: marches of this model take too long"
+    )
+
+
 def unjudged_sentence(curves: Sequence[Curve]) -> str:
     """The resonances whose motion could not be judged, among others that were, or ""."""
     asked = [c for c in curves if c.sought is None and (c.stability != UNKNOWN).any()]
