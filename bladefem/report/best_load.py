@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..study.pipeline.best_load import BestLoad, studied_load
-from ..study.pipeline.loads import Curve
+from ..study.pipeline.loads import Curve, lower_studied
 
 # share of the excitation's work that friction takes at an optimum that is one of damping; below it
 # the amplitude is low for another reason, such as a stiffer blade
@@ -46,6 +46,9 @@ def best_load_table(found: Sequence[BestLoad], curves: Sequence[Curve] = ()) -> 
         curve = next((c for c in curves if (c.load, c.mass) == here), None)
         if curve is not None:
             row |= _judged(curve, row["error"])
+            lower = lower_studied(curve, curves)
+            if lower is not None:
+                row |= {"amplitude": np.nan, "reason": _passed_over(curve, lower)}
         del row["tried"], row["heights"]
         rows.append(row)
     table = pd.DataFrame(rows)
@@ -68,6 +71,14 @@ def _judged(curve: Curve, searched: float) -> dict[str, float]:
         "input_work": curve.peak.work.input,
         "error": np.inf if np.isinf(searched) else error,
     }
+
+
+def _passed_over(there: Curve, lower: Curve) -> str:
+    """Why the load of a search is not the best one."""
+    return (
+        f"it compares balances, and the blade keeps {1e6 * there.peak_amplitude:.4g} um under "
+        f"{there.load:.4g} N, {1e6 * lower.peak_amplitude:.4g} um under {lower.load:.4g} N"
+    )
 
 
 def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | None:

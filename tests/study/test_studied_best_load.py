@@ -85,6 +85,20 @@ def test_the_report_begins_with_the_curve_at_the_best_load():
     assert best_curve(curves, []) == 0
 
 
+def test_a_load_under_which_the_blade_keeps_far_more_is_not_the_best():
+    """Plane blades: balances of 2.05 um under 2.547 N, where a strong drive leads to 14.2 um."""
+    curves = [curve(2.547, 14.2e-6), curve(3.0, 2.58e-6)]
+    assert best_curve(curves, [best(2.547)]) == 1
+    (row,) = best_load_table([best(2.547)], curves).to_dict("records")
+    assert np.isnan(row["amplitude"]) and row["searched_amplitude"] == 150e-6
+    assert "14.2 um under 2.547 N, 2.58 um under 3 N" in row["reason"]
+    # as far as its own error tells
+    curves[1].error = 3.0
+    assert best_curve(curves, [best(2.547)]) == 0
+    curves[1].error = None
+    assert best_curve(curves, [best(2.547)]) == 0
+
+
 def test_its_row_is_that_of_its_response():
     """The balance of the shipped wedge is 150 um high there; the blade keeps to 147.5."""
     (row,) = best_load_table([best(78.9107)], [curve(78.91, 147.5e-6)]).to_dict("records")

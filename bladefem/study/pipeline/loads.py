@@ -300,11 +300,29 @@ def study_loads(
 
 def best_curve(curves: Sequence[Curve], best: Sequence[BestLoad]) -> int:
     """Number of the curve that the report begins with: at the best load found, of the damper with
-    the lowest resonance there; the one with the lowest resonance where none was found.
+    the lowest resonance there; the one with the lowest resonance where none was found, or another
+    load keeps the blade lower.
     """
     found = {(studied_load(b), b.mass) for b in best if not b.reason}
-    there = [k for k, c in enumerate(curves) if (c.load, c.mass) in found]
+    there = [
+        k
+        for k, c in enumerate(curves)
+        if (c.load, c.mass) in found and lower_studied(c, curves) is None
+    ]
     return min(there or range(len(curves)), key=lambda k: curves[k].peak_amplitude)
+
+
+def lower_studied(there: Curve, curves: Sequence[Curve]) -> Curve | None:
+    """The curve of the same damper whose resonance is the lowest, where that is below another one
+    by more than twice its estimated error; else None.
+
+    A search compares balances; under its load the blade may keep to a far higher motion, and under
+    others not.
+    """
+    lowest = min((c for c in curves if c.mass == there.mass), key=lambda c: c.peak_amplitude)
+    error = np.inf if lowest.error is None else lowest.error
+    sure = (1 + 2 * error) * lowest.peak_amplitude
+    return lowest if sure < there.peak_amplitude else None
 
 
 def longest_first(loads: Sequence[float], best: float = 0.0) -> list[int]:

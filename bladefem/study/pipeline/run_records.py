@@ -21,7 +21,7 @@ from ...scene.tables import Scene
 from ..adaptive.settings import Settings
 from ..influences import Influence
 from ..modes.stress import Strength
-from .best_load import BestLoad
+from .best_load import BestLoad, studied_load
 from .body_mesh import ModeErrors
 from .damped_motion import DampedStress
 from .history import DamperMass
@@ -97,7 +97,7 @@ class Response:
     def best_found(self) -> BestLoad | None:
         """The best load there, where it was searched and found."""
         there = self.curves[self.best_curve]
-        found = (b for b in self.best if not b.reason and b.mass == there.mass)
+        found = (b for b in self.best if (studied_load(b), b.mass) == (there.load, there.mass))
         return next(found, None)
 
     def __repr__(self) -> str:
