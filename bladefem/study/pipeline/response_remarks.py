@@ -20,8 +20,8 @@ from .stability_remarks import (
     folded_sentence,
     ripple_sentence,
     stability_sentence,
-    unjudged_sentence,
     undriven_sentence,
+    unjudged_sentence,
     unmarched_sentence,
     unstable_sentence,
 )
