@@ -346,7 +346,7 @@ class Mistuning:
         "whole wheel",
         choices=("whole wheel", "damper law"),
         help="how 'bladefem scatter' solves its wheels: each in full, or all by the law of one "
-        "damper in one harmonic, some of them checked in full",
+        "damper, some of them checked in full",
     )
     checks: int = quantity(
         4, "1", 2, 1000, "wheels of each load that are solved in full where the damper law is asked"

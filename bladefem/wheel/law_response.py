@@ -1,4 +1,4 @@
-"""Many wheels at once by the law of one damper: amplitudes of all blades of a family, one harmonic.
+"""Many wheels at once by the law of one damper: first harmonic of all blades of a family.
 
     (z_d / |y_d|^2) a_d + (E a + g(a))_d = F_d,    z_d = omega_d^2 - Omega^2 + i Omega c_d,
 
@@ -16,7 +16,8 @@ import numpy as np
 
 from ..util.arrays import RealArray
 from ..util.curve_extremum import parabola_at_middle
-from .damper_law import DamperLaw, Family
+from .damper_law import DamperLaw
+from .family import Family
 from .model import Pattern
 from .statistics import Amplification, no_checks
 

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy import linalg
 
-from bladefem.data import RigidBody
+from bladefem.data import Elements, RigidBody
 from bladefem.errors import InputError
-from bladefem.study.mistuning.law_level import _changed_law
-from bladefem.wheel import damper_law as subject
-from bladefem.wheel.damper_law import damper_law, family_of_modes, scaled_elements
+from bladefem.reduction.assemble import recombine_contact
+from bladefem.study.mistuning.law_level import changed_law
+from bladefem.wheel.damper_balance import solve_damper, stuck_displacements
+from bladefem.wheel.damper_law import damper_law, law_harmonics, scaled_elements
+from bladefem.wheel.family import family_of_modes
 from bladefem.wheel.law_response import (
     LawWheels,
     ScatteredLaw,
@@ -21,6 +23,7 @@ from bladefem.wheel.law_response import (
 )
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.scatter import Scatter, drawn_deviations, drawn_patterns
+from bladefem.wheel.solve import solve_wheel
 from bladefem.wheel.statistics import one_body_respond, scatter_statistics
 
 BLADES = LumpedBlades()
@@ -46,9 +49,10 @@ def test_law_is_the_balance_of_its_damper(made):
     wheel, family, law = made
     a, b = amplitudes()
     imposed = np.outer(a, family.before) + np.outer(b, family.after)
-    start = subject._stuck_motion(wheel, family, imposed)
-    _, force, error = subject._small_balance(wheel, wheel.elements, family, imposed, start, 64)
-    assert error.max() < 1e-6
+    start = stuck_displacements(wheel, family, imposed)
+    balanced = solve_damper(wheel, wheel.elements, family, imposed, start, 64)
+    assert balanced.residual.max() < 1e-6
+    force = balanced.force[:, :, 0]
     expected = np.array([force @ family.before, force @ family.after])
     found, _ = law.forces(a, b)
     off = np.linalg.norm(found - expected, axis=0)
@@ -140,7 +144,7 @@ def test_heavier_dampers_by_the_change_of_the_law():
     wheel = replace(lumped_wheel(BLADES, 9, 1.0, 1e5, 3.0), damper=light)
     family = family_of_modes(wheel, OWN)
     nominal = damper_law(wheel, family, SIZES, 64)
-    changed = [_changed_law(wheel, OWN, 0, SIZES, 64, "mass", factor) for factor in (1.15, 0.85)]
+    changed = [changed_law(wheel, family, 0, SIZES, 64, "mass", factor) for factor in (1.15, 0.85)]
     law = ScatteredLaw(nominal, {"mass": (changed[0], changed[1], 0.15)})
     a, b = amplitudes()
     found, _ = law.forces(a, b, {"mass": np.full(len(a), 1.07)})
@@ -166,6 +170,46 @@ def test_masses_deviate(made):
     np.testing.assert_allclose(found.factor, whole.factor, rtol=0.05)
     without = by_law(made, drawn, {})
     assert abs(without.factor / whole.factor - 1).max() > 0.08
+
+
+def inclined_wheel():
+    """Dampers between the platforms that a stretch also presses together or lets go."""
+    wheel = lumped_wheel(BLADES, 9, 1.0, 1e5, 3.0)
+    inclined = np.array([[-0.7], [0.7]])
+    sectors = {d: recombine_contact(body, inclined) for d, body in wheel.sectors.items()}
+    element = Elements(
+        np.array([1e5]), np.array([1e5]), np.array([0.3]), np.array([2.0]), tangents=1
+    )
+    return replace(wheel, sectors=sectors, elements=element)
+
+
+def test_harmonics_are_those_of_the_tuned_wheel():
+    """Contacts that lift off: from the balance of all sectors, what is left over in the damper's is
+    the family's motion in the first harmonic and nothing in the others.
+    """
+    wheel = inclined_wheel()
+    point = solve_wheel(wheel, OWN, 5, 128)
+    assert point.converged
+    assert point.shares[0, 0, 2] > 0.1
+    family = family_of_modes(wheel, OWN, harmonics=5)
+    w, f = ((q[0, 0, :, 1::2] - 1j * q[0, 0, :, 2::2])[None] for q in (point.w, point.f))
+    imposed = w[0] + np.einsum("hij,jh->ih", family.flexibility, f[0])
+    size = abs(imposed[:, 0]).max()
+    np.testing.assert_allclose(imposed[:, 1:], 0, atol=1e-6 * size)
+    turn = np.exp(2j * np.pi * 9 / BLADES.count)
+    amplitude = imposed[:, 0] / (family.before + turn * family.after)
+    np.testing.assert_allclose(amplitude, amplitude[0], rtol=1e-6)
+    # and back again, from full stick
+    start = stuck_displacements(wheel, family, imposed[None, :, 0])
+    found = solve_damper(wheel, wheel.elements, family, imposed[None, :, 0], start, 128)
+    assert found.solved.all()
+    np.testing.assert_allclose(found.force, f, atol=1e-5 * abs(f).max())
+
+
+def test_law_gives_up_harmonics_that_it_cannot_afford():
+    assert law_harmonics(24, 3) == 3
+    assert law_harmonics(120, 3) == 2
+    assert law_harmonics(400, 3) == 1
 
 
 def test_what_has_no_law_is_refused(made):

@@ -129,7 +129,9 @@ def _by_damper_law(
     band = float(grid[0]), float(grid[-1])
     scatter = scene_scatter(scene)
     mode = scene.excitation.mode - 1
-    cheap = on_root(comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, band))
+    cheap = on_root(
+        comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, chosen.harmonics, band)
+    )
 
     def whole_peak(pattern: Pattern) -> float:
         respond = drawn.respond(pattern, chosen)

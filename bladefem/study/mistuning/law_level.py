@@ -11,7 +11,8 @@ import numpy as np
 
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
-from ...wheel.damper_law import DamperLaw, Family, damper_law, family_of_modes, scaled_elements
+from ...wheel.damper_law import DamperLaw, damper_law, law_harmonics, scaled_elements
+from ...wheel.family import Family, family_of_modes
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
 from ...wheel.model import Pattern, Wheel, heavier_damper
 from ...wheel.scatter import Scatter, drawn_deviations
@@ -35,6 +36,7 @@ def law_level(
     scatter: Scatter,
     curve: Curve,
     mode: int,
+    harmonics: int,
     band: tuple[float, float],
 ) -> Amplification:
     """Statistics of all patterns under the load of a curve, by the law of one damper.
@@ -42,13 +44,15 @@ def law_level(
     Args:
         scatter: that the patterns were drawn with.
         mode: number of the excited mode, from 0.
+        harmonics: of the whole wheels; the law has as many where it can.
         band: ends of the frequencies [rad/s].
 
     Raises:
         InputError: the damper has too many contact nodes, or the forces are no travelling wave.
         NotSolvedError: the damper's small balance has no solution somewhere.
     """
-    family = family_of_modes(wheel, curve.peak.omega, mode)
+    harmonics = law_harmonics(len(wheel.rows), harmonics)
+    family = family_of_modes(wheel, curve.peak.omega, mode, harmonics)
     law = _scattered_law(wheel, family, scatter, curve, mode)
     draws = drawn_deviations(wheel.count, scatter, len(patterns))
     factors = draws.factors(scatter)
@@ -67,36 +71,40 @@ def _scattered_law(
     order = travelling_order(wheel) or 0
     motion = curve.peak_amplitude / abs(family.probe[order])
     sizes = MOTION_RANGE[0] * motion, MOTION_RANGE[1] * motion
-    samples = max(curve.settings.samples, 16)
+    harmonics = len(family.flexibility)
+    samples = max(curve.settings.samples, 8 * (harmonics + 1))
     changed = {}
     for name in CHANGED_PARAMETERS:
         share = DEVIATIONS_OF_CHANGE * getattr(scatter, name)
         if share > 0:
             more, less = (
-                _changed_law(wheel, curve.peak.omega, mode, sizes, samples, name, factor)
+                changed_law(wheel, family, mode, sizes, samples, name, factor)
                 for factor in (1 + share, 1 - share)
             )
             changed[name] = (more, less, share)
     return ScatteredLaw(damper_law(wheel, family, sizes, samples), changed)
 
 
-def _changed_law(
+def changed_law(
     wheel: Wheel,
-    omega: float,
+    family: Family,
     mode: int,
     sizes: tuple[float, float],
     samples: int,
     name: str,
     factor: float,
 ) -> DamperLaw:
-    """The law of a damper with another friction coefficient, contact stiffness or mass."""
+    """The law of a damper with another friction coefficient, contact stiffness or mass than the one
+    whose law stands on a family.
+    """
     elements = None
     if name == "mass":
         # of the same load: that is a parameter of its own
         wheel = replace(wheel, damper=heavier_damper(wheel.damper, factor))
+        family = family_of_modes(wheel, family.at, mode, len(family.flexibility))
     else:
         elements = scaled_elements(wheel, name, factor)
-    return damper_law(wheel, family_of_modes(wheel, omega, mode), sizes, samples, elements)
+    return damper_law(wheel, family, sizes, samples, elements)
 
 
 def with_checks(
