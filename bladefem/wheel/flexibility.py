@@ -34,9 +34,9 @@ class WheelFlexibility:
     Z: np.ndarray
     T: np.ndarray
     # (H+1, N, q, q) dynamic stiffness of the deviations, and LU factors of 1 + E A_yy in the
-    # readings that deviate; empty: tuned
+    # readings that deviate, None of a mean that takes no part; empty: tuned
     E: np.ndarray
-    factors: tuple[tuple[np.ndarray, np.ndarray], ...]
+    factors: tuple[tuple[np.ndarray, np.ndarray] | None, ...]
     # (N q,) true where a reading deviates in some harmonic
     active: np.ndarray
     # readings of blades and dampers that the deviations act on
@@ -70,8 +70,10 @@ class WheelFlexibility:
 
     def deviation_forces(self, y: np.ndarray) -> np.ndarray:
         """(N, q, H+1) forces of the deviations for tuned readings y (N, q, H+1)."""
-        z = np.empty_like(y)
+        z = np.zeros_like(y)
         for h, factors in enumerate(self.factors):
+            if factors is None:
+                continue
             right = (self.E[h] @ y[:, :, h, None]).ravel()
             solved = np.zeros_like(right)
             solved[self.active] = linalg.lu_solve(factors, right[self.active], check_finite=False)
@@ -98,20 +100,24 @@ def wheel_flexibility(
         wheel.kept["last"] = (key, Z, modal_flexibility(parts, Z), {})
     _, Z, T, shared = wheel.kept["last"]
     E = np.zeros((0, 0, 0, 0))
-    factors: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    factors: tuple[tuple[np.ndarray, np.ndarray] | None, ...] = ()
     active = np.zeros(0, dtype=bool)
     dampers = pattern.heavier_dampers
     deviating = parts.deviating(dampers)
     if not pattern.tuned:
         if dampers not in shared:
             shared[dampers] = [
-                _reading_matrix(parts, T, h, deviating) for h in range(harmonics + 1)
+                _reading_matrix(parts, T, h, deviating) if h > 0 or wheel.coupled else None
+                for h in range(harmonics + 1)
             ]
         sizes = parts.blade.stop - parts.blade.start, deviating.stop - parts.damper.start
         E = np.array([pattern.change(h * omega, *sizes) for h in range(harmonics + 1)])
         # one blade of another shape has many readings, the others none or few
         active = E.any(axis=(0, 3)).ravel()
-        factors = tuple(_factorise_blocks(A, E[h], active) for h, A in enumerate(shared[dampers]))
+        factors = tuple(
+            None if A is None else _factorise_blocks(A, E[h], active)
+            for h, A in enumerate(shared[dampers])
+        )
     return WheelFlexibility(omega, parts, Z, T, E, factors, active, deviating, wheel.coupled)
 
 
