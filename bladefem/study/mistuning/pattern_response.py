@@ -30,8 +30,10 @@ from .peak_choice import (
 
 # points of the first look at a band
 FIRST_LOOK_POINTS = 15
-# of the linear wheel, which costs little
-LINEAR_POINTS = 300
+# of the linear wheel in the half-power width of its resonances, and over the band at least and at
+# most; the search closes in on what they find
+LINEAR_POINTS_PER_WIDTH = 4
+LINEAR_POINTS = 60, 300
 # resonances with sticking dampers that are looked at
 MAX_RESONANCES = 8
 
@@ -144,12 +146,27 @@ def _stuck_peaks(
     harmonic: int,
 ) -> np.ndarray:
     """Circular frequencies of the highest resonances with all contacts sticking."""
-    fine = np.linspace(low, high, LINEAR_POINTS)
+    fine = _linear_grid(wheel, low, high)
     highest = max(wheel.excitation)
     sizes = [stuck_wheel(wheel, w / harmonic, highest, pattern)[:, 1:, 0] for w in fine]
     height = np.linalg.norm(np.array(sizes), axis=2).max(axis=1)
     inner = np.flatnonzero((height[1:-1] >= height[:-2]) & (height[1:-1] >= height[2:])) + 1
     return fine[inner[np.argsort(-height[inner])[:MAX_RESONANCES]]]
+
+
+def _linear_grid(wheel: Wheel, low: float, high: float) -> np.ndarray:
+    """(k,) circular frequencies of a band, as dense as the resonances of the linear wheel are wide
+    by the damping of its modes.
+    """
+    fewest, most = LINEAR_POINTS
+    if wheel.influence is not None:
+        # the flow may narrow some of them
+        return np.linspace(low, high, most)
+    middle = 0.5 * (low + high)
+    damping = wheel.damping
+    loss = np.min(damping.viscous(np.array(middle)) / middle + damping.structural)
+    wanted = LINEAR_POINTS_PER_WIDTH * (high / low - 1) / max(loss, np.finfo(float).tiny)
+    return np.linspace(low, high, int(np.clip(wanted, fewest, most)))
 
 
 def pattern_response(
@@ -266,7 +283,7 @@ def _free_factor(
     harmonic: int,
 ) -> float:
     """Amplification without dampers over the same band."""
-    fine = np.linspace(grid[0], grid[-1], LINEAR_POINTS)
+    fine = _linear_grid(wheel, grid[0], grid[-1])
     highest = max(wheel.excitation)
 
     def respond(pattern: Pattern) -> float:
