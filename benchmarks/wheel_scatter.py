@@ -17,6 +17,7 @@ from bladefem.view.wheel import draw_bands
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.scatter import Scatter, drawn_patterns
 from bladefem.wheel.statistics import (
+    band_search,
     free_respond,
     one_body_respond,
     quantile_interval,
@@ -37,16 +38,20 @@ def main() -> None:
     patterns = dict.fromkeys(LIMITS, drawn)
     start = time.process_time()
     free = scatter_statistics(
-        {0.0: wheels[1.0]},
         {0.0: drawn},
-        lambda load, pattern: own * np.linspace(0.96, 1.04, 120),
-        free_respond,
+        band_search(
+            {0.0: wheels[1.0]},
+            lambda load, pattern: own * np.linspace(0.96, 1.04, 120),
+            free_respond,
+        ),
     )
     found = scatter_statistics(
-        wheels,
         patterns,
-        lambda load, pattern: own * np.linspace(0.96, 1.05, 90),
-        lambda wheel, pattern: one_body_respond(wheel, pattern, 3, 64),
+        band_search(
+            wheels,
+            lambda load, pattern: own * np.linspace(0.96, 1.05, 90),
+            lambda wheel, pattern: one_body_respond(wheel, pattern, 3, 64),
+        ),
     )
     seconds = time.process_time() - start
     p95 = quantile_interval(free.factor[0], 0.95)

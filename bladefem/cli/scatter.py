@@ -27,7 +27,8 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
     used, remarks = scatter_utilisation(run, found)
-    sentences = [*scatter_sentences(found), *use_sentences(used), *remarks]
+    held = scene.model.static == "uncoupled"
+    sentences = [*scatter_sentences(found, held), *use_sentences(used), *remarks]
     table, files = on_root(comm, lambda: _write_results(found, used, sentences, folder, scene))
     tell(
         options,

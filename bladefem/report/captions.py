@@ -83,7 +83,8 @@ CAPTIONS = {
     "wheel/blades": "Each blade: deviation of its first family, largest amplitude over the band, "
     "and friction work of its damper at the wheel's highest point.",
     "wheel/scatter": "Highest blade of the drawn wheels over the tuned wheel under the same load: "
-    "quantiles with 95 % intervals, and the worst wheel.",
+    "quantiles with 95 % intervals, which hold what checked wheels are off the calibrated damper "
+    "law, and the worst wheel.",
     "wheel/scatter_optima": "The load that is best for the tuned wheel, and the one that is best "
     "for 95 % of the drawn wheels, with 95 % intervals by the bootstrap over the wheels.",
     "wheel/scatter_utilisation": "What of the material's endurance the drawn wheels use: the tuned "

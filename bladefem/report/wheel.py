@@ -18,7 +18,6 @@ from ..wheel.statistics import (
     Amplification,
     RobustOptimum,
     best_load,
-    quantile_interval,
     robust_optimum,
 )
 from .fatigue import WorstUse
@@ -135,10 +134,11 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
         row = {
             "load": load,
             "tuned_amplitude": found.tuned[i],
+            **_free_columns(found, i),
             "wheels": found.factor.shape[1],
         }
         for share in SCATTER_QUANTILES:
-            q = quantile_interval(found.factor[i], share)
+            q = found.quantile(i, share)
             name = f"p{100 * share:g}"
             row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
         if found.checked.shape[1]:
@@ -153,6 +153,19 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
         }
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _free_columns(found: Amplification, load: int) -> dict[str, float]:
+    """The tuned wheel with held means, what free ones change in the amplification of wheels solved
+    in full, at most, and how many of these keep held ones; empty where these were not asked for.
+    """
+    if not len(found.tuned_held) or np.isnan(found.tuned_held[load]):
+        return {}
+    return {
+        "tuned_amplitude_held": found.tuned_held[load],
+        "free_change": abs(found.free_change[load]).max(initial=0.0),
+        "kept_held": int(np.count_nonzero(~found.free[load])),
+    }
 
 
 def optima_of_scatter(found: Amplification) -> tuple[tuple[float, float], RobustOptimum]:
@@ -228,7 +241,7 @@ def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
 def scatter_headlines(found: Amplification) -> list[Headline]:
     """First numbers of the statistics; one load alone has no optimum."""
     i = int(np.argmin(found.tuned))
-    factor = quantile_interval(found.factor[i], SHARE)
+    factor = found.quantile(i, SHARE)
     return [
         *(_optimum_headlines(found) if len(found.loads) > 1 else []),
         Headline(
@@ -280,22 +293,22 @@ def _upper(value: float) -> str:
     return f"{value:.3g}" if np.isfinite(value) else "unknown, too few wheels"
 
 
-def scatter_sentences(found: Amplification) -> list[str]:
-    """The answer, and what it is worth."""
+def scatter_sentences(found: Amplification, held_means: bool = False) -> list[str]:
+    """The answer, and what it is worth.
+
+    Args:
+        held_means: the scene holds the dampers' mean displacements.
+    """
     sentences = _optimum_sentences(found)
     i = int(np.argmin(found.tuned))
-    q = quantile_interval(found.factor[i], 0.95)
+    q = found.quantile(i, 0.95)
     sentences.append(
         f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of {found.peak.shape[1]} "
         f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {_upper(q.high)})"
     )
     if found.checked.shape[1]:
-        errors = 100 * found.check_errors
-        sentences.append(
-            f"wheels by the law of one damper; {found.checked.size} of them solved in full, from "
-            f"the lowest to the highest of each load, are off by {errors.min():+.2g} to "
-            f"{errors.max():+.2g} % in amplification"
-        )
+        sentences.append(_law_sentence(found))
+    sentences.extend(_mean_sentences(found, held_means))
     if len(found.harmonics):
         parts = [
             f"{load:g} N: {H} ({'unknown' if np.isnan(error) else f'{100 * error:.2g} %'})"
@@ -308,6 +321,51 @@ def scatter_sentences(found: Amplification) -> list[str]:
     lost = int(found.unsolved.sum())
     sentences.append(f"{lost} of {int(found.points.sum())} points not solved")
     return sentences
+
+
+def _law_sentence(found: Amplification) -> str:
+    """What the damper law is off by, and what was done about it."""
+    errors = 100 * found.check_errors
+    factors = ", ".join(f"{factor:.4g}" for factor in found.calibration)
+    rest = 100 * (np.array([found.law_bounds(i) for i in range(len(found.loads))]) - 1)
+    return (
+        f"wheels by the law of one damper; {found.checked.size} of them solved in full, from the "
+        f"lowest to the highest of each load: the law is off by {errors.min():+.2g} to "
+        f"{errors.max():+.2g} % in amplification, so that its amplifications are multiplied by "
+        f"{factors}; the intervals take in what these wheels are still off, {rest.min():+.2g} to "
+        f"{rest.max():+.2g} %; how often another wheel is further off is not known"
+    )
+
+
+def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
+    """How the mean displacements of the dampers count; one a load, or one for all."""
+    if held_means:
+        return [
+            "mean displacements are held in the preload state (model.static): what free ones "
+            "change is not known"
+        ]
+    said = []
+    for i, held in enumerate(found.tuned_held):
+        if np.isnan(held):
+            continue
+        known = found.free[i]
+        if not known.any():
+            said.append(
+                f"{found.loads[i]:g} N: mean displacements are held in the preload state, no "
+                "balance with free ones was found"
+            )
+            continue
+        change = 100 * found.free_change[i][known]
+        kept = np.count_nonzero(~known)
+        lost = f"; {kept} of these wheels keep their amplification with held ones" if kept else ""
+        said.append(
+            f"{found.loads[i]:g} N: wheels solved in full have free mean displacements, dampers "
+            "walk where friction alone holds them, and so has the tuned wheel; against held ones "
+            f"this changes the tuned amplitude by {100 * (found.tuned[i] / held - 1):+.2g} % and "
+            f"the amplification of {len(change)} wheels by {change.min():+.2g} to "
+            f"{change.max():+.2g} %{lost}"
+        )
+    return said
 
 
 def _optimum_sentences(found: Amplification) -> list[str]:
@@ -344,12 +402,10 @@ def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]
     """Bands against the load, and the histogram at the tuned optimum."""
     bands = {}
     for share in SCATTER_QUANTILES[:2]:
-        rows = [quantile_interval(row, share) for row in found.peak]
-        bands[f"{100 * share:g} % of wheels"] = np.array([[q.value, q.low, q.high] for q in rows])
+        rows = np.array([[q.value, q.low, q.high] for q in found.quantiles(share)])
+        bands[f"{100 * share:g} % of wheels"] = found.tuned[:, None] * rows
     i = int(np.argmin(found.tuned))
-    marks = {
-        f"{100 * s:g} %": quantile_interval(found.factor[i], s).value for s in SCATTER_QUANTILES[:2]
-    }
+    marks = {f"{100 * s:g} %": found.quantile(i, s).value for s in SCATTER_QUANTILES[:2]}
     drawings: dict[str, Callable[[Path], object]] = {
         "wheel/scatter_histogram": partial(
             view.draw_histogram, found.factor[i], marks, f"{found.loads[i]:g} N"

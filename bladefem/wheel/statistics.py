@@ -17,18 +17,22 @@ from ..hbm.model import ReducedModel
 from ..hbm.solution import Solution
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
-from ..util.arrays import IntegerArray, RealArray
+from ..util.arrays import BooleanArray, IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, without_progress
 from .model import Pattern, Wheel
 from .one_body import one_body_model
+from .pattern_peak import PatternPeak, compared_peaks, peak_heights
 from .resonance import Respond, find_wheel_peak
 from .solve import TUNED_PATTERN, WheelSolution, solve_wheel
 
 CONFIDENCE_LEVEL = 0.95
 # of the bootstrap: its intervals then move by a few per cent of their width
 BOOTSTRAP_RESAMPLES = 1000
+
+# looks for the highest blade of a pattern under a damper load [N]
+Search = Callable[[float, Pattern], PatternPeak]
 
 
 @dataclass(frozen=True)
@@ -78,20 +82,54 @@ class Amplification:
     # samples leave in a peak's height; empty where nothing chose them
     harmonics: IntegerArray = field(default_factory=lambda: np.zeros(0, dtype=int))
     truncation: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (L,) peak of the tuned wheel with held mean displacements [m], where free ones were asked for:
+    # NaN elsewhere; empty where no whole wheel was solved
+    tuned_held: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (L, C) of the wheels that were checked, (L, W) where all are whole: amplification with held
+    # means of both, and whether the one with free means is known, which then counts
+    held_factor: RealArray = field(default_factory=lambda: np.zeros((0, 0)))
+    # (L,) by which the amplifications of the damper law are multiplied, the mean ratio of checked
+    # wheels; empty where all wheels are whole
+    calibration: RealArray = field(default_factory=lambda: np.zeros(0))
+    free: BooleanArray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @property
     def check_errors(self) -> np.ndarray:
-        """(L, C) relative difference of the amplification from the whole wheel's."""
-        return np.take_along_axis(self.factor, self.checked, axis=1) / self.whole - 1
+        """(L, C) relative difference of the law's amplification from the whole wheel's."""
+        by_law = np.take_along_axis(self.factor, self.checked, axis=1)
+        if len(self.calibration):
+            by_law = by_law / self.calibration[:, None]
+        return by_law / self.whole - 1
 
     @property
     def factor(self) -> np.ndarray:
         """(L, W) amplification over the tuned wheel under the same load [1]."""
         return self.peak / self.tuned[:, None]
 
+    @property
+    def free_change(self) -> np.ndarray:
+        """As `held_factor`: relative change of the amplification by free means."""
+        whole = self.whole if self.checked.shape[1] else self.factor
+        return whole / self.held_factor - 1
+
+    def law_bounds(self, load: int) -> tuple[float, float]:
+        """Lowest and highest amplification of checked wheels over that by the calibrated law, of
+        the load with a number; 1 lies between them.
+        """
+        ratios = self.whole[load] / self.factor[load, self.checked[load]]
+        return float(ratios.min(initial=1.0)), float(ratios.max(initial=1.0))
+
+    def quantile(self, load: int, share: float) -> Quantile:
+        """Of the amplification under the load with a number: the interval is that of the sample,
+        widened by what checked wheels are off the calibrated law.
+        """
+        found = quantile_interval(self.factor[load], share)
+        low, high = self.law_bounds(load)
+        return Quantile(found.value, low * found.low, high * found.high)
+
     def quantiles(self, share: float) -> list[Quantile]:
         """Of the amplification under each load."""
-        return [quantile_interval(row, share) for row in self.factor]
+        return [self.quantile(i, share) for i in range(len(self.loads))]
 
 
 def quantile_interval(
@@ -119,58 +157,81 @@ def quantile_interval(
 
 
 def scatter_statistics(
-    wheels: Mapping[float, Wheel],
     patterns: Mapping[float, Sequence[Pattern]],
-    grid: Callable[[float, Pattern], np.ndarray],
-    respond: Callable[[Wheel, Pattern], Respond],
+    search: Search,
     comm: Communicator | None = None,
-    tolerance: float = 5e-3,
     progress: Progress = without_progress,
 ) -> Amplification:
     """Peaks of all patterns under all loads; wheels are dealt out over the ranks.
 
     Args:
-        wheels: damper load [N] to the tuned wheel under it.
-        patterns: damper load to the patterns, as many for each.
-        grid: damper load and pattern to the first circular frequencies of the search.
-        respond: what solves one pattern at one frequency.
-        tolerance: relative error of a peak's height by the search.
+        patterns: damper load [N] to the patterns, as many for each.
+        search: looks for the highest blade, of the tuned wheel too.
         progress: wraps the list of wheels of this rank.
     """
-    loads = list(wheels)
+    loads = list(patterns)
     sizes = {len(patterns[load]) for load in loads}
     if len(sizes) != 1 or not loads:
         raise InputError(f"patterns: {sorted(sizes)} for the loads, expected the same number")
+    return joined_loads(
+        [_statistics_of_load(load, patterns[load], search, comm, progress) for load in loads]
+    )
+
+
+def _statistics_of_load(
+    load: float,
+    patterns: Sequence[Pattern],
+    search: Search,
+    comm: Communicator | None,
+    progress: Progress,
+) -> Amplification:
+    """Peaks of all patterns under one load."""
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
-    shape = (len(loads), sizes.pop())
-    parts = [np.zeros(shape) for _ in range(5)]
-    tuned = np.zeros((2, len(loads)))
-    for i, load in enumerate(loads):
-        wheel = wheels[load]
-        mine = range(rank, shape[1], ranks)
-        reference = find_wheel_peak(
-            respond(wheel, TUNED_PATTERN), grid(load, TUNED_PATTERN), tolerance
-        )
-        tuned[:, i] = reference.height, reference.omega
-        for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
-            pattern = patterns[load][j]
-            peak = find_wheel_peak(respond(wheel, pattern), grid(load, pattern), tolerance)
-            row = (peak.height, peak.blade, peak.omega, peak.unsolved, len(peak.omegas))
-            for part, value in zip(parts, row, strict=True):
-                part[i, j] = value
+    mine = range(rank, len(patterns), ranks)
+    tuned = search(load, TUNED_PATTERN)
+    rows = np.zeros((7, len(patterns)))
+    for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
+        found = search(load, patterns[j])
+        # where the tuned wheel has no free means, the others' do not count
+        peak = found.held if tuned.free is None else found.peak
+        rows[:3, j] = peak_heights(found)
+        rows[3:, j] = peak.blade, peak.omega, peak.unsolved, len(peak.omegas)
     if comm is not None:
-        parts = [comm.allreduce(part) for part in parts]
-    peaks, blades, omegas, unsolved, points = parts
+        rows = comm.allreduce(rows)
+    compared = compared_peaks(np.column_stack([peak_heights(tuned), rows[:3]]))
+    blade, omega, unsolved, points = rows[3:]
     return Amplification(
-        np.array(loads),
-        tuned[0],
-        tuned[1],
-        peaks,
-        blades.astype(int),
-        omegas,
-        unsolved.astype(int),
-        points.astype(int),
-        *no_checks(len(loads)),
+        np.array([load]),
+        np.array([compared.tuned]),
+        np.array([tuned.peak.omega]),
+        compared.height[None],
+        blade.astype(int)[None],
+        omega[None],
+        unsolved.astype(int)[None],
+        points.astype(int)[None],
+        *no_checks(1),
+        tuned_held=np.array([compared.tuned_held]),
+        held_factor=compared.held_factor[None],
+        free=compared.free[None],
+    )
+
+
+def band_search(
+    wheels: Mapping[float, Wheel],
+    grid: Callable[[float, Pattern], np.ndarray],
+    respond: Callable[[Wheel, Pattern], Respond],
+    tolerance: float = 5e-3,
+) -> Search:
+    """A search over a band, with the means as the wheels have them.
+
+    Args:
+        wheels: damper load [N] to the tuned wheel under it.
+        grid: damper load and pattern to the first circular frequencies of the search.
+        respond: what solves one pattern at one frequency.
+        tolerance: relative error of a peak's height by the search.
+    """
+    return lambda load, pattern: PatternPeak(
+        find_wheel_peak(respond(wheels[load], pattern), grid(load, pattern), tolerance)
     )
 
 
@@ -212,7 +273,8 @@ def robust_optimum(
     The interval is the bootstrap's: wheels are drawn again with replacement, each with its peaks
     under all loads, as the same patterns are under each of them (Efron and Tibshirani, An
     Introduction to the Bootstrap, 1993, Sect. 13.3). It knows the scatter of the sample, not what
-    lies between the loads.
+    lies between the loads. That of the height is widened by what checked wheels are off the law
+    under any of the loads.
 
     Args:
         share: of the wheels that stay below.
@@ -227,10 +289,11 @@ def robust_optimum(
     low, high = np.percentile(ends, [tail, 100 - tail], axis=0)
     load, height = best_load(found.loads, np.quantile(found.peak, share, axis=1))
     lowest = heights.argmin(axis=1)
+    bounds = np.array([found.law_bounds(i) for i in range(loads)])
     return RobustOptimum(
         share,
         Quantile(load, float(low[0]), float(high[0])),
-        Quantile(height, float(low[1]), float(high[1])),
+        Quantile(height, float(low[1] * bounds[:, 0].min()), float(high[1] * bounds[:, 1].max())),
         float(np.mean((lowest == 0) | (lowest == loads - 1))),
     )
 

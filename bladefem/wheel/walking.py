@@ -84,6 +84,14 @@ def walking_motions(wheel: Wheel) -> RealArray:
     return unresisted(B, springs, normal.ravel(), UNRESISTED_NORMAL).reshape(n, d, -1)
 
 
+def with_free_means(wheel: Wheel) -> Wheel | None:
+    """The wheel with free mean displacements; None where no damper has a motion that friction alone
+    resists.
+    """
+    free = replace(wheel, coupled=True)
+    return free if walking_motions(free).shape[2] else None
+
+
 def _rigid_motions(wheel: Wheel) -> np.ndarray:
     """(n d, r) of the damper's contacts."""
     damper = wheel.damper

@@ -24,7 +24,7 @@ from bladefem.wheel.law_response import (
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.scatter import Scatter, drawn_deviations, drawn_patterns
 from bladefem.wheel.solve import solve_wheel
-from bladefem.wheel.statistics import one_body_respond, scatter_statistics
+from bladefem.wheel.statistics import band_search, one_body_respond, scatter_statistics
 
 BLADES = LumpedBlades()
 M, K, _ = lumped_matrices(BLADES)
@@ -95,10 +95,12 @@ def by_law(made, patterns, factors, changed=None):
 
 def by_balance(wheel, patterns):
     return scatter_statistics(
-        {3.0: wheel},
         {3.0: patterns},
-        lambda load, pattern: OWN * np.linspace(0.96, 1.05, 61),
-        lambda w, p: one_body_respond(w, p, 1, 64),
+        band_search(
+            {3.0: wheel},
+            lambda load, pattern: OWN * np.linspace(0.96, 1.05, 61),
+            lambda w, p: one_body_respond(w, p, 1, 64),
+        ),
     )
 
 

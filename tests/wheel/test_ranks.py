@@ -13,7 +13,7 @@ import numpy as np
 from mpi4py import MPI
 from bladefem.wheel.lumped import LumpedBlades, lumped_pattern, lumped_wheel
 from bladefem.wheel.scatter import Scatter, drawn_patterns
-from bladefem.wheel.statistics import scatter_statistics, wheel_respond
+from bladefem.wheel.statistics import band_search, scatter_statistics, wheel_respond
 
 blades = LumpedBlades(count=6)
 wheels = {limit: lumped_wheel(blades, 2, 1.0, 1e5, limit) for limit in (2.0, 6.0)}
@@ -22,10 +22,12 @@ drawn = drawn_patterns(
 )
 grid = 2900.0 * np.linspace(0.9, 1.1, 21)
 found = scatter_statistics(
-    wheels,
     dict.fromkeys(wheels, drawn),
-    lambda load, pattern: grid,
-    lambda wheel, pattern: wheel_respond(wheel, pattern, 1, 32),
+    band_search(
+        wheels,
+        lambda load, pattern: grid,
+        lambda wheel, pattern: wheel_respond(wheel, pattern, 1, 32),
+    ),
     MPI.COMM_WORLD,
 )
 if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:

@@ -13,10 +13,11 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress
 from ...wheel.model import Pattern, Wheel, frequency_pattern
-from ...wheel.resonance import find_wheel_peak
+from ...wheel.pattern_peak import PatternPeak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.solve import TUNED_PATTERN
-from ...wheel.statistics import Amplification, Respond, scatter_statistics, wheel_respond
+from ...wheel.statistics import Amplification, scatter_statistics
+from ...wheel.walking import with_free_means
 from ..adaptive.choice import solver_options
 from ..pipeline.loads import Curve
 from .engine_orders import own_harmonic
@@ -24,11 +25,10 @@ from .law_level import law_level, with_checks
 from .other_blades import OtherBlades
 from .pattern_response import frequency_grid
 from .peak_choice import (
-    SEARCH_TOLERANCE,
     ChosenPeak,
     chosen_peak,
     first_balance,
-    in_common_period,
+    pattern_peak,
     wanted_truncation,
 )
 from .validate import LAW_LEVEL, scene_scatter
@@ -48,6 +48,9 @@ class DrawnWheels:
     patterns: list[Pattern]
     # largest relative deviation of a blade's frequency, roughly
     spread: float
+    # the same wheel with free means, by which peaks are searched again; None where the scene holds
+    # them, or no damper has a motion that friction alone resists
+    free: Wheel | None = None
 
     @property
     def harmonic(self) -> int:
@@ -58,10 +61,17 @@ class DrawnWheels:
         """Circular frequencies at which the resonance with a pattern is looked for [rad/s]."""
         return frequency_grid(self.wheel, self.curve, pattern, self.spread, self.harmonic)
 
-    def respond(self, pattern: Pattern, chosen: ChosenPeak) -> Respond:
-        """The wheel's motion with a pattern, by the harmonics that were chosen."""
-        options = solver_options(self.scene.accuracy)
-        return wheel_respond(self.wheel, pattern, chosen.harmonics, chosen.samples, options)
+    def peak(self, pattern: Pattern, chosen: ChosenPeak) -> PatternPeak:
+        """The highest blade with a pattern, by the harmonics that were chosen."""
+        return pattern_peak(
+            self.wheel,
+            self.free,
+            pattern,
+            self.grid(pattern),
+            (chosen.harmonics, chosen.samples),
+            self.harmonic,
+            solver_options(self.scene.accuracy),
+        )
 
 
 def drawn_wheels(
@@ -86,7 +96,9 @@ def drawn_wheels(
         return pattern if others is None else others.added(pattern, wheel.count)
 
     patterns = drawn_patterns(wheel, scene_scatter(scene), scene.mistuning.wheels, made)
-    return DrawnWheels(scene, wheel, curve, patterns, spread)
+    held = scene.model.static == "uncoupled"
+    free = None if held else with_free_means(wheel)
+    return DrawnWheels(scene, wheel, curve, patterns, spread, free)
 
 
 def drawn_statistics(
@@ -114,6 +126,7 @@ def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
         solver_options(drawn.scene.accuracy),
         wanted_truncation(drawn.scene),
         SCATTER_HARMONICS,
+        drawn.free,
     )
 
 
@@ -132,12 +145,14 @@ def _by_damper_law(
     cheap = on_root(
         comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, chosen.harmonics, band)
     )
-
-    def whole_peak(pattern: Pattern) -> float:
-        respond = drawn.respond(pattern, chosen)
-        return find_wheel_peak(respond, drawn.grid(pattern), SEARCH_TOLERANCE).height
-
-    return with_checks(cheap, drawn.patterns, whole_peak, scene.mistuning.checks, comm, progress)
+    return with_checks(
+        cheap,
+        drawn.patterns,
+        lambda pattern: drawn.peak(pattern, chosen),
+        scene.mistuning.checks,
+        comm,
+        progress,
+    )
 
 
 def _by_whole_wheels(
@@ -147,14 +162,10 @@ def _by_whole_wheels(
     progress: Progress,
 ) -> Amplification:
     """All wheels one by one, dealt out over the ranks."""
-    load = drawn.curve.load
     return scatter_statistics(
-        {load: drawn.wheel},
-        {load: drawn.patterns},
-        lambda _, pattern: drawn.grid(pattern),
-        lambda _, pattern: in_common_period(drawn.respond(pattern, chosen), drawn.harmonic),
+        {drawn.curve.load: drawn.patterns},
+        lambda _, pattern: drawn.peak(pattern, chosen),
         comm,
-        SEARCH_TOLERANCE,
         progress,
     )
 

@@ -15,6 +15,7 @@ from ...wheel.damper_law import DamperLaw, damper_law, law_harmonics, scaled_ele
 from ...wheel.family import Family, family_of_modes
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
 from ...wheel.model import Pattern, Wheel, heavier_damper
+from ...wheel.pattern_peak import PatternPeak, compared_peaks, peak_heights
 from ...wheel.scatter import Scatter, drawn_deviations
 from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification
@@ -110,34 +111,43 @@ def changed_law(
 def with_checks(
     found: Amplification,
     patterns: list[Pattern],
-    whole_peak: Callable[[Pattern], float],
+    whole_peak: Callable[[Pattern], PatternPeak],
     checks: int,
     comm: Communicator | None,
     progress: Progress = without_progress,
 ) -> Amplification:
     """Statistics of one load with some wheels solved whole, from the lowest to the highest.
 
-    The tuned peak becomes the whole wheel's, and all peaks keep their amplification: the family's
-    one mode leaves the same part out of both.
+    The tuned peak becomes the whole wheel's: the family's one mode leaves the same part out of both
+    and the amplification is the law's, times the mean ratio of the wheels that are solved whole to
+    it.
 
     Args:
-        whole_peak: height of a pattern's highest blade by the whole wheel [m].
+        whole_peak: a pattern's highest blade by the whole wheel.
         checks: wheels that are solved, dealt out over the ranks.
     """
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
     order = np.argsort(found.factor[0])
     places = np.unique(np.linspace(0, len(order) - 1, checks).round().astype(int))
     chosen = order[places[::-1]]
-    heights = np.zeros(1 + len(chosen))
-    mine = range(rank, len(heights), ranks)
+    solved = [TUNED_PATTERN, *(patterns[i] for i in chosen)]
+    heights = np.zeros((3, len(solved)))
+    mine = range(rank, len(solved), ranks)
     for i in progress(list(mine), f"checks under {found.loads[0]:g} N", len(mine)):
-        heights[i] = whole_peak(TUNED_PATTERN if i == 0 else patterns[chosen[i - 1]])
+        heights[:, i] = peak_heights(whole_peak(solved[i]))
     if comm is not None:
         heights = comm.allreduce(heights)
+    compared = compared_peaks(heights)
+    whole = compared.height / compared.tuned
+    calibration = float(np.mean(whole / found.factor[0, chosen]))
     return replace(
         found,
-        tuned=heights[:1],
-        peak=found.factor * heights[0],
+        tuned=np.array([compared.tuned]),
+        peak=calibration * found.factor * compared.tuned,
         checked=chosen[None],
-        whole=(heights[1:] / heights[0])[None],
+        whole=whole[None],
+        calibration=np.array([calibration]),
+        tuned_held=np.array([compared.tuned_held]),
+        held_factor=compared.held_factor[None],
+        free=compared.free[None],
     )

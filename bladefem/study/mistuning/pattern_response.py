@@ -15,7 +15,7 @@ from ...wheel.resonance import WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
-from ...wheel.walking import walking_motions
+from ...wheel.walking import with_free_means
 from ..pipeline.loads import Curve
 from .deciding_blades import BladeStress, DecidingBlade, SearchedWheel, deciding_blades
 from .other_blades import OtherBlades
@@ -197,7 +197,7 @@ def pattern_response(
         held_means: the scene holds them, and nobody asks what free ones do.
     """
     grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
-    free = None if held_means else _free_wheel(wheel)
+    free = None if held_means else with_free_means(wheel)
     found = chosen_peak(
         wheel,
         pattern,
@@ -229,12 +229,6 @@ def pattern_response(
         others,
         lost,
     )
-
-
-def _free_wheel(wheel: Wheel) -> Wheel | None:
-    """The wheel with free means; None where no damper has a motion that friction alone resists."""
-    free = replace(wheel, coupled=True)
-    return free if walking_motions(free).shape[2] else None
 
 
 def _with_tuned(

@@ -10,6 +10,7 @@ from ...hbm.solver.newton import Options
 from ...scene.tables import Scene
 from ...wheel.local_peak import LocalBalances, LocalPeak, find_local_peak
 from ...wheel.model import Pattern, Wheel
+from ...wheel.pattern_peak import PatternPeak
 from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, solve_wheel
 from ...wheel.statistics import wheel_respond
@@ -116,6 +117,32 @@ def chosen_peak(
         if not _asks_for_more(judged, wanted, limit):
             return replace(found, truncation=judged.change)
         H, samples = judged.harmonics, judged.samples
+
+
+def pattern_peak(
+    wheel: Wheel,
+    free: Wheel | None,
+    pattern: Pattern,
+    grid: np.ndarray,
+    balance: tuple[int, int],
+    harmonic: int,
+    options: Options,
+) -> PatternPeak:
+    """The highest blade by given harmonics and samples, with held means over the band and with free
+    ones round its peaks; the other arguments are those of `chosen_peak`.
+
+    Args:
+        balance: harmonics and samples of the common period.
+    """
+    held = LocalBalances(wheel, pattern, *balance, options)
+    first = find_wheel_peak(in_common_period(held, harmonic), grid, SEARCH_TOLERANCE)
+    if free is None:
+        return PatternPeak(first)
+    # what Newton does not reach from the nearest walking balance nothing else is likely to
+    simply = replace(options, fallbacks=False)
+    near = held.points[first.omega / harmonic]
+    balances = LocalBalances(free, pattern, *balance, simply, near)
+    return PatternPeak(first, local_peak(balances, first, harmonic), True)
 
 
 def local_peak(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...wheel.statistics import Amplification, Quantile, quantile_interval
+from ...wheel.statistics import Amplification, Quantile
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.utilisation import highest_use, run_utilisation
 
@@ -25,12 +25,11 @@ class ScatteredUse:
     load: float
     # utilisation of the tuned wheel
     tuned: float
-    # utilisation of the highest blade that SHARE of the wheels stay below, with the interval of
-    # confidence that the number of wheels leaves
+    # utilisation of the highest blade that SHARE of the wheels stay below, with the interval that
+    # the number of wheels leaves, and what checked wheels are off the law of one damper
     share: Quantile
     # upper end of that interval with the upper ends of the errors of mesh and loading history
-    # (contact tractions), and with what checked wheels exceed the law of one damper by; infinite
-    # with too few wheels
+    # (contact tractions); infinite with too few wheels
     highest: float
 
     @property
@@ -51,10 +50,8 @@ def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
         tuned = float(used.used[used.worst])
         places = [i for i, one in enumerate(found.loads) if one == load]
         for i in places:
-            factor = quantile_interval(found.factor[i], SHARE)
+            factor = found.quantile(i, SHARE)
             share = Quantile(*(tuned * one for one in (factor.value, factor.low, factor.high)))
-            # what the law of one damper was found to miss
-            low = 1 + min(found.check_errors[i].min(initial=0.0), 0.0)
-            highest = highest_use(run, number, used) * factor.high / low
+            highest = highest_use(run, number, used) * factor.high
             rows.append(ScatteredUse(load, tuned, share, highest))
     return rows
