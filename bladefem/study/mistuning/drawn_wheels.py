@@ -62,16 +62,21 @@ class DrawnWheels:
         return frequency_grid(self.wheel, self.curve, pattern, self.spread, self.harmonic)
 
     def peak(self, pattern: Pattern, chosen: ChosenPeak) -> PatternPeak:
-        """The highest blade with a pattern, by the harmonics that were chosen."""
-        return pattern_peak(
+        """The highest blade with a pattern, by the harmonics that were chosen.
+
+        Where the first wheel drawn has no balance with free means none is looked for: that takes
+        ten times as long as the rest, and is as little likely.
+        """
+        found = pattern_peak(
             self.wheel,
-            self.free,
+            None if chosen.free is None else self.free,
             pattern,
             self.grid(pattern),
             (chosen.harmonics, chosen.samples),
             self.harmonic,
             solver_options(self.scene.accuracy),
         )
+        return replace(found, asked=self.free is not None)
 
 
 def drawn_wheels(

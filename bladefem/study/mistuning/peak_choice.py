@@ -23,6 +23,9 @@ MOST_HARMONICS = 15
 JUDGING_HARMONICS = 7
 # flexibility products of one point up to which all points of a search may be solved like it
 MOST_SEARCH_PRODUCTS = 400
+# Newton iterations of a balance with free means, one of many wheels: one that is not found takes as
+# long as it may
+MOST_WALKING_ITERATIONS = 25
 # relative error of a peak's height by the search over frequencies
 SEARCH_TOLERANCE = 0.01
 
@@ -139,7 +142,7 @@ def pattern_peak(
     if free is None:
         return PatternPeak(first)
     # what Newton does not reach from the nearest walking balance nothing else is likely to
-    simply = replace(options, fallbacks=False)
+    simply = replace(options, fallbacks=False, iterations=MOST_WALKING_ITERATIONS)
     near = held.points[first.omega / harmonic]
     balances = LocalBalances(free, pattern, *balance, simply, near)
     return PatternPeak(first, local_peak(balances, first, harmonic), True)
