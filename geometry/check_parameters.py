@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # cells; as finalise_mesh.MAX_CELLS, which counts again once the volumes are known
 MAX_CELLS = 3e6
+# faces at which a damper touches two blades
+DAMPER_FACES = ("seat_right", "damper_left", "seat_left", "damper_right")
 
 
 def check_parameters(scene: Scene) -> None:
@@ -45,18 +47,56 @@ def check_names(scene: Scene) -> None:
     if face_names is None:
         return
     known = face_names(scene)
-    support = scene.support
-    wanted = [("excitation.at", scene.excitation.at)]
-    # an empty name holds nothing
-    wanted += [("support.clamp", support.clamp)] if support.clamp else []
-    wanted += [("support.springs", face) for face, *_ in area_springs(support)]
-    wanted += [("support.directions", face) for face, _ in held_letters(support)]
-    for field, name in wanted:
+    for field, name in [("excitation.at", scene.excitation.at), *_held_names(scene)]:
         if name not in known:
             raise InputError(
                 f"{field} = {name!r}: a {scene.kind} has no face or node set of that "
                 f"name{suggestion(name, known)}"
             )
+
+
+def check_file(scene: Scene) -> list[str]:
+    """What responses need and the file of a scene's own geometry does not have, one sentence each.
+
+    The file is read, and drawn where it is a STEP file, which takes seconds.
+
+    Raises:
+        InputError: what the mesh would be refused for, or a support that the file does not have.
+    """
+    kind = kind_named(scene.kind)
+    if kind.file_names is None:
+        return []
+    known = kind.file_names(scene)
+    for field, name in _held_names(scene):
+        if name not in known:
+            raise InputError(
+                f"{field} = {name!r}: the file has no face or node set of that "
+                f"name{suggestion(name, known)}"
+            )
+    lacks = []
+    at = scene.excitation.at
+    if at not in known:
+        lacks.append(
+            f"excitation.at = {at!r}: enough for modes, responses need a face or node set of the "
+            f"file{suggestion(at, known)}"
+        )
+    missing = sorted(set(DAMPER_FACES) - known)
+    if missing:
+        lacks.append(
+            f"the file has no {', '.join(missing)}: enough for modes, responses need a damper with "
+            "its seats; imported.seats draws one to a STEP file"
+        )
+    return lacks
+
+
+def _held_names(scene: Scene) -> list[tuple[str, str]]:
+    """Fields of the supports and the names in them; an empty name holds nothing."""
+    support = scene.support
+    return [
+        *([("support.clamp", support.clamp)] if support.clamp else []),
+        *(("support.springs", face) for face, *_ in area_springs(support)),
+        *(("support.directions", face) for face, _ in held_letters(support)),
+    ]
 
 
 def _refuse_many(scene: Scene, cells: float) -> None:

@@ -25,6 +25,7 @@ from bladefem.util.arrays import IntegerArray
 
 from .face_distance import distance_to_face
 from .finalise_mesh import Motion
+from .imported_check import STEP_SUFFIXES
 from .jacobian import straight_jacobian
 from .joined_files import joined_files
 from .matching import match_faces, snap_slaves
@@ -72,27 +73,54 @@ def read_geometry(
     Raises:
         InputError: the file, its groups or its periodicity are not usable; one sentence.
     """
-    axis = np.asarray(imported.axis, dtype=float)
-    if Path(imported.file).suffix.lower() in (".step", ".stp"):
-        from .step_file import FittedDamper, read_step
+    if Path(imported.file).suffix.lower() in STEP_SUFFIXES:
+        from .step_file import read_step
 
-        fitted = None
-        if imported.seats is not None:
-            fitted = FittedDamper(imported.seats, wedge, imported.seat_width)
-        return read_step(
-            imported.file,
-            size,
-            imported.scale,
-            imported.sectors,
-            axis,
-            imported.names or (),
-            fitted,
-        )
+        return read_step(imported.file, size, **_drawing_options(imported, wedge))
+    return _mesh_of_file(imported)
+
+
+def file_names(imported: Any, wedge: Wedge) -> frozenset[str]:
+    """Names of the faces and node sets that the mesh of a scene's [imported] table has; a STEP file
+    is drawn for them and not meshed.
+
+    Args:
+        imported: as for :func:`read_geometry`.
+        wedge: likewise.
+
+    Raises:
+        InputError: as `read_geometry`, except for what only the mesher refuses.
+    """
+    if Path(imported.file).suffix.lower() in STEP_SUFFIXES:
+        from .step_file import step_face_names
+
+        drawn = step_face_names(imported.file, **_drawing_options(imported, wedge))
+        return frozenset(map(_family_word, drawn))
+    mesh = _mesh_of_file(imported)
+    return frozenset((*mesh.faces, *mesh.nodes))
+
+
+def _drawing_options(imported: Any, wedge: Wedge) -> dict[str, Any]:
+    """Arguments of the functions that draw a STEP file."""
+    from .step_file import FittedDamper
+
+    seats = imported.seats
+    return {
+        "scale": imported.scale,
+        "sectors": imported.sectors,
+        "axis": imported.axis,
+        "names": imported.names or (),
+        "fitted": seats and FittedDamper(seats, wedge, imported.seat_width),
+    }
+
+
+def _mesh_of_file(imported: Any) -> Mesh:
+    """What a mesh file and the others of its model hold."""
     return read_mesh(
         imported.file,
         imported.scale,
         imported.sectors,
-        axis,
+        np.asarray(imported.axis, dtype=float),
         imported.names or (),
         imported.linear,
         imported.tolerance,

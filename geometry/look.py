@@ -39,10 +39,7 @@ ROUNDOFF_SHARE = 1e-6
 WHOLE_NUMBER_TOLERANCE = 0.01
 MAX_SECTORS = 400
 # what a scene says in addition to a STEP file
-STEP_FILE_NEEDS = (
-    "imported.names, such as 'tip = face_21', for the face of excitation.at",
-    "imported.seats = two plane platform faces: the damper is drawn between them",
-)
+SEATS_NEED = "imported.seats = two plane platform faces: the damper is drawn between them"
 # where no cut faces were found in it
 UNCUT_SECTOR_NEEDS = (
     "imported.sectors = number of blades, for a sector of a wheel; 0 for a single blade"
@@ -155,7 +152,9 @@ def look_at(file: str | Path) -> Look:
         cut,
         bore,
         alike,
-        _missing_in_drawing(cut) if drawing else _missing_names(raw, alike, cut, bore),
+        _missing_in_drawing(cut, _tip_face(raw, outside, faces, cut))
+        if drawing
+        else _missing_names(raw, alike, cut, bore),
     )
 
 
@@ -433,14 +432,36 @@ def _bore_face(
     cut: CutFaces,
 ) -> str | None:
     """The face whose farthest node is nearest to the axis: a disc is held there."""
-    k = "xyz".index(cut.axis)
-    radius = np.hypot(raw.points[:, (k + 1) % 3], raw.points[:, (k + 2) % 3])
+    radius = _radii(raw, cut.axis)
     reach = {
         face.name: max(radius[c].max() for c in face_corners(outside, i))
         for i, face in enumerate(faces)
         if face.name not in (*cut.low, *cut.high)
     }
     return min(reach, key=lambda name: reach[name]) if reach else None
+
+
+def _tip_face(
+    raw: RawMesh,
+    outside: NumberedFaces,
+    faces: tuple[FacePart, ...],
+    cut: CutFaces | None,
+) -> str | None:
+    """The face whose nearest node is farthest from the axis; unknown without an axis."""
+    if cut is None:
+        return None
+    radius = _radii(raw, cut.axis)
+    start = {
+        face.name: min(radius[c].min() for c in face_corners(outside, i))
+        for i, face in enumerate(faces)
+    }
+    return max(start, key=lambda name: start[name])
+
+
+def _radii(raw: RawMesh, axis: str) -> np.ndarray:
+    """(n,) distance of all nodes from an axis of the file."""
+    k = "xyz".index(axis)
+    return np.asarray(np.hypot(raw.points[:, (k + 1) % 3], raw.points[:, (k + 2) % 3]))
 
 
 def _names_of(raw: RawMesh) -> set[str]:
@@ -471,9 +492,11 @@ def _letters(name: str) -> str:
     return "".join(c for c in name.lower() if c.isalnum())
 
 
-def _missing_in_drawing(cut: CutFaces | None) -> tuple[str, ...]:
+def _missing_in_drawing(cut: CutFaces | None, tip: str | None) -> tuple[str, ...]:
     """What a run of a STEP file needs and its faces do not tell."""
-    return STEP_FILE_NEEDS if cut is not None else (UNCUT_SECTOR_NEEDS, *STEP_FILE_NEEDS)
+    example = "'tip = face_7'" if tip is None else f"'tip = {tip}', the face farthest out"
+    names = f"imported.names, such as {example}, for the face of excitation.at"
+    return (*(() if cut is not None else (UNCUT_SECTOR_NEEDS,)), names, SEATS_NEED)
 
 
 def _missing_names(

@@ -82,23 +82,9 @@ def read_step(
     Raises:
         InputError: the file cannot be read or meshed, or groups are missing.
     """
-    path = Path(file)
-    if not path.is_file():
-        raise InputError(f"imported.file = '{file}': there is no such file")
     unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
-    text = path.read_text(errors="replace")
     with gmsh_session() as gmsh:
-        with gmsh_step("imported.file", f"import '{file}'", STEP_REMEDY):
-            _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
-        # shapes of another size are more than the drawing library can handle
-        box = np.array(gmsh.model.getBoundingBox(-1, -1))
-        check_extent(float(np.max(box[3:] - box[:3])), scale)
-        named = _apply_names(_named_entities(gmsh, text), read_names(names))
-        if fitted is not None:
-            on = axis_rotation(unit, 2 * np.pi / sectors)
-            seats = fitted.seats, fitted.wedge, fitted.seat_width
-            named = fit_wedge(gmsh, named, *seats, on, unit)
-        named |= _find_faces(gmsh, named, sectors, unit)
+        named = _drawn_entities(gmsh, Path(file), scale, sectors, unit, names, fitted)
         _tie_faces(gmsh, named, sectors, unit)
         contact = [
             tag
@@ -114,6 +100,53 @@ def read_step(
             )
         raw = from_gmsh_model(gmsh)
     return mesh_of_raw(raw, 1.0, sectors, unit, str(file))
+
+
+def step_face_names(
+    file: str | Path,
+    scale: float = 1.0,
+    sectors: int = 0,
+    axis: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 1.0),
+    names: Iterable[str] = (),
+    fitted: FittedDamper | None = None,
+) -> frozenset[str]:
+    """Names of the faces of a STEP file as :func:`read_step` draws it, without a mesh.
+
+    Raises:
+        InputError: as `read_step` before it meshes.
+    """
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    with gmsh_session() as gmsh:
+        named = _drawn_entities(gmsh, Path(file), scale, sectors, unit, names, fitted)
+    return frozenset(name for dimension, name in named if dimension == 2)
+
+
+def _drawn_entities(
+    gmsh: ModuleType,
+    path: Path,
+    scale: float,
+    sectors: int,
+    axis: np.ndarray,
+    names: Iterable[str],
+    fitted: FittedDamper | None,
+) -> Named:
+    """Solids and faces of a STEP file and of the damper drawn to it, by name; arguments as those of
+    :func:`read_step`, with a unit vector as the axis.
+    """
+    if not path.is_file():
+        raise InputError(f"imported.file = '{path}': there is no such file")
+    text = path.read_text(errors="replace")
+    with gmsh_step("imported.file", f"import '{path}'", STEP_REMEDY):
+        _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))
+    # shapes of another size are more than the drawing library can handle
+    box = np.array(gmsh.model.getBoundingBox(-1, -1))
+    check_extent(float(np.max(box[3:] - box[:3])), scale)
+    named = _apply_names(_named_entities(gmsh, text), read_names(names))
+    if fitted is not None:
+        on = axis_rotation(axis, 2 * np.pi / sectors)
+        seats = fitted.seats, fitted.wedge, fitted.seat_width
+        named = fit_wedge(gmsh, named, *seats, on, axis)
+    return named | _find_faces(gmsh, named, sectors, axis)
 
 
 def coarse_step(file: str | Path) -> RawMesh:
@@ -251,7 +284,13 @@ def _find_faces(
     found: dict[tuple[int, str], list[int]] = {}
     if sectors and not {"cyclic_low", "cyclic_high"} & words:
         low, high = _turned_faces(gmsh, middle, axis_rotation(axis, 2 * np.pi / sectors))
-        found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high} if low else {}
+        if not low:
+            raise InputError(
+                f"imported.sectors = {sectors}: no face of the file comes onto another one by a "
+                f"{sectors}th of a turn about imported.axis, as cut faces do; expected the number "
+                "of blades of the wheel, which 'bladefem look' guesses from the file"
+            )
+        found |= {(2, "cyclic_low"): low, (2, "cyclic_high"): high}
     if sectors and "clamp" not in words:
         radius = {
             tag: np.linalg.norm(c - (c @ axis) * axis)

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Print the resolved scene, and what in it is improbable."""
+    from geometry.check_parameters import check_file
+
     from ..io.stage_cache import on_root
     from ..scene.toml import given_keys, read_tables, resolved_rows, scene_of
     from ..scene.warnings import implausible_values
@@ -36,8 +38,9 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
         written = read_tables(file, options.overrides)
         scene = scene_of(written, file.resolve().parent)
         refuse_run(scene)
+        notes = [*implausible_values(scene), *check_file(scene)]
         rows = tables.resolved_scene(resolved_rows(scene, given_keys(written)))
-        return "\n".join([rows, *(f"note: {doubt}" for doubt in implausible_values(scene))])
+        return "\n".join([rows, *(f"note: {note}" for note in notes)])
 
     text = on_root(comm, table)
     if comm is None or comm.rank == 0:

@@ -99,7 +99,9 @@ def _of_drawing(found: Look) -> list[str]:
     """Solids and size of a STEP file."""
     size = 1e3 * (found.box[1] - found.box[0])
     count = f"{len(found.bodies)} solid{'s' if len(found.bodies) > 1 else ''}"
-    return [f"{count}, {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} mm; centres and areas in m"]
+    return [
+        f"{count}, {size[0]:.6g} x {size[1]:.6g} x {size[2]:.6g} mm; centres in m, areas in m^2"
+    ]
 
 
 def _of_mesh(found: Look) -> list[str]:

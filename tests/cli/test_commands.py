@@ -667,3 +667,30 @@ def test_the_best_load_of_the_table_is_that_of_the_search(tmp_path):
     )
     response.best_curve = 1
     assert response_tables(response).endswith("best load, by search: 50 N, amplitude divided by 4")
+
+
+OWN_BLADE = "scenes/own_blade.toml"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("imported.seats=face_11, face_14", "exchange the two names"),
+        ("imported.seats=face_14, face_23", "'face_23' is not one plane face"),
+        ("imported.seats=face_14, face_99", "no face 'face_99'"),
+        ("damper.length=70 mm", "expected at most 60 mm"),
+        ("imported.seat_width=20 mm", "the width of the narrower platform face"),
+        ("support.clamp=nose", "support.clamp = 'nose': the file has no face"),
+        ("imported.sectors=30", "imported.sectors = 30"),
+    ],
+)
+def test_check_refuses_what_a_drawing_does_not_have(change, said, capsys):
+    assert main(["check", OWN_BLADE, "--set", change]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_check_notes_what_responses_of_a_file_need(capsys):
+    assert main(["check", OWN_BLADE]) == 0
+    assert "note:" not in capsys.readouterr().out
+    assert main(["check", OWN_BLADE, "--set", "excitation.at=tpi"]) == 0
+    assert "note: excitation.at = 'tpi': enough for modes" in capsys.readouterr().out

@@ -20,7 +20,13 @@ from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Root, S
 from geometry.profile import sector_profile
 from geometry.section import section_outline
 from geometry.session import gmsh_session
-from geometry.step_file import FittedDamper, _import_shapes, axis_rotation, read_step
+from geometry.step_file import (
+    FittedDamper,
+    _import_shapes,
+    axis_rotation,
+    read_step,
+    step_face_names,
+)
 
 AXIS = np.array([0.0, 0.0, 1.0])
 SIZE = MeshSize(size=0.02, order=1)
@@ -68,6 +74,17 @@ def test_all_pairs_match_and_other_names_stay(mesh):
         assert np.abs(moved - mesh.points[slave]).max() < 1e-12
     assert {"tip", "clamp", "face_12"} <= set(mesh.faces)
     assert not set(SEATS) & set(mesh.faces)
+
+
+def test_names_are_known_without_a_mesh(step, mesh):
+    fitted = FittedDamper(SEATS, Wedge())
+    names = step_face_names(step, 1.0, BLADE[3].sectors, AXIS, ["tip = face_24"], fitted)
+    assert names == set(mesh.faces)
+
+
+def test_a_wrong_number_of_sectors_is_named(step):
+    with pytest.raises(InputError, match=r"^imported\.sectors = 30: no face .* 30th of a turn"):
+        step_face_names(step, 1.0, 30, AXIS)
 
 
 def test_the_step_file_has_the_fillet_of_the_parametric_sector(step, tmp_path):

@@ -164,6 +164,13 @@ def test_cut_faces_of_a_drawing_are_guessed():
     assert not any("imported.sectors" in sentence for sentence in found.missing)
 
 
+def test_the_tip_of_a_drawing_is_guessed():
+    """As scenes/own_blade.toml names it."""
+    assert any(
+        "'tip = face_24'" in sentence for sentence in look_at("scenes/own_blade.step").missing
+    )
+
+
 def test_the_scene_of_a_drawing_is_meshed_as_it_is_written(tmp_path, capsys):
     """With what is still missing: the face that is excited."""
     step = tmp_path / "blade.step"

@@ -109,6 +109,7 @@ KIND = Kind(
     sectors="imported.sectors",
     clearance_is_meshed=False,
     check=SceneCall("geometry.imported_check:check_imported", ("imported",)),
+    file_names=SceneCall("geometry.imported:file_names", ("imported", "damper")),
     meshed_here=is_drawing,
     whole_paths=whole_paths,
     files=input_files,

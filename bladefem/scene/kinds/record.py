@@ -106,6 +106,8 @@ class Kind:
     preflight: str | None = None
     # faces and node sets that a force can act on; None where a file names them
     face_names: Callable[[Scene], tuple[str, ...]] | None = None
+    # the same from the file, which is read and drawn for it but not meshed
+    file_names: SceneCall | None = None
     # drawings of the parameters by name, each taking ``file``
     pictures: Mapping[str, SceneCall] = field(default_factory=dict)
     # the scene with whole paths, from the folder that its own start from

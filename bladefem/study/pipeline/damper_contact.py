@@ -26,8 +26,9 @@ def contact_patches(mesh: Mesh) -> list[Patch]:
     missing = [name for name in ("this", "next") if name not in mesh.pairs]
     if missing:
         raise InputError(
-            f"the mesh has no contact pair '{missing[0]}': faces seat_right and damper_left "
-            "(this), seat_left and damper_right (next) with matching nodes were expected"
+            f"the mesh has no contact pair '{missing[0]}', a damper on its seat: expected faces "
+            "seat_right and damper_left (this), seat_left and damper_right (next) with matching "
+            "nodes; imported.seats draws a damper to a STEP file"
         )
     return [make_patch(mesh, name) for name in ("this", "next")]
 
