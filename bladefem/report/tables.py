@@ -53,6 +53,7 @@ COLUMNS = {
     "deviation": Column("deviation of frequency", "1", "%", 100.0, 3),
     "blade": Column("blade"),
     "wheels": Column("wheels"),
+    "calibration": Column("law multiplied by"),
     "law_error": Column("law off the whole wheel by", "1", "%", 100.0, 2),
     "worst": Column("worst wheel", "1", digits=4),
     **{

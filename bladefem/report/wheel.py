@@ -142,6 +142,7 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
             name = f"p{100 * share:g}"
             row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
         if found.checked.shape[1]:
+            row["calibration"] = found.calibration[i]
             row["law_error"] = abs(found.check_errors[i]).max()
         if len(found.harmonics):
             row |= {"harmonics": int(found.harmonics[i]), "truncation": found.truncation[i]}
@@ -307,7 +308,7 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
         f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {_upper(q.high)})"
     )
     if found.checked.shape[1]:
-        sentences.append(_law_sentence(found))
+        sentences.extend(_law_sentences(found))
     sentences.extend(_mean_sentences(found, held_means))
     if len(found.harmonics):
         parts = [
@@ -323,18 +324,30 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
     return sentences
 
 
-def _law_sentence(found: Amplification) -> str:
-    """What the damper law is off by, and what was done about it."""
-    errors = 100 * found.check_errors
-    factors = ", ".join(f"{factor:.4g}" for factor in found.calibration)
-    rest = 100 * (np.array([found.law_bounds(i) for i in range(len(found.loads))]) - 1)
-    return (
-        f"wheels by the law of one damper; {found.checked.size} of them solved in full, from the "
-        f"lowest to the highest of each load: the law is off by {errors.min():+.2g} to "
-        f"{errors.max():+.2g} % in amplification, so that its amplifications are multiplied by "
-        f"{factors}; the intervals take in what these wheels are still off, {rest.min():+.2g} to "
-        f"{rest.max():+.2g} %; how often another wheel is further off is not known"
-    )
+def _law_sentences(found: Amplification) -> list[str]:
+    """What the damper law is off by, and what was done about it; one a load."""
+    checks, wheels = found.checked.shape[1], found.factor.shape[1]
+    said = []
+    for load, factor, error, rest in zip(
+        found.loads,
+        found.calibration,
+        100 * found.check_errors,
+        100 * (found.calibration_bounds - 1),
+        strict=True,
+    ):
+        text = (
+            f"{load:g} N: wheels by the law of one damper; {checks} of them solved in full, from "
+            f"the lowest to the highest: the law is off by {error.min():+.2g} to "
+            f"{error.max():+.2g} % in amplification"
+        )
+        if checks < wheels:
+            text += (
+                f", so that the amplifications of the others are multiplied by {factor:.4g}; the "
+                f"intervals take in what the solved ones are still off, {rest[0]:+.2g} to "
+                f"{rest[1]:+.2g} %; how often another wheel is further off is not known"
+            )
+        said.append(text)
+    return said
 
 
 def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
@@ -379,8 +392,8 @@ def _optimum_sentences(found: Amplification) -> list[str]:
         f"{robust.load.value:.4g} N (95 % interval {robust.load.low:.4g} to "
         f"{robust.load.high:.4g} N), {1e6 * robust.height.value:.4g} um "
         f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
-        "between the loads studied both optima are those of a parabola; the intervals know the "
-        f"sample of wheels, not the parabola: robust optimum {_bracket(found, robust.load.value)}",
+        "between the loads studied both optima are those of a parabola, whose error the intervals "
+        f"leave out: robust optimum {_bracket(found, robust.load.value)}",
     ]
     if robust.at_end > 0.025:
         sentences.append(

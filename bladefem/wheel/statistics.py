@@ -74,10 +74,11 @@ class Amplification:
     # (L, W) points that were not solved, and points altogether
     unsolved: IntegerArray
     points: IntegerArray
-    # (L, C) numbers of the wheels that were checked by the whole wheel, and their amplification by
-    # it; C = 0 where all wheels are whole
+    # (L, C) numbers of the wheels that were checked by the whole wheel, their amplification by it
+    # and by the damper law, which the checks calibrate; C = 0 where all wheels are whole
     checked: IntegerArray
     whole: RealArray
+    law: RealArray
     # (L,) harmonics of the balance of whole wheels, and the relative error that they and the
     # samples leave in a peak's height; empty where nothing chose them
     harmonics: IntegerArray = field(default_factory=lambda: np.zeros(0, dtype=int))
@@ -88,18 +89,31 @@ class Amplification:
     # (L, C) of the wheels that were checked, (L, W) where all are whole: amplification with held
     # means of both, and whether the one with free means is known, which then counts
     held_factor: RealArray = field(default_factory=lambda: np.zeros((0, 0)))
-    # (L,) by which the amplifications of the damper law are multiplied, the mean ratio of checked
-    # wheels; empty where all wheels are whole
-    calibration: RealArray = field(default_factory=lambda: np.zeros(0))
     free: BooleanArray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @property
     def check_errors(self) -> np.ndarray:
         """(L, C) relative difference of the law's amplification from the whole wheel's."""
-        by_law = np.take_along_axis(self.factor, self.checked, axis=1)
-        if len(self.calibration):
-            by_law = by_law / self.calibration[:, None]
-        return by_law / self.whole - 1
+        return self.law / self.whole - 1
+
+    @property
+    def calibration(self) -> np.ndarray:
+        """(L,) amplification over that by the law: the mean of the checked wheels."""
+        if not self.law.shape[1]:
+            return np.ones(len(self.loads))
+        return np.asarray((self.whole / self.law).mean(axis=1))
+
+    @property
+    def calibration_bounds(self) -> np.ndarray:
+        """(L, 2) lowest and highest amplification of a checked wheel over the calibrated law's; 1
+        lies between them. Both are 1 where every wheel is whole.
+        """
+        bounds = np.ones((len(self.loads), 2))
+        if self.checked.shape[1] < self.factor.shape[1]:
+            off = self.whole / self.law / self.calibration[:, None]
+            bounds[:, 0] = off.min(axis=1, initial=1.0)
+            bounds[:, 1] = off.max(axis=1, initial=1.0)
+        return bounds
 
     @property
     def factor(self) -> np.ndarray:
@@ -112,20 +126,13 @@ class Amplification:
         whole = self.whole if self.checked.shape[1] else self.factor
         return whole / self.held_factor - 1
 
-    def law_bounds(self, load: int) -> tuple[float, float]:
-        """Lowest and highest amplification of checked wheels over that by the calibrated law, of
-        the load with a number; 1 lies between them.
-        """
-        ratios = self.whole[load] / self.factor[load, self.checked[load]]
-        return float(ratios.min(initial=1.0)), float(ratios.max(initial=1.0))
-
     def quantile(self, load: int, share: float) -> Quantile:
         """Of the amplification under the load with a number: the interval is that of the sample,
         widened by what checked wheels are off the calibrated law.
         """
         found = quantile_interval(self.factor[load], share)
-        low, high = self.law_bounds(load)
-        return Quantile(found.value, low * found.low, high * found.high)
+        low, high = self.calibration_bounds[load]
+        return Quantile(found.value, float(low * found.low), float(high * found.high))
 
     def quantiles(self, share: float) -> list[Quantile]:
         """Of the amplification under each load."""
@@ -235,9 +242,9 @@ def band_search(
     )
 
 
-def no_checks(loads: int) -> tuple[np.ndarray, np.ndarray]:
-    """`Amplification.checked` and `whole` of statistics whose wheels are whole."""
-    return np.zeros((loads, 0), dtype=int), np.zeros((loads, 0))
+def no_checks(loads: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`Amplification.checked`, `whole` and `law` of statistics whose wheels are whole."""
+    return np.zeros((loads, 0), dtype=int), np.zeros((loads, 0)), np.zeros((loads, 0))
 
 
 def joined_loads(parts: Sequence[Amplification]) -> Amplification:
@@ -272,9 +279,9 @@ def robust_optimum(
 
     The interval is the bootstrap's: wheels are drawn again with replacement, each with its peaks
     under all loads, as the same patterns are under each of them (Efron and Tibshirani, An
-    Introduction to the Bootstrap, 1993, Sect. 13.3). It knows the scatter of the sample, not what
-    lies between the loads. That of the height is widened by what checked wheels are off the law
-    under any of the loads.
+    Introduction to the Bootstrap, 1993, Sect. 13.3). Under each load apart all peaks of a resample
+    are taken at one or the other of `calibration_bounds`. It knows the scatter of the sample and of
+    the law, not what lies between the loads.
 
     Args:
         share: of the wheels that stay below.
@@ -284,16 +291,17 @@ def robust_optimum(
     loads, wheels = found.peak.shape
     drawn = rng.integers(wheels, size=(BOOTSTRAP_RESAMPLES, wheels))
     heights = np.quantile(found.peak[:, drawn], share, axis=2).T
+    side = rng.integers(2, size=heights.shape)
+    heights *= found.calibration_bounds[np.arange(loads), side]
     ends = np.array([best_load(found.loads, row) for row in heights])
     tail = 100 * (1 - confidence) / 2
     low, high = np.percentile(ends, [tail, 100 - tail], axis=0)
     load, height = best_load(found.loads, np.quantile(found.peak, share, axis=1))
     lowest = heights.argmin(axis=1)
-    bounds = np.array([found.law_bounds(i) for i in range(loads)])
     return RobustOptimum(
         share,
         Quantile(load, float(low[0]), float(high[0])),
-        Quantile(height, float(low[1] * bounds[:, 0].min()), float(high[1] * bounds[:, 1].max())),
+        Quantile(height, float(low[1]), float(high[1])),
         float(np.mean((lowest == 0) | (lowest == loads - 1))),
     )
 

@@ -132,7 +132,7 @@ def amplification(factors: np.ndarray) -> Amplification:
     none = np.zeros((1, 0), dtype=int)
     one = np.array([1e-3])
     tall = 1e-3 * factors[None]
-    return Amplification(np.array([80.0]), one, one, tall, none, tall, none, none, none, none)
+    return Amplification(np.array([80.0]), one, one, tall, none, tall, none, none, none, none, none)
 
 
 def test_the_band_of_the_scatter_enters_the_utilisation():

@@ -105,6 +105,14 @@ def test_a_law_that_is_wrong_by_a_factor_is_calibrated():
         # 2 % by the law, and what six wheels leave open in the mean
         assert quantile.value == pytest.approx(exact, rel=0.03)
         assert quantile.low < exact < quantile.high
+    # a wheel that is solved in full is its own, and the others are the law times one factor
+    np.testing.assert_allclose(found.factor[0, found.checked[0]], truth[found.checked[0]])
+    others = np.setdiff1d(np.arange(len(truth)), found.checked)
+    expected = found.calibration[0] * by_law[others]
+    np.testing.assert_allclose(found.factor[0, others], expected)
+    every = with_checks(law, patterns, whole_peak, len(truth), None)
+    np.testing.assert_allclose(every.factor[0], truth)
+    np.testing.assert_array_equal(every.calibration_bounds, 1.0)
     assert scatter_table(found)["law_error"][0] == abs(found.check_errors).max()
     (said,) = [text for text in scatter_sentences(found) if "law of one damper" in text]
     assert f"multiplied by {found.calibration[0]:.4g}" in said

@@ -2,6 +2,8 @@
 whose damped amplification exceeds the undamped one at the load that the tuned wheel recommends.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import linalg, stats
@@ -147,6 +149,29 @@ def test_interval_of_the_robust_optimum_holds_what_it_promises():
     assert 0.87 < held <= 1.0
     # and they are intervals: some miss by as much as they are wide
     assert np.median([one.high / one.low for one in found]) < 2.0
+
+
+def test_interval_of_the_robust_optimum_takes_in_what_the_law_leaves():
+    """All wheels are best at 7 N; their peaks under each load are off by what checks leave open."""
+    loads = np.geomspace(1, 32, 6)
+    sizes = np.random.default_rng(1).lognormal(0, 0.2, 50)
+    whole = peaks_of(loads, np.full(50, 7.0), sizes)
+    true = robust_optimum(whole).height
+    for off in np.random.default_rng(2).uniform(0.97, 1.03, (10, 6, 1)):
+        found = replace(
+            whole,
+            peak=off * whole.peak,
+            checked=np.tile(np.arange(4), (6, 1)),
+            whole=np.tile([0.97, 0.99, 1.01, 1.03], (6, 1)),
+            law=np.ones((6, 4)),
+        )
+        np.testing.assert_allclose(found.calibration, 1.0)
+        best = robust_optimum(found)
+        assert best.load.low < 7.0 < best.load.high
+        assert best.height.low < true.value < best.height.high
+        assert best.height.high - best.height.low > true.high - true.low
+        # no wider than such errors make it
+        assert best.load.high / best.load.low < 1.2
 
 
 def test_draws_are_the_same_everywhere_and_cut_off():

@@ -118,9 +118,8 @@ def with_checks(
 ) -> Amplification:
     """Statistics of one load with some wheels solved whole, from the lowest to the highest.
 
-    The tuned peak becomes the whole wheel's: the family's one mode leaves the same part out of both
-    and the amplification is the law's, times the mean ratio of the wheels that are solved whole to
-    it.
+    These have their own amplification, and all others that by the law times the mean ratio of both.
+    The tuned peak becomes the whole wheel's.
 
     Args:
         whole_peak: a pattern's highest blade by the whole wheel.
@@ -139,14 +138,16 @@ def with_checks(
         heights = comm.allreduce(heights)
     compared = compared_peaks(heights)
     whole = compared.height / compared.tuned
-    calibration = float(np.mean(whole / found.factor[0, chosen]))
+    law = found.factor[0, chosen]
+    factor = found.factor[0] * (whole / law).mean()
+    factor[chosen] = whole
     return replace(
         found,
         tuned=np.array([compared.tuned]),
-        peak=calibration * found.factor * compared.tuned,
+        peak=compared.tuned * factor[None],
         checked=chosen[None],
         whole=whole[None],
-        calibration=np.array([calibration]),
+        law=law[None],
         tuned_held=np.array([compared.tuned_held]),
         held_factor=compared.held_factor[None],
         free=compared.free[None],
