@@ -10,8 +10,10 @@ from test_walking_dampers import BLADES, free_dampers, resonance
 
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.report.wheel import scatter_sentences, scatter_table
+from bladefem.study.mistuning import peak_choice
 from bladefem.study.mistuning.law_level import with_checks
 from bladefem.study.mistuning.peak_choice import chosen_peak, pattern_peak
+from bladefem.wheel.local_peak import LocalPeak
 from bladefem.wheel.lumped import lumped_pattern
 from bladefem.wheel.model import Pattern
 from bladefem.wheel.pattern_peak import PatternPeak, compared_peaks
@@ -44,6 +46,21 @@ def test_wheels_of_the_statistics_walk_as_one_wheel_does():
     np.testing.assert_allclose(found.held_factor[0], held_heights[1:] / held_heights[0], rtol=1e-6)
     assert abs(found.tuned[0] / found.tuned_held[0] - 1) > 0.005
     assert any("free mean displacements" in text for text in scatter_sentences(found))
+
+
+def test_a_free_maximum_beside_a_lost_point_does_not_count(monkeypatch):
+    """Its resonance may be higher beyond that point."""
+    free = free_dampers(np.array([4.0, 2.0]), 1.5)
+    held = replace(free, coupled=False)
+    grid = resonance() * np.linspace(0.98, 1.02, 5)
+    omegas, sizes = np.array([0.9, 1.0, 1.1]), np.array([[1.0], [2.0], [1.5]])
+    closed = WheelPeak(1.0, 2.0, 0, sizes[1], omegas, sizes, 0, 0.0)
+    lost = replace(closed, sizes=np.array([[1.0], [2.0], [np.nan]]), unsolved=1)
+    for peak, known in ((closed, True), (lost, False)):
+        again = LocalPeak(peak, None, 0.0, 3)
+        monkeypatch.setattr(peak_choice, "local_peak", lambda *_, again=again: again)
+        found = pattern_peak(held, free, Pattern(), grid, (2, 64), 1, DEFAULT_OPTIONS)
+        assert found.asked and (found.free is not None) == known
 
 
 def test_like_is_compared_with_like():

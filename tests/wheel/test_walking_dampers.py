@@ -15,6 +15,7 @@ from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.study.mistuning.peak_choice import pattern_peak
 from bladefem.wheel.local_peak import (
     FIRST_REACH,
     NEARER_REACH,
@@ -25,7 +26,7 @@ from bladefem.wheel.lumped import PLATFORM, TIP, LumpedBlades, lumped_matrices, 
 from bladefem.wheel.model import engine_order, tuned_wheel
 from bladefem.wheel.resonance import find_wheel_peak
 from bladefem.wheel.solve import solve_wheel
-from bladefem.wheel.statistics import wheel_respond
+from bladefem.wheel.statistics import scatter_statistics, wheel_respond
 from bladefem.wheel.tuned import tuned_sector
 
 COUNT, ORDER = 12, 3
@@ -200,6 +201,29 @@ def test_searched_peak_is_the_highest_of_marches(deviation):
     assert found.change == pytest.approx(marched[1].max() / first.height - 1, abs=1e-3)
     # few more than the search with held means took
     assert found.points <= 5 < len(first.omegas)
+
+
+def test_amplification_with_free_means_is_that_of_marches(deviation):
+    """The tuned wheel and one pattern, each at the peak that was searched for it."""
+    limits, phase = np.array([4.0, 2.0]), 1.5
+    free = free_dampers(limits, phase)
+    held = replace(free, coupled=False)
+    grid = resonance() * np.linspace(0.95, 1.05, 11)
+    found = scatter_statistics(
+        {0.0: [lumped_pattern(BLADES, deviation)]},
+        lambda _, pattern: pattern_peak(held, free, pattern, grid, (9, 512), 1, DEFAULT_OPTIONS),
+    )
+    tuned, mistuned = (
+        np.linalg.norm(march(omega, own, limits[:, None], 60, 512, phase)[0], axis=1).max()
+        for omega, own in (
+            (found.tuned_omega[0], np.zeros(COUNT)),
+            (found.omega[0, 0], deviation),
+        )
+    )
+    assert found.free.all()
+    assert found.tuned[0] == pytest.approx(tuned, rel=1e-3)
+    assert found.factor[0, 0] == pytest.approx(mistuned / tuned, rel=1e-3)
+    assert found.tuned_held[0] > 1.005 * tuned
 
 
 class Curves:

@@ -139,13 +139,15 @@ def pattern_peak(
     """
     held = LocalBalances(wheel, pattern, *balance, options)
     first = find_wheel_peak(in_common_period(held, harmonic), grid, SEARCH_TOLERANCE)
-    if free is None:
-        return PatternPeak(first)
+    near = held.points[first.omega / harmonic]
+    if free is None or not near.converged:
+        return PatternPeak(first, asked=free is not None)
     # what Newton does not reach from the nearest walking balance nothing else is likely to
     simply = replace(options, fallbacks=False, iterations=MOST_WALKING_ITERATIONS)
-    near = held.points[first.omega / harmonic]
-    balances = LocalBalances(free, pattern, *balance, simply, near)
-    return PatternPeak(first, local_peak(balances, first, harmonic), True)
+    again = local_peak(LocalBalances(free, pattern, *balance, simply, near), first, harmonic)
+    # the resonance may be higher beyond a point that was not solved
+    known = again is not None and again.peak.closed_in
+    return PatternPeak(first, again if known else None, True)
 
 
 def local_peak(
