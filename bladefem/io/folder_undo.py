@@ -45,15 +45,19 @@ def folder_state(folder: str | Path) -> FolderState:
     )
 
 
-def restore_folder(before: FolderState) -> None:
+def restore_folder(before: FolderState) -> bool:
     """Remove what is new and bring back what was put away; nothing where long work was done, whose
     stages are worth more than a clean folder.
+
+    Returns:
+        whether results came back.
     """
     folder = before.folder
     new = _files(folder) - before.files
     stages = {path for path in new if path.parent != folder}
     if any(path.name != SHORT_STAGE for path in stages):
-        return
+        return False
+    put_away = False
     # what cannot be removed or moved stays: the sentence about the input matters more
     with suppress(OSError):
         earlier = folder / EARLIER_FOLDER
@@ -72,6 +76,8 @@ def restore_folder(before: FolderState) -> None:
             _remove_empty(inner)
         for path in before.missing:
             _remove_empty(path)
+        return put_away
+    return False
 
 
 def forget_replaced(folder: str | Path) -> None:

@@ -72,8 +72,10 @@ def lock_run_folder(folder: str | Path) -> Iterator[None]:
             pass
         try:
             yield
-        except InputError:
-            restore_folder(before)
+        except InputError as error:
+            if restore_folder(before):
+                # the command has said that they were moved away
+                raise InputError(f"{error}; the results that were moved are back") from None
             raise
         finally:
             forget_replaced(folder)

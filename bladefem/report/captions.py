@@ -13,7 +13,7 @@ CAPTIONS = {
     "largest value; grey lines show the shape at rest. On the screen: choose a mode, drag to "
     "rotate, move the phase through one period.",
     "modes/mode_on_the_wheel": "The excited mode on the whole wheel: displacement along its main "
-    "direction, with nodal lines in white.",
+    "direction, with nodal lines in black.",
     "modes/frequencies_by_nodal_diameter": "Natural frequencies over nodal diameter, without "
     "damper; modes of one family are joined.",
     "modes/modes": "Modes in the excited nodal diameter, named after those of the clamped blade. "
@@ -124,7 +124,8 @@ CAPTIONS = {
     "with all modes, harmonics and damper forces, about the mean position; the damper moves as a "
     "rigid body. Colours: amplitude of each node.",
     "response/hysteresis": "Friction force over relative displacement, summed over each seat, "
-    "in one period at each resonance; the enclosed area is the friction work.",
+    "in one period at each resonance, along the direction in which the seat's mean motion is "
+    "largest; the enclosed area is the friction work of that motion.",
     "response/flow": "Waves of the wheel in the flow, without dampers; negative nodal diameters "
     "run backwards.",
     "response/flutter": "Limit cycle of each fed wave under each load; the start decides which "

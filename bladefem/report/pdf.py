@@ -45,7 +45,7 @@ def print_pdf(page: str | Path, file: str | Path | None = None) -> Path:
     """Print a page; next to it under the same name when no file is named.
 
     Raises:
-        InputError: no such page, or no Chromium. NotSolvedError: it wrote nothing.
+        InputError: no such page, or no Chromium. NotSolvedError: it wrote nothing, or did not end.
     """
     page = Path(page).resolve()
     file = page.with_suffix(".pdf") if file is None else Path(file).resolve()
@@ -61,9 +61,14 @@ def print_pdf(page: str | Path, file: str | Path | None = None) -> Path:
             page.as_uri(),
         ]
         file.unlink(missing_ok=True)
-        done = subprocess.run(
-            printing, capture_output=True, text=True, timeout=PATIENCE_SECONDS, check=False
-        )
+        try:
+            done = subprocess.run(
+                printing, capture_output=True, text=True, timeout=PATIENCE_SECONDS, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise NotSolvedError(
+                f"{page.name} was not printed: {command[0]} did not end in {PATIENCE_SECONDS} s"
+            ) from None
     if not file.is_file():
         last = (done.stderr.strip().splitlines() or ["no message"])[-1]
         raise NotSolvedError(f"{page.name} was not printed: {last}")

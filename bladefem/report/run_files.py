@@ -42,7 +42,8 @@ def file_writers(
         for name, table in tables.items():
             write_tables(table, folder / name.split("/")[1], name.split("/")[1])
         write_table(folder / "nodes.csv", nodes, units_of(nodes))
-        loop_table(cycles).to_csv(folder / "hysteresis.csv", index=False)
+        loops = loop_table(cycles)
+        write_table(folder / "hysteresis.csv", loops, units_of(loops))
 
     def write_contact() -> None:
         write_points(folder, result.contact.maps)

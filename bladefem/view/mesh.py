@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
@@ -284,14 +285,24 @@ def boundary_lines(mesh: Mesh, face: np.ndarray) -> PolyData:
     return pyvista.PolyData(mesh.points + lift, lines=np.insert(ends, 0, 2, axis=1).ravel())
 
 
+def is_numbered(name: str) -> bool:
+    """Whether a face has the number of a drawing in place of a name."""
+    return re.fullmatch(r"face_\d+", name) is not None
+
+
 def label_colours(mesh: Mesh) -> list[str]:
-    """Light colours for bodies, strong ones for named faces."""
+    """Light colours for bodies, strong ones for named faces; numbered faces are like the first
+    body.
+    """
     bodies = [BODY_COLOURS[i % len(BODY_COLOURS)] for i in range(len(mesh.bodies))]
     strong = cycle(FACE_COLOURS)
-    return bodies + [
-        PALE_FACE_COLOURS[name] if name in PALE_FACE_COLOURS else next(strong)
-        for name in mesh.faces
-    ]
+
+    def colour(name: str) -> str:
+        if is_numbered(name):
+            return BODY_COLOURS[0]
+        return PALE_FACE_COLOURS.get(name) or next(strong)
+
+    return bodies + [colour(name) for name in mesh.faces]
 
 
 def view_of(
@@ -394,6 +405,7 @@ def draw_legend(ax: Axes, mesh: Mesh) -> None:
     swatches = [
         Swatch(facecolor=c, edgecolor="#555555", lw=0.5, label=f"{name} ({count})")
         for c, name, count in zip(colours, names, counts, strict=True)
+        if not is_numbered(name)
     ]
     many = len(swatches) > MAX_NAMES_IN_LEGEND
     ax.legend(

@@ -119,6 +119,18 @@ def test_bad_input_brings_back_what_was_put_away(tmp_path):
     assert {name: (tmp_path / name).read_bytes() for name in results(tmp_path)} == before
 
 
+def test_bad_input_says_that_results_are_back(tmp_path):
+    with lock_run_folder(tmp_path):
+        take_folder(tmp_path, Scene())
+    (tmp_path / "report.md").write_text("first")
+    with (
+        pytest.raises(InputError, match=r"^no face; the results that were moved are back$"),
+        lock_run_folder(tmp_path),
+    ):
+        assert "moved to" in take_folder(tmp_path, OTHER)
+        raise InputError("no face")
+
+
 @pytest.mark.parametrize(
     ("error", "files"),
     [

@@ -67,7 +67,7 @@ def test_speeds_are_read(text, rpm):
 
 
 @pytest.mark.parametrize(
-    "text", ["0, ..., 2000 rpm", "0, 500, ...", "..., 3 rpm", "fast", "0, 3 Hz m"]
+    "text", ["", "0, ..., 2000 rpm", "0, 500, ...", "..., 3 rpm", "fast", "0, 3 Hz m"]
 )
 def test_wrong_speeds_are_refused(text):
     with pytest.raises(InputError, match="campbell"):
@@ -78,6 +78,11 @@ def test_wrong_speeds_are_refused(text):
 def test_speeds_without_a_unit_are_refused(text):
     with pytest.raises(InputError, match=f"expected a unit, such as '{text} rpm'"):
         read_speeds(text)
+
+
+def test_a_unit_without_a_speed_is_not_told_twice():
+    with pytest.raises(InputError, match="such as '0, 2000, 4000 rpm'"):
+        read_speeds("0, 1000, ..., rpm")
 
 
 def test_too_few_speeds(wheel):

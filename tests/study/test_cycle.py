@@ -11,7 +11,15 @@ from bladefem.data import Elements, Patch
 from bladefem.friction.closed_form import circular_orbit_work
 from bladefem.friction.states import GROSS_SLIP, STICK
 from bladefem.report.linear import harmonic_table, linear_sentence
-from bladefem.report.nodes import draw_wear, node_table, save_cycles_vtu, wear_sentence, wear_table
+from bladefem.report.nodes import (
+    draw_wear,
+    loop_table,
+    node_table,
+    save_cycles_vtu,
+    wear_sentence,
+    wear_table,
+)
+from bladefem.report.tables import units_of
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.contact_cycle import contact_cycle
 from bladefem.view.hysteresis import loop_energy
@@ -160,6 +168,12 @@ def test_hysteresis_of_a_patch_is_the_loop_of_its_springs():
     assert abs(sliding.displacement).max() == pytest.approx(3 * MU * N / KT, rel=1e-12)
     assert abs(sliding.force).max() == pytest.approx(limit, rel=0.02)  # the corners of 63 harmonics
     np.testing.assert_allclose(stuck.force, 8 * KT * stuck.displacement, atol=1e-9 * limit)
+
+
+def test_the_columns_of_loops_have_units():
+    _, cycle = at_resonance(np.full(16, 3.0) * MU * N / KT, 3, None)
+    units = units_of(loop_table([cycle]))
+    assert units == {"load": "N", "phase": "rad", "displacement": "m", "force": "N"}
 
 
 def test_wear_is_archards_law_on_circular_orbits(tmp_path):

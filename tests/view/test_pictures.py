@@ -22,7 +22,15 @@ from bladefem.view.contact import (
 )
 from bladefem.view.hysteresis import draw_loops, draw_seat_loops, loop_energy
 from bladefem.view.live_shapes import live_motion
-from bladefem.view.mesh import carry_round, draw_mesh, draw_wheel, pyvista_grid, save_vtu
+from bladefem.view.mesh import (
+    carry_round,
+    draw_legend,
+    draw_mesh,
+    draw_wheel,
+    label_colours,
+    pyvista_grid,
+    save_vtu,
+)
 from bladefem.view.modes import (
     animate_wave,
     best_phase,
@@ -37,7 +45,7 @@ from bladefem.view.optimum import draw_optimum
 from bladefem.view.response import draw_responses, smooth_curve
 from bladefem.view.skin import row_keys, skin, wheel_skin
 from bladefem.view.style import SUPERSAMPLING, canvas, enlarged_lines, show_photograph
-from geometry.mesh import Sector
+from geometry.mesh import Mesh, Sector
 
 
 def ink(file):
@@ -101,10 +109,22 @@ def test_hexahedra_and_vtk_order(count):
 
 def test_unknown_cells_are_refused():
     from bladefem.errors import InputError
-    from geometry.mesh import Mesh
 
     with pytest.raises(InputError, match="wedge"):
         draw_mesh(Mesh(np.zeros((6, 3)), "wedge", {"blade": np.arange(6)[None]}))
+
+
+def test_numbers_of_a_drawing_are_no_names():
+    """The face that a name was given to is told apart by its colour."""
+    faces = {name: np.array([[0, 1, 2]]) for name in ("face_1", "tip", "face_12", "seat_left")}
+    mesh = Mesh(np.zeros((4, 3)), "tetra", {"blade": np.arange(4)[None]}, faces=faces)
+    body, first, tip, second, seat = label_colours(mesh)
+    assert body == first == second
+    assert len({body, tip, seat}) == 3
+    with canvas() as ax:
+        draw_legend(ax, mesh)
+        named = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert named == ["blade (1)", "tip (1)", "seat_left (1)"]
 
 
 @pytest.mark.parametrize("step", [1, 10**12])

@@ -42,7 +42,7 @@ class Damping:
             value = np.asarray(getattr(self, name))
             if not (np.isfinite(value).all() and np.all(value >= 0)):
                 raise InputError(
-                    f"damping.{name} {value}: expected finite numbers, none of them negative"
+                    f"damping.{name} = {value}: expected finite numbers, none of them negative"
                 )
 
     def viscous(self, omega: np.ndarray) -> np.ndarray:

@@ -140,9 +140,12 @@ def read_speeds(text: str) -> list[float]:
         InputError: not speeds, no unit, or dots without a step before and an end after them.
     """
     items = split_values(text)
+    if not items:
+        raise InputError(f"campbell = {text!r}: expected speeds, such as '0, 2000, 4000 rpm'")
     for item in items:
         if is_plain(item) and parse(item, "rad/s", "campbell"):
-            raise InputError(f"campbell = {text}: expected a unit, such as '{text.strip()} rpm'")
+            told = f"{text.strip()} rpm" if is_plain(items[-1]) else "0, 2000, 4000 rpm"
+            raise InputError(f"campbell = {text}: expected a unit, such as '{told}'")
     numbers = [
         None if item.startswith("...") else parse(item, "rad/s", "campbell") for item in items
     ]
