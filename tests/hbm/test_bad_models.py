@@ -99,8 +99,8 @@ def test_models(change, words):
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: Damping(-0.1), "damping.ratio -0.1"),
-        (lambda: Damping(stiffness=np.nan), "damping.stiffness nan"),
+        (lambda: Damping(-0.1), "damping.ratio = -0.1"),
+        (lambda: Damping(stiffness=np.nan), "damping.stiffness = nan"),
         (lambda: solve(MODEL, np.ones(2)), "omega"),
         (lambda: solve(MODEL, 1.0, 2.5), "H 2.5"),
         (lambda: solve(MODEL, 1.0, "3"), "H 3"),
