@@ -335,7 +335,13 @@ def tell(
 
 
 def scene_path(given: str) -> Path:
-    """The scene file, also of a run folder."""
+    """The scene file, also of a run folder.
+
+    Raises:
+        InputError: an empty name, as an unset variable of a shell leaves it, or one too long.
+    """
+    if not given:
+        raise InputError("scene '': expected the name of a scene file or of a run folder")
     path = Path(given)
     try:
         return path / "scene.toml" if path.is_dir() else path

@@ -694,3 +694,8 @@ def test_check_notes_what_responses_of_a_file_need(capsys):
     assert "note:" not in capsys.readouterr().out
     assert main(["check", OWN_BLADE, "--set", "excitation.at=tpi"]) == 0
     assert "note: excitation.at = 'tpi': enough for modes" in capsys.readouterr().out
+
+
+def test_an_empty_scene_name_is_not_this_folder(capsys):
+    assert main(["check", ""]) == 2
+    assert "scene '': expected the name" in capsys.readouterr().err
