@@ -104,13 +104,15 @@ def _drawing_options(imported: Any, wedge: Wedge) -> dict[str, Any]:
     """Arguments of the functions that draw a STEP file."""
     from .step_file import FittedDamper
 
-    seats = imported.seats
+    fitted = None
+    if imported.seats is not None:
+        fitted = FittedDamper(imported.seats, wedge, imported.seat_width)
     return {
         "scale": imported.scale,
         "sectors": imported.sectors,
         "axis": imported.axis,
         "names": imported.names or (),
-        "fitted": seats and FittedDamper(seats, wedge, imported.seat_width),
+        "fitted": fitted,
     }
 
 

@@ -75,7 +75,7 @@ def lock_run_folder(folder: str | Path) -> Iterator[None]:
         except InputError as error:
             if restore_folder(before):
                 # the command has said that they were moved away
-                raise InputError(f"{error}; the results that were moved are back") from None
+                error.args = (f"{error}; the results that were moved are back",)
             raise
         finally:
             forget_replaced(folder)

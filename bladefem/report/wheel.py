@@ -328,17 +328,18 @@ def _law_sentences(found: Amplification) -> list[str]:
     """What the damper law is off by, and what was done about it; one a load."""
     checks, wheels = found.checked.shape[1], found.factor.shape[1]
     said = []
-    for load, factor, error, rest in zip(
+    for load, harmonics, factor, error, rest in zip(
         found.loads,
+        found.law_harmonics,
         found.calibration,
         100 * found.check_errors,
         100 * (found.calibration_bounds - 1),
         strict=True,
     ):
         text = (
-            f"{load:g} N: wheels by the law of one damper; {checks} of them solved in full, from "
-            f"the lowest to the highest: the law is off by {error.min():+.2g} to "
-            f"{error.max():+.2g} % in amplification"
+            f"{load:g} N: wheels by the law of one damper, harmonics 1 to {harmonics}; {checks} "
+            f"of them solved in full, from the lowest to the highest: the law is off by "
+            f"{error.min():+.2g} to {error.max():+.2g} % in amplification"
         )
         if checks < wheels:
             text += (

@@ -184,7 +184,8 @@ def _contact_flexibility(
     if damper is not None:
         own = np.arange(len(damper.residual))[damper.ports["contact"]][wheel.rows]
         law = wheel.damper_damping.viscous(damper.omega)
-        Z = damper.omega**2 - omega**2 + 1j * omega * law
+        loss = wheel.damper_damping.structural
+        Z = damper.omega**2 * (1 + 1j * loss) - omega**2 + 1j * omega * law
         shapes = damper.shapes[own]
         return G + (shapes / Z) @ shapes.conj().T + damper.residual[np.ix_(own, own)]
     return G
@@ -202,7 +203,7 @@ def _other_modes(
     [m/N].
     """
     own = wheel.damping.viscous(body.omega) + _own_damping(body, mirrored)
-    Z = body.omega**2 - omega**2 + 1j * omega * own
+    Z = body.omega**2 * (1 + 1j * wheel.damping.structural) - omega**2 + 1j * omega * own
     others = np.arange(len(Z)) != left_out
     shapes = body.shapes[rows][:, others]
     residual = body.residual[rows][:, rows]

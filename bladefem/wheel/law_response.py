@@ -249,6 +249,7 @@ def law_statistics(
         rows[3].astype(int),
         rows[4].astype(int),
         *no_checks(1),
+        law_harmonics=np.array([len(wheels.family.flexibility)]),
     )
 
 

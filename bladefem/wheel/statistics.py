@@ -83,6 +83,8 @@ class Amplification:
     # samples leave in a peak's height; empty where nothing chose them
     harmonics: IntegerArray = field(default_factory=lambda: np.zeros(0, dtype=int))
     truncation: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (L,) harmonics of the damper law; empty where all wheels are whole
+    law_harmonics: IntegerArray = field(default_factory=lambda: np.zeros(0, dtype=int))
     # (L,) peak of the tuned wheel with held mean displacements [m], where free ones were asked for:
     # NaN elsewhere; empty where no whole wheel was solved
     tuned_held: RealArray = field(default_factory=lambda: np.zeros(0))

@@ -104,6 +104,7 @@ def test_a_law_that_is_wrong_by_a_factor_is_calibrated():
         zeros.astype(int),
         zeros.astype(int),
         *no_checks(1),
+        law_harmonics=np.array([3]),
     )
     patterns = [Pattern(start=np.array([i])) for i in range(len(truth))]
 

@@ -10,6 +10,7 @@ from scipy import linalg
 
 from bladefem.data import Elements, RigidBody
 from bladefem.errors import InputError
+from bladefem.hbm.model import Damping
 from bladefem.reduction.assemble import recombine_contact
 from bladefem.study.mistuning.law_level import changed_law
 from bladefem.wheel.damper_balance import solve_damper, stuck_displacements
@@ -185,11 +186,14 @@ def inclined_wheel():
     return replace(wheel, sectors=sectors, elements=element)
 
 
-def test_harmonics_are_those_of_the_tuned_wheel():
+@pytest.mark.parametrize("damping", [Damping(ratio=1e-3), Damping(ratio=1e-4, structural=2e-3)])
+@pytest.mark.parametrize("damper", [None, RigidBody(np.array([[0.05]]), np.array([[0.5], [0.5]]))])
+def test_harmonics_are_those_of_the_tuned_wheel(damping, damper):
     """Contacts that lift off: from the balance of all sectors, what is left over in the damper's is
     the family's motion in the first harmonic and nothing in the others.
     """
-    wheel = inclined_wheel()
+    # the law holds mean displacements
+    wheel = replace(inclined_wheel(), damping=damping, damper=damper, coupled=False)
     point = solve_wheel(wheel, OWN, 5, 128)
     assert point.converged
     assert point.shares[0, 0, 2] > 0.1
