@@ -3,7 +3,8 @@
     w_1 + G_1 f_1(w) = imposed,    w_h + G_h f_h(w) = 0  for h = 2..H,
 
 relative displacements w of the contacts and forces f on the blades by harmonics, and the
-flexibility G of everything but the family of modes that is imposed. Newton with dense matrices.
+flexibility G of everything but the family of modes that is imposed. Mean displacements stay in the
+preload state. Newton with dense matrices.
 """
 
 from __future__ import annotations

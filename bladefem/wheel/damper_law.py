@@ -2,11 +2,11 @@
 
 Where one family of blade modes vibrates, the motion of a damper's contacts is a sum of its two
 blades' amplitudes, w = alpha a_s + beta a_{s+1}, less what all other modes, the residual
-flexibility and the damper give way to the contact forces. This small balance is
-solved once for all pairs of amplitudes; since a shift of time changes nothing, these are three
-numbers: the size of both, their ratio and the phase between them. Shapes and flexibility are those
-of the tuned wheel in the nodal diameter of the engine order, so that the tuned wheel comes out
-again.
+flexibility and the damper give way to the contact forces. This balance of the damper is solved once
+for all pairs of amplitudes; since a shift of time changes nothing, these are three numbers: the
+size of both, their ratio and the phase between them. Shapes and flexibility are those of the tuned
+wheel in the nodal diameters of the engine order and of its harmonics, so that the tuned wheel comes
+out again.
 
 The blades' amplitudes are those of the first harmonic; the damper answers with higher ones too.
 Where contacts lift off these count: on the wheel of scenes/mistuned.toml under 40 N the law of one

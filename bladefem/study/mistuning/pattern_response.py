@@ -146,7 +146,7 @@ def _stuck_peaks(
     harmonic: int,
 ) -> np.ndarray:
     """Circular frequencies of the highest resonances with all contacts sticking."""
-    fine = _linear_grid(wheel, low, high)
+    fine = linear_grid(wheel, low, high)
     highest = max(wheel.excitation)
     sizes = [stuck_wheel(wheel, w / harmonic, highest, pattern)[:, 1:, 0] for w in fine]
     height = np.linalg.norm(np.array(sizes), axis=2).max(axis=1)
@@ -154,7 +154,7 @@ def _stuck_peaks(
     return fine[inner[np.argsort(-height[inner])[:MAX_RESONANCES]]]
 
 
-def _linear_grid(wheel: Wheel, low: float, high: float) -> np.ndarray:
+def linear_grid(wheel: Wheel, low: float, high: float) -> np.ndarray:
     """(k,) circular frequencies of a band, as dense as the resonances of the linear wheel are wide
     by the damping of its modes.
     """
@@ -221,7 +221,7 @@ def pattern_response(
         tuned.omega / (2 * pi),
         found.peak,
         found.solution,
-        _free_factor(wheel, pattern, grid, harmonic),
+        free_factor(wheel, pattern, grid, harmonic),
         found.truncation,
         tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
         blades,
@@ -270,14 +270,14 @@ def _free_means(found: ChosenPeak) -> FreeMeans:
     )
 
 
-def _free_factor(
+def free_factor(
     wheel: Wheel,
     pattern: Pattern,
     grid: np.ndarray,
     harmonic: int,
 ) -> float:
     """Amplification without dampers over the same band."""
-    fine = _linear_grid(wheel, grid[0], grid[-1])
+    fine = linear_grid(wheel, grid[0], grid[-1])
     highest = max(wheel.excitation)
 
     def respond(pattern: Pattern) -> float:
