@@ -505,6 +505,11 @@ def test_scatter_of_several_masses_is_refused_before_long_work():
         refuse_scatter(scene)
 
 
+def test_scatter_of_a_scene_without_a_wheel_names_its_kind():
+    with pytest.raises(InputError, match="a scene of kind 'plane blades' has no wheel"):
+        refuse_scatter(load_scene(MISTUNED.with_name("plane.toml")))
+
+
 @pytest.mark.parametrize(("given", "H"), [(None, 3), (7, 7)])
 def test_statistics_begin_with_few_harmonics(given, H):
     """A tuned curve under a light load may need more, unless the scene gives them."""

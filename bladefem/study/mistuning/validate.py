@@ -33,12 +33,7 @@ def check_mistuning(scene: Scene) -> None:
     """
     if not is_mistuned(scene):
         return
-    name = kind_named(scene.kind).sectors
-    if name is None:
-        raise InputError(f"mistuning: a scene of kind '{scene.kind}' has no wheel")
-    count = value_at(scene, name)
-    if count == 0:
-        raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
+    count = _wheel_blades(scene)
     scene_deviations(scene, count, scene.mistuning.families)
     other_blades(scene, count)
     if read_orders(scene) and scene.mistuning.level == LAW_LEVEL:
@@ -52,8 +47,9 @@ def refuse_scatter(scene: Scene) -> None:
     """Refuse what 'bladefem scatter' cannot draw.
 
     Raises:
-        InputError: the scene has no scatter, or several damper masses.
+        InputError: the scene has no wheel, no scatter, or several damper masses.
     """
+    _wheel_blades(scene)
     if scene.mistuning.scatter is None:
         raise InputError(
             "mistuning.scatter: expected a relative standard deviation of the blades' "
@@ -69,6 +65,21 @@ def refuse_scatter(scene: Scene) -> None:
             f"mistuning.traction = {scene.mistuning.traction:g}: the law of one damper knows one "
             'state of its friction forces, expected mistuning.level = "whole wheel"'
         )
+
+
+def _wheel_blades(scene: Scene) -> int:
+    """Number of blades of the scene's wheel.
+
+    Raises:
+        InputError: it has none.
+    """
+    name = kind_named(scene.kind).sectors
+    if name is None:
+        raise InputError(f"mistuning: a scene of kind '{scene.kind}' has no wheel")
+    count = int(value_at(scene, name))
+    if count == 0:
+        raise InputError("mistuning: expected a wheel, imported.sectors = 0 has a single blade")
+    return count
 
 
 def scene_deviations(
