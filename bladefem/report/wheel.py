@@ -13,6 +13,7 @@ import pandas as pd
 
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.scatter_use import SHARE, ScatteredUse
+from ..util.message import warning
 from ..view import wheel as view
 from ..wheel.statistics import (
     Amplification,
@@ -358,11 +359,22 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
             "mean displacements are held in the preload state (model.static): what free ones "
             "change is not known"
         ]
-    said = []
+    said: list[str] = []
     for i, held in enumerate(found.tuned_held):
         if np.isnan(held):
             continue
         known = found.free[i]
+        at_least = found.tuned_at_least[i]
+        if np.isfinite(at_least):
+            said.append(
+                warning(
+                    f"{found.loads[i]:g} N: mean displacements are held in the preload state, "
+                    f"which gives {1e6 * found.tuned[i]:.4g} um for the tuned wheel; with free "
+                    f"ones it moves {1e6 * at_least:.4g} um or more: next to that point no balance "
+                    "was found, and where its resonance lies is not known"
+                )
+            )
+            continue
         if not known.any():
             said.append(
                 f"{found.loads[i]:g} N: mean displacements are held in the preload state, no "

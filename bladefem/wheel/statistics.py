@@ -88,6 +88,9 @@ class Amplification:
     # (L,) peak of the tuned wheel with held mean displacements [m], where free ones were asked for:
     # NaN elsewhere; empty where no whole wheel was solved
     tuned_held: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (L,) its height with free means at a point next to one that was not solved, where held ones
+    # count though they may be far too low [m]; NaN elsewhere, empty as above
+    tuned_at_least: RealArray = field(default_factory=lambda: np.zeros(0))
     # (L, C) of the wheels that were checked, (L, W) where all are whole: amplification with held
     # means of both, and whether the one with free means is known, which then counts
     held_factor: RealArray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -198,17 +201,17 @@ def _statistics_of_load(
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
     mine = range(rank, len(patterns), ranks)
     tuned = search(load, TUNED_PATTERN)
-    rows = np.zeros((7, len(patterns)))
+    rows = np.zeros((8, len(patterns)))
     for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
         found = search(load, patterns[j])
         # where the tuned wheel has no free means, the others' do not count
         peak = found.held if tuned.free is None else found.peak
-        rows[:3, j] = peak_heights(found)
-        rows[3:, j] = peak.blade, peak.omega, peak.unsolved, len(peak.omegas)
+        rows[:4, j] = peak_heights(found)
+        rows[4:, j] = peak.blade, peak.omega, peak.unsolved, len(peak.omegas)
     if comm is not None:
         rows = comm.allreduce(rows)
-    compared = compared_peaks(np.column_stack([peak_heights(tuned), rows[:3]]))
-    blade, omega, unsolved, points = rows[3:]
+    compared = compared_peaks(np.column_stack([peak_heights(tuned), rows[:4]]))
+    blade, omega, unsolved, points = rows[4:]
     return Amplification(
         np.array([load]),
         np.array([compared.tuned]),
@@ -220,6 +223,7 @@ def _statistics_of_load(
         points.astype(int)[None],
         *no_checks(1),
         tuned_held=np.array([compared.tuned_held]),
+        tuned_at_least=np.array([compared.tuned_at_least]),
         held_factor=compared.held_factor[None],
         free=compared.free[None],
     )

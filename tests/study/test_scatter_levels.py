@@ -13,6 +13,7 @@ from bladefem.report.wheel import scatter_sentences, scatter_table
 from bladefem.study.mistuning import peak_choice
 from bladefem.study.mistuning.law_level import with_checks
 from bladefem.study.mistuning.peak_choice import chosen_peak, pattern_peak
+from bladefem.util.message import Message
 from bladefem.wheel.local_peak import LocalPeak
 from bladefem.wheel.lumped import lumped_pattern
 from bladefem.wheel.model import Pattern
@@ -61,13 +62,42 @@ def test_a_free_maximum_beside_a_lost_point_does_not_count(monkeypatch):
         monkeypatch.setattr(peak_choice, "local_peak", lambda *_, again=again: again)
         found = pattern_peak(held, free, Pattern(), grid, (2, 64), 1, DEFAULT_OPTIONS)
         assert found.asked and (found.free is not None) == known
+        assert np.isnan(found.at_least) if known else found.at_least == 2.0
+
+
+def test_a_tuned_wheel_that_moves_further_with_free_means_is_told():
+    """Where its resonance with free means is not closed in, those that are held count."""
+    heights = np.array([[2.0, 3.0], [np.nan, np.nan], [1.0, 1.0], [3.1, np.nan]])
+    compared = compared_peaks(heights)
+    assert compared.tuned == 2.0 and compared.tuned_at_least == 3.1
+    none = np.zeros((1, 1), dtype=int)
+    one = np.ones(1)
+    found = Amplification(
+        one,
+        2e-6 * one,
+        one,
+        np.full((1, 1), 3e-6),
+        none,
+        np.ones((1, 1)),
+        none,
+        none,
+        *no_checks(1),
+        tuned_held=2e-6 * one,
+        tuned_at_least=3.1e-6 * one,
+        held_factor=compared.held_factor[None],
+        free=compared.free[None],
+    )
+    (said,) = [text for text in scatter_sentences(found) if "held" in text]
+    assert isinstance(said, Message) and said.level == "warning"
+    assert "it moves 3.1 um or more" in said
 
 
 def test_like_is_compared_with_like():
     """A wheel without a balance of free means keeps its amplification with held ones, and where the
     tuned wheel has none all of them do.
     """
-    heights = np.array([[2.0, 3.0, 4.0], [1.9, 2.85, np.nan], [1.0, 1.0, 1.0]])
+    nowhere = np.full(3, np.nan)
+    heights = np.array([[2.0, 3.0, 4.0], [1.9, 2.85, np.nan], [1.0, 1.0, 1.0], nowhere])
     found = compared_peaks(heights)
     assert found.tuned == 1.9 and found.tuned_held == 2.0
     np.testing.assert_allclose(found.height / found.tuned, [1.5, 2.0])
@@ -75,6 +105,7 @@ def test_like_is_compared_with_like():
     heights[1, 0] = np.nan
     without = compared_peaks(heights)
     assert without.tuned == 2.0 and not without.free.any()
+    assert np.isnan(without.tuned_at_least)
     np.testing.assert_array_equal(without.height, [3.0, 4.0])
     heights[2] = 0.0
     assert np.isnan(compared_peaks(heights).tuned_held)

@@ -4,6 +4,7 @@ whole wheels or by the damper law.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,15 +62,15 @@ class DrawnWheels:
         """Circular frequencies at which the resonance with a pattern is looked for [rad/s]."""
         return frequency_grid(self.wheel, self.curve, pattern, self.spread, self.harmonic)
 
-    def peak(self, pattern: Pattern, chosen: ChosenPeak) -> PatternPeak:
+    def peak(self, pattern: Pattern, chosen: ChosenPeak, free: bool = True) -> PatternPeak:
         """The highest blade with a pattern, by the harmonics that were chosen.
 
-        Where the first wheel drawn has no balance with free means none is looked for: that takes
-        ten times as long as the rest, and is as little likely.
+        Args:
+            free: look for it with free means too, where the scene has these.
         """
         found = pattern_peak(
             self.wheel,
-            None if chosen.free is None else self.free,
+            self.free if free else None,
             pattern,
             self.grid(pattern),
             (chosen.harmonics, chosen.samples),
@@ -114,8 +115,22 @@ def drawn_statistics(
     """Statistics of the highest blade, at the level that the scene asks for."""
     # by the first wheel drawn: all have the same contacts
     chosen = on_root(comm, lambda: _chosen_balance(drawn))
-    by_law = drawn.scene.mistuning.level == LAW_LEVEL
-    found = (_by_damper_law if by_law else _by_whole_wheels)(drawn, chosen, comm, progress)
+    tuned = on_root(comm, lambda: drawn.peak(TUNED_PATTERN, chosen))
+
+    def search(pattern: Pattern) -> PatternPeak:
+        # free means count only where the tuned wheel has them too
+        return (
+            tuned
+            if pattern is TUNED_PATTERN
+            else drawn.peak(pattern, chosen, tuned.free is not None)
+        )
+
+    if drawn.scene.mistuning.level == LAW_LEVEL:
+        found = _by_damper_law(drawn, chosen, search, comm, progress)
+    else:
+        # one by one, dealt out over the ranks
+        patterns = {drawn.curve.load: drawn.patterns}
+        found = scatter_statistics(patterns, lambda _, pattern: search(pattern), comm, progress)
     return with_balance(found, chosen)
 
 
@@ -138,6 +153,7 @@ def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
 def _by_damper_law(
     drawn: DrawnWheels,
     chosen: ChosenPeak,
+    search: Callable[[Pattern], PatternPeak],
     comm: Communicator | None,
     progress: Progress,
 ) -> Amplification:
@@ -150,29 +166,7 @@ def _by_damper_law(
     cheap = on_root(
         comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, chosen.harmonics, band)
     )
-    return with_checks(
-        cheap,
-        drawn.patterns,
-        lambda pattern: drawn.peak(pattern, chosen),
-        scene.mistuning.checks,
-        comm,
-        progress,
-    )
-
-
-def _by_whole_wheels(
-    drawn: DrawnWheels,
-    chosen: ChosenPeak,
-    comm: Communicator | None,
-    progress: Progress,
-) -> Amplification:
-    """All wheels one by one, dealt out over the ranks."""
-    return scatter_statistics(
-        {drawn.curve.load: drawn.patterns},
-        lambda _, pattern: drawn.peak(pattern, chosen),
-        comm,
-        progress,
-    )
+    return with_checks(cheap, drawn.patterns, search, scene.mistuning.checks, comm, progress)
 
 
 def scatter_balance(scene: Scene, wheel: Wheel, curve: Curve) -> tuple[int, int]:
