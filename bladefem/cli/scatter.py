@@ -49,6 +49,7 @@ def _write_results(
     """The table as text, and the files of the folder."""
     from ..report.tables import readable_texts, write_tables
     from ..report.wheel import (
+        optimum_is_known,
         optimum_table,
         scatter_drawings,
         scatter_headlines,
@@ -61,7 +62,7 @@ def _write_results(
     parts = {
         "wheel/scatter": scatter_table(found),
     }
-    if len(found.loads) > 1:
+    if optimum_is_known(found):
         parts["wheel/scatter_optima"] = optimum_table(found)
     if used:
         parts["wheel/scatter_utilisation"] = use_table(used)

@@ -13,6 +13,7 @@ import pandas as pd
 
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.scatter_use import SHARE, ScatteredUse
+from ..study.mistuning.sector_comparison import SectorComparison, comparison_words
 from ..util.message import warning
 from ..view import wheel as view
 from ..wheel.statistics import (
@@ -22,10 +23,12 @@ from ..wheel.statistics import (
     robust_optimum,
 )
 from .fatigue import WorstUse
-from .headlines import Headline
+from .headlines import NOT_DETERMINED, Headline
 
 # all blades at the highest point
 WHEEL_FIGURE = "wheel/wheel_motion"
+# the first headline of a scatter
+ROBUST_OPTIMUM = "robust optimum of the load of a seat"
 # quantiles of a scatter
 SCATTER_QUANTILES = (0.5, 0.95, 0.99)
 
@@ -129,32 +132,51 @@ def pattern_drawings(
 
 
 def scatter_table(found: Amplification) -> pd.DataFrame:
-    """One row a load: quantiles of the amplification with intervals, and the worst wheel."""
+    """One row a load: quantiles of the amplification with intervals, and the worst wheel, NaN where
+    the amplification is not known.
+    """
     rows = []
     for i, load in enumerate(found.loads):
         row = {
             "load": load,
             "tuned_amplitude": found.tuned[i],
+            **_comparison_columns(found, i),
             **_free_columns(found, i),
             "wheels": found.factor.shape[1],
         }
+        known = 1.0 if found.is_known[i] else float("nan")
         for share in SCATTER_QUANTILES:
             q = found.quantile(i, share)
             name = f"p{100 * share:g}"
-            row |= {name: q.value, f"{name}_low": q.low, f"{name}_high": q.high}
+            row |= {
+                name: known * q.value,
+                f"{name}_low": known * q.low,
+                f"{name}_high": known * q.high,
+            }
         if found.checked.shape[1]:
-            row["calibration"] = found.calibration[i]
-            row["law_error"] = abs(found.check_errors[i]).max()
+            row["calibration"] = known * found.calibration[i]
+            row["law_error"] = known * abs(found.check_errors[i]).max()
         if len(found.harmonics):
             row |= {"harmonics": int(found.harmonics[i]), "truncation": found.truncation[i]}
         row |= {
-            "worst": found.factor[i].max(),
-            "highest_amplitude": found.peak[i].max(),
+            "worst": known * found.factor[i].max(),
+            "highest_amplitude": known * found.peak[i].max(),
             "unconverged": int(found.unsolved[i].sum()),
             "points": int(found.points[i].sum()),
         }
         rows.append(row)
     return pd.DataFrame(rows)
+
+
+def _comparison_columns(found: Amplification, load: int) -> dict[str, float]:
+    """The tuned wheel by both ways, and whether these agree; empty where they were not compared."""
+    if not len(found.agrees):
+        return {}
+    return {
+        "tuned_amplitude_balance": found.tuned_balance[load],
+        "tuned_amplitude_sector": found.tuned_sector[load],
+        "amplification_known": bool(found.is_known[load]),
+    }
 
 
 def _free_columns(found: Amplification, load: int) -> dict[str, float]:
@@ -241,11 +263,19 @@ def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
 
 
 def scatter_headlines(found: Amplification) -> list[Headline]:
-    """First numbers of the statistics; one load alone has no optimum."""
-    i = int(np.argmin(found.tuned))
+    """First numbers of the statistics, as far as they are known; one load alone has no optimum."""
+    numbers = []
+    if optimum_is_known(found):
+        numbers = _optimum_headlines(found)
+    elif len(found.loads) > 1:
+        why = "amplifications are not known where the drawn wheels are lowest"
+        numbers = [Headline(ROBUST_OPTIMUM, NOT_DETERMINED, why, "")]
+    i = _lowest_known(found)
+    if i is None:
+        return numbers
     factor = found.quantile(i, SHARE)
     return [
-        *(_optimum_headlines(found) if len(found.loads) > 1 else []),
+        *numbers,
         Headline(
             f"amplification at {found.loads[i]:.4g} N, where the tuned wheel is lowest",
             f"{factor.value:.3g}",
@@ -262,7 +292,7 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
     words = f"{100 * robust.share:g} % of {found.peak.shape[1]} wheels"
     return [
         Headline(
-            "robust optimum of the load of a seat",
+            ROBUST_OPTIMUM,
             f"{robust.load.value:.4g} N",
             f"95 % interval {robust.load.low:.4g} to {robust.load.high:.4g} N",
             f"lowest amplitude that {words} stay below, by the bootstrap over the wheels",
@@ -302,12 +332,15 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
         held_means: the scene holds the dampers' mean displacements.
     """
     sentences = _optimum_sentences(found)
-    i = int(np.argmin(found.tuned))
-    q = found.quantile(i, 0.95)
-    sentences.append(
-        f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of {found.peak.shape[1]} "
-        f"wheels stay below {q.value:.3g} times it (95 % interval {q.low:.3g} to {_upper(q.high)})"
-    )
+    i = _lowest_known(found)
+    if i is not None:
+        q = found.quantile(i, 0.95)
+        sentences.append(
+            f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of "
+            f"{found.peak.shape[1]} wheels stay below {q.value:.3g} times it (95 % interval "
+            f"{q.low:.3g} to {_upper(q.high)})"
+        )
+    sentences.extend(_comparison_sentences(found))
     if found.checked.shape[1]:
         sentences.extend(_law_sentences(found))
     sentences.extend(_mean_sentences(found, held_means))
@@ -325,11 +358,38 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
     return sentences
 
 
+def _lowest_known(found: Amplification) -> int | None:
+    """Number of the load with the lowest tuned wheel among those whose amplification is known."""
+    known = np.flatnonzero(found.is_known)
+    return int(known[np.argmin(found.tuned[known])]) if len(known) else None
+
+
+def optimum_is_known(found: Amplification) -> bool:
+    """There are several loads, and where the drawn wheels are lowest their amplification is known."""
+    heights = np.quantile(found.peak, SHARE, axis=1)
+    return len(found.loads) > 1 and bool(found.is_known[np.argmin(heights)])
+
+
+def _comparison_sentences(found: Amplification) -> list[str]:
+    """Loads under which the balance of all blades does not describe the wheel."""
+    return [
+        warning(
+            f"{found.loads[i]:g} N: "
+            + comparison_words(
+                SectorComparison(found.tuned_balance[i], found.tuned_sector[i], agrees=False)
+            )
+            + ", and the amplification of mistuned wheels under this load is not known"
+        )
+        for i in np.flatnonzero(~found.is_known)
+    ]
+
+
 def _law_sentences(found: Amplification) -> list[str]:
     """What the damper law is off by, and what was done about it; one a load."""
     checks, wheels = found.checked.shape[1], found.factor.shape[1]
     said = []
-    for load, harmonics, factor, error, rest in zip(
+    for known, load, harmonics, factor, error, rest in zip(
+        found.is_known,
         found.loads,
         found.law_harmonics,
         found.calibration,
@@ -337,6 +397,8 @@ def _law_sentences(found: Amplification) -> list[str]:
         100 * (found.calibration_bounds - 1),
         strict=True,
     ):
+        if not known:
+            continue
         text = (
             f"{load:g} N: wheels by the law of one damper, harmonics 1 to {harmonics}; {checks} "
             f"of them solved in full, from the lowest to the highest: the law is off by "
@@ -364,16 +426,8 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
         if np.isnan(held):
             continue
         known = found.free[i]
-        at_least = found.tuned_at_least[i]
-        if np.isfinite(at_least):
-            said.append(
-                warning(
-                    f"{found.loads[i]:g} N: mean displacements are held in the preload state, "
-                    f"which gives {1e6 * found.tuned[i]:.4g} um for the tuned wheel; with free "
-                    f"ones it moves {1e6 * at_least:.4g} um or more: next to that point no balance "
-                    "was found, and where its resonance lies is not known"
-                )
-            )
+        if not found.is_known[i]:
+            # said by `_comparison_sentences`
             continue
         if not known.any():
             said.append(
@@ -398,6 +452,13 @@ def _optimum_sentences(found: Amplification) -> list[str]:
     """Both optima; one load alone has none."""
     if len(found.loads) < 2:
         return ["one load has no optimum, expected several in study.loads"]
+    if not optimum_is_known(found):
+        return [
+            warning(
+                "no robust optimum is given: under the load at which the drawn wheels are lowest "
+                "their amplification is not known"
+            )
+        ]
     (load, height), robust = optima_of_scatter(found)
     sentences = [
         f"tuned optimum: {load:.4g} N, {1e6 * height:.4g} um",
@@ -425,20 +486,29 @@ def marked_optima(found: Amplification) -> list[tuple[str, float, float, float]]
 
 
 def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]]:
-    """Bands against the load, and the histogram at the tuned optimum."""
+    """Bands against the load, and the histogram under the load with the lowest tuned wheel, where
+    amplifications are known.
+    """
+    drawings: dict[str, Callable[[Path], object]] = {}
+    i = _lowest_known(found)
+    if i is not None:
+        marks = {f"{100 * s:g} %": found.quantile(i, s).value for s in SCATTER_QUANTILES[:2]}
+        drawings["wheel/scatter_histogram"] = partial(
+            view.draw_histogram, found.factor[i], marks, f"{found.loads[i]:g} N"
+        )
+    if len(found.loads) > 1:
+        optima = marked_optima(found) if optimum_is_known(found) else []
+        drawings["wheel/scatter_chart"] = partial(
+            view.draw_bands, found.loads, found.tuned, _known_bands(found), optima
+        )
+    return drawings
+
+
+def _known_bands(found: Amplification) -> dict[str, np.ndarray]:
+    """(L, 3) quantiles of the highest blade with their intervals [m], NaN where not known."""
     bands = {}
     for share in SCATTER_QUANTILES[:2]:
         rows = np.array([[q.value, q.low, q.high] for q in found.quantiles(share)])
+        rows[~found.is_known] = np.nan
         bands[f"{100 * share:g} % of wheels"] = found.tuned[:, None] * rows
-    i = int(np.argmin(found.tuned))
-    marks = {f"{100 * s:g} %": found.quantile(i, s).value for s in SCATTER_QUANTILES[:2]}
-    drawings: dict[str, Callable[[Path], object]] = {
-        "wheel/scatter_histogram": partial(
-            view.draw_histogram, found.factor[i], marks, f"{found.loads[i]:g} N"
-        )
-    }
-    if len(found.loads) > 1:
-        drawings["wheel/scatter_chart"] = partial(
-            view.draw_bands, found.loads, found.tuned, bands, marked_optima(found)
-        )
-    return drawings
+    return bands

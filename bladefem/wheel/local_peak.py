@@ -14,16 +14,20 @@ import numpy as np
 
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from .model import Pattern, Wheel
-from .resonance import Respond, WheelPeak, find_wheel_peak
+from .resonance import LOST_GAIN, Respond, WheelPeak, find_wheel_peak, lost_gain
 from .solve import WheelSolution, solve_wheel
 
-# times that a bracket is widened, each time to twice its width, until it encloses a maximum
-MOST_WIDENINGS = 6
 # of the frequency: from the peak of held means to the first points on both sides, at most. On the
-# shipped wheel points 0.07 % apart take 2 s each, and one 0.4 % away is not reached from the peak
+# shipped wheel points 0.07 % apart take 2 s each
 FIRST_REACH = 1e-3
-# of that: where a point at it is not solved
-NEARER_REACH = 0.5
+# of that: the shortest step from a solved point to a next one
+SHORTEST_STEP = 1 / 16
+# steps to the higher side until a maximum is enclosed, each up to twice as long as the one before
+MOST_STEPS = 24
+# of a step that was halved: the next one, so that it passes a point that was lost from farther away
+NEXT_STEP = 0.8
+# of the distance of two solved points: how far from them their secant predicts
+LONGEST_PREDICTION = 4.0
 # over the largest relative change by free means that was seen: the change at other peaks
 CHANGE_MARGIN = 2.0
 
@@ -59,19 +63,38 @@ class LocalBalances:
     def __call__(self, omega: float) -> np.ndarray:
         """(N,) amplitudes of the blades [m], NaN where the point is not solved."""
         if omega not in self.points:
-            known = [point for point in self.points.values() if point.converged]
-            nearest = min(known, key=lambda point: abs(point.omega - omega), default=self.start)
             self.points[omega] = solve_wheel(
                 self.wheel,
                 omega,
                 self.harmonics,
                 self.samples,
                 pattern=self.pattern,
-                start=nearest,
+                start=self._start(omega),
                 options=self.options,
             )
         point = self.points[omega]
         return point.size() if point.converged else np.full(self.wheel.count, np.nan)
+
+    def _start(self, omega: float) -> WheelSolution | None:
+        """The nearest point, or the secant through the two nearest where the same dampers walk: a
+        curve is then followed over a fold's shoulder, where its slope is large.
+        """
+        known = [point for point in self.points.values() if point.converged]
+        near = sorted(known, key=lambda point: abs(point.omega - omega))[:2]
+        if len(near) < 2:
+            return near[0] if near else self.start
+        first, second = near
+        share = (omega - first.omega) / (first.omega - second.omega)
+        if not _walk_alike(first, second) or abs(share) > LONGEST_PREDICTION:
+            return first
+        return replace(first, w=first.w + share * (first.w - second.w))
+
+
+def _walk_alike(one: WheelSolution, other: WheelSolution) -> bool:
+    """The same dampers walk, some of them."""
+    if one.walk is None or other.walk is None:
+        return False
+    return bool((one.walk.dampers == other.walk.dampers).all())
 
 
 def find_local_peak(
@@ -127,36 +150,72 @@ def _maxima(heights: np.ndarray) -> np.ndarray:
 
 def _bracket(respond: Respond, omegas: np.ndarray, i: int) -> np.ndarray | None:
     """(k,) ascending circular frequencies round point i of a curve, of which an inner one has the
-    highest amplitude where widening leads to one; None where the balance at the point itself is not
-    found.
+    highest amplitude where the curve can be followed to one; None where the balance at the point
+    itself is not found.
     """
-    if not np.isfinite(respond(omegas[i])).all():
+    curve = _Followed(respond, omegas[i])
+    if not curve.solved:
         return None
     reach = FIRST_REACH * omegas[i]
     below = min(reach, omegas[i] - omegas[i - 1]) if i > 0 else reach
     above = min(reach, omegas[i + 1] - omegas[i]) if i + 1 < len(omegas) else reach
-    sides = [_solved_beside(respond, omegas[i], reach) for reach in (-below, above)]
-    grid = [sides[0], omegas[i], sides[1]]
-    for _ in range(MOST_WIDENINGS):
-        sizes = np.array([respond(w) for w in grid])
-        heights = np.where(np.isfinite(sizes), sizes, 0.0).max(axis=1)
-        top = int(np.argmax(heights))
-        width = grid[-1] - grid[0]
-        if top == 0:
-            grid.insert(0, grid[0] - width)
-        elif top == len(grid) - 1:
-            grid.append(grid[-1] + width)
-        else:
+    curve.steps = {-1: below, 1: above}
+    curve.extend(-1)
+    curve.extend(1)
+    for _ in range(MOST_STEPS):
+        side = curve.higher_side()
+        if side == 0 or not curve.extend(side):
             break
-    return np.array(grid)
+    return np.array(sorted(curve.heights))
 
 
-def _solved_beside(respond: Respond, omega: float, reach: float) -> float:
-    """The circular frequency that far from another, or nearer where only that one is solved."""
-    far, near = omega + reach, omega + NEARER_REACH * reach
-    if not np.isfinite(respond(far)).all() and np.isfinite(respond(near)).all():
-        return near
-    return far
+class _Followed:
+    """A curve that is followed from one frequency to both sides, by steps that get longer until a
+    point is not solved, and shorter from then on.
+    """
+
+    def __init__(self, respond: Respond, first: float) -> None:
+        self.respond = respond
+        # highest amplitude by circular frequency; NaN: not solved
+        self.heights: dict[float, float] = {}
+        # length of the next step downwards (-1) and upwards (1) [rad/s]
+        self.steps: dict[int, float] = {}
+        self.solved = self.add(first)
+
+    def add(self, omega: float) -> bool:
+        """Ask for a point; False where it is not solved."""
+        height = float(self.respond(omega).max())
+        self.heights[omega] = height
+        return bool(np.isfinite(height))
+
+    def end(self, side: int) -> float:
+        """The outermost frequency that is solved."""
+        solved = (omega for omega, height in self.heights.items() if np.isfinite(height))
+        return max(solved, key=lambda omega: side * omega)
+
+    def higher_side(self) -> int:
+        """The end that has the highest amplitude, -1 or 1, where beyond it there may be more than
+        what a search leaves; else 0.
+        """
+        omegas = np.array(sorted(self.heights))
+        heights = np.array([self.heights[omega] for omega in omegas])
+        top = omegas[np.nanargmax(heights)]
+        side = next((side for side in (-1, 1) if top == self.end(side)), 0)
+        return side if lost_gain(omegas, heights) > LOST_GAIN else 0
+
+    def extend(self, side: int) -> bool:
+        """Go one step on; False where no point is solved at the end of a shortest one."""
+        end = self.end(side)
+        step = self.steps[side]
+        shortest = min(step, SHORTEST_STEP * FIRST_REACH * end)
+        longer = 2.0
+        while step >= shortest:
+            if self.add(end + side * step):
+                self.steps[side] = longer * step
+                return True
+            step /= 2
+            longer = NEXT_STEP
+        return False
 
 
 def _joined(

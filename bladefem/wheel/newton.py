@@ -47,6 +47,9 @@ QUADRATIC_REDUCTION = 1e-2
 MEAN_WEIGHT = 1e-2
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-8
+# steps whose GMRES did not reach its accuracy, after which Newton is given up where its caller has
+# no other way: each takes all products, and those that converge have none
+MOST_UNSOLVED_STEPS = 2
 # products of one solve from which a new preconditioner pays, and from which one of the other kind
 # is tried
 SLOW_SOLVE_PRODUCTS = 12
@@ -156,7 +159,7 @@ def newton_wheel(
             next, which does not depend on how the equations are scaled (Deuflhard, Newton Methods
             for Nonlinear Problems, 2004, Sect. 3.3), or "residual", which costs no more solves.
     """
-    steps = _Steps(balance)
+    steps = _Steps(balance, MOST_UNSOLVED_STEPS if not options.fallbacks else None)
     run = iterate_newton(
         evaluate_wheel(balance, w),
         lambda state: state.error if state.forces.converged else np.inf,
@@ -177,8 +180,11 @@ class _Steps:
     couple, and another where the present one takes long.
     """
 
-    def __init__(self, balance: WheelBalance) -> None:
+    def __init__(self, balance: WheelBalance, most_unsolved: int | None) -> None:
         self.balance = balance
+        # steps whose GMRES did not reach its accuracy: at most, None for any number, and so far
+        self.most_unsolved = most_unsolved
+        self.unsolved = 0
         self.preconditioner: AnyPreconditioner | None = None
         self.stale = True
         self.products = 0
@@ -216,6 +222,10 @@ class _Steps:
         if new:
             self.took[self.kind] = taken
         self.stale = taken > (COUPLED_PRODUCTS if self.kind == "coupled" else SLOW_SOLVE_PRODUCTS)
+        self.unsolved += failed
+        if failed and self.unsolved == self.most_unsolved:
+            text = f"GMRES did not converge in {self.unsolved} steps, residual {state.error:.1e}"
+            raise StepError(Outcome.SINGULAR, text)
         return found, not failed
 
     def _choose_kind(self) -> None:

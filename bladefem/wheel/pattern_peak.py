@@ -24,9 +24,6 @@ class PatternPeak:
     free: LocalPeak | None = None
     # free means were asked for
     asked: bool = False
-    # height with free means at a point next to one that was not solved, where the resonance may be
-    # higher still [m]; NaN where there is no such point
-    at_least: float = float("nan")
 
     @property
     def peak(self) -> WheelPeak:
@@ -44,8 +41,6 @@ class ComparedPeaks:
     height: RealArray
     # of the tuned wheel with held means [m]; NaN where free ones were not asked for
     tuned_held: float
-    # of the tuned wheel: `PatternPeak.at_least`
-    tuned_at_least: float
     # (W,) amplification with held means [1]
     held_factor: RealArray
     # (W,) True where that with free ones is known
@@ -57,23 +52,23 @@ def compared_peaks(heights: np.ndarray) -> ComparedPeaks:
     whose balance with free means was not found keeps its amplification with held ones, of both.
 
     Args:
-        heights: (4, 1 + W) of `peak_heights`, the tuned wheel first.
+        heights: (3, 1 + W) of `peak_heights`, the tuned wheel first.
     """
-    tuned_held, tuned_free, asked, at_least = map(float, heights[:, 0])
+    tuned_held, tuned_free, asked = map(float, heights[:, 0])
     held, free = heights[:2, 1:]
     factor = held / tuned_held
     against = tuned_held if asked else float("nan")
     if np.isnan(tuned_free):
         nowhere = np.zeros(len(held), dtype=bool)
-        return ComparedPeaks(tuned_held, held, against, at_least, factor, nowhere)
+        return ComparedPeaks(tuned_held, held, against, factor, nowhere)
     known = np.isfinite(free)
     height = np.where(known, free, factor * tuned_free)
-    return ComparedPeaks(tuned_free, height, against, at_least, factor, known)
+    return ComparedPeaks(tuned_free, height, against, factor, known)
 
 
 def peak_heights(found: PatternPeak) -> np.ndarray:
-    """(4,) heights with held means and with free ones [m], NaN where these are not known, whether
-    these were asked for, and `PatternPeak.at_least`.
+    """(3,) heights with held means and with free ones [m], NaN where these are not known, and
+    whether these were asked for.
     """
     free = float("nan") if found.free is None else found.free.peak.height
-    return np.array([found.held.height, free, float(found.asked), found.at_least])
+    return np.array([found.held.height, free, float(found.asked)])

@@ -19,6 +19,11 @@ MAX_ADDED_POINTS = 40
 # points closer than this are not distinguished, relative
 SAME_POINT = 1e-7
 
+# next to a point that was not solved, where the curve may end in a fold: relative gain of height that
+# is not looked for, up to that point and at least over this share of the frequency
+LOST_GAIN = 0.01
+LEAST_LOOK = 5e-4
+
 # amplitudes (N,) of the blades at a circular frequency, NaN where it was not solved
 Respond = Callable[[float], np.ndarray]
 
@@ -45,11 +50,35 @@ class WheelPeak:
 
     @property
     def closed_in(self) -> bool:
-        """The maximum lies between two points next to it that were solved."""
-        place = int(np.searchsorted(self.omegas, self.omega))
-        if place in (0, len(self.omegas) - 1):
-            return False
-        return bool(np.isfinite(self.sizes[[place - 1, place + 1]]).all())
+        """The maximum lies between two points next to it that were solved, or next to one that was
+        not, towards which hardly more is to be gained.
+        """
+        return lost_gain(self.omegas, self.sizes.max(axis=1)) <= LOST_GAIN
+
+
+def lost_gain(omegas: np.ndarray, heights: np.ndarray) -> float:
+    """Relative gain of height from the highest point of a curve towards a point next to it that was
+    not solved, on the line that comes from its other side. Zero where both points next to it are
+    solved, infinite at an end of the curve or where none is.
+
+    Args:
+        omegas: (k,) ascending circular frequencies [rad/s].
+        heights: (k,) [m], NaN where a point was not solved.
+    """
+    top = int(np.nanargmax(heights))
+    gain = 0.0
+    for side in (-1, 1):
+        beside, behind = top + side, top - side
+        if not (0 <= beside < len(omegas) and 0 <= behind < len(omegas)):
+            return float("inf")
+        if np.isfinite(heights[beside]):
+            continue
+        if not np.isfinite(heights[behind]):
+            return float("inf")
+        slope = (heights[top] - heights[behind]) / (omegas[top] - omegas[behind])
+        ahead = side * max(abs(omegas[beside] - omegas[top]), LEAST_LOOK * omegas[top])
+        gain = max(gain, slope * ahead / heights[top])
+    return float(gain)
 
 
 def find_wheel_peak(

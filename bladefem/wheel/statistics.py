@@ -88,9 +88,14 @@ class Amplification:
     # (L,) peak of the tuned wheel with held mean displacements [m], where free ones were asked for:
     # NaN elsewhere; empty where no whole wheel was solved
     tuned_held: RealArray = field(default_factory=lambda: np.zeros(0))
-    # (L,) its height with free means at a point next to one that was not solved, where held ones
-    # count though they may be far too low [m]; NaN elsewhere, empty as above
-    tuned_at_least: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (L,) peak of the tuned wheel by the balance of all blades and by the sector's own response,
+    # whose errors are judged and which counts where both do not agree [m], NaN where that is the
+    # response to other forces; empty where they were not compared
+    tuned_balance: RealArray = field(default_factory=lambda: np.zeros(0))
+    tuned_sector: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (L,) both agree within the error of the latter; where they do not amplifications are those of
+    # a balance that does not describe the wheel
+    agrees: BooleanArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
     # (L, C) of the wheels that were checked, (L, W) where all are whole: amplification with held
     # means of both, and whether the one with free means is known, which then counts
     held_factor: RealArray = field(default_factory=lambda: np.zeros((0, 0)))
@@ -119,6 +124,11 @@ class Amplification:
             bounds[:, 0] = off.min(axis=1, initial=1.0)
             bounds[:, 1] = off.max(axis=1, initial=1.0)
         return bounds
+
+    @property
+    def is_known(self) -> BooleanArray:
+        """(L,) False where the balance does not describe the wheel: see `agrees`."""
+        return self.agrees if len(self.agrees) else np.ones(len(self.loads), dtype=bool)
 
     @property
     def factor(self) -> np.ndarray:
@@ -201,17 +211,17 @@ def _statistics_of_load(
     rank, ranks = (comm.rank, comm.size) if comm is not None else (0, 1)
     mine = range(rank, len(patterns), ranks)
     tuned = search(load, TUNED_PATTERN)
-    rows = np.zeros((8, len(patterns)))
+    rows = np.zeros((7, len(patterns)))
     for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
         found = search(load, patterns[j])
         # where the tuned wheel has no free means, the others' do not count
         peak = found.held if tuned.free is None else found.peak
-        rows[:4, j] = peak_heights(found)
-        rows[4:, j] = peak.blade, peak.omega, peak.unsolved, len(peak.omegas)
+        rows[:3, j] = peak_heights(found)
+        rows[3:, j] = peak.blade, peak.omega, peak.unsolved, len(peak.omegas)
     if comm is not None:
         rows = comm.allreduce(rows)
-    compared = compared_peaks(np.column_stack([peak_heights(tuned), rows[:4]]))
-    blade, omega, unsolved, points = rows[4:]
+    compared = compared_peaks(np.column_stack([peak_heights(tuned), rows[:3]]))
+    blade, omega, unsolved, points = rows[3:]
     return Amplification(
         np.array([load]),
         np.array([compared.tuned]),
@@ -223,9 +233,38 @@ def _statistics_of_load(
         points.astype(int)[None],
         *no_checks(1),
         tuned_held=np.array([compared.tuned_held]),
-        tuned_at_least=np.array([compared.tuned_at_least]),
         held_factor=compared.held_factor[None],
         free=compared.free[None],
+    )
+
+
+def unknown_statistics(load: float, tuned: PatternPeak, wheels: int, checks: int) -> Amplification:
+    """Statistics of one load whose wheels were not solved: each counts as high as the tuned one,
+    below which the highest blade does not stay.
+
+    Args:
+        checks: wheels that are checked under other loads.
+    """
+    none = np.zeros((1, wheels), dtype=int)
+    alike = np.ones((1, checks))
+    omega = np.array([tuned.peak.omega])
+    asked = tuned.held.height if tuned.asked else float("nan")
+    return Amplification(
+        np.array([load]),
+        np.array([tuned.peak.height]),
+        omega,
+        np.full((1, wheels), tuned.peak.height),
+        none,
+        np.broadcast_to(omega, (1, wheels)).copy(),
+        none,
+        none,
+        np.arange(checks)[None],
+        alike,
+        alike,
+        law_harmonics=np.zeros(1 if checks else 0, dtype=int),
+        tuned_held=np.array([asked]),
+        held_factor=np.ones((1, checks or wheels)),
+        free=np.zeros((1, checks or wheels), dtype=bool),
     )
 
 

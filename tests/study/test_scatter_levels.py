@@ -3,16 +3,27 @@ wheels that are solved in full.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from test_walking_dampers import BLADES, free_dampers, resonance
 
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
-from bladefem.report.wheel import scatter_sentences, scatter_table
+from bladefem.report.wheel import (
+    optimum_is_known,
+    scatter_headlines,
+    scatter_sentences,
+    scatter_table,
+)
 from bladefem.study.mistuning import peak_choice
 from bladefem.study.mistuning.law_level import with_checks
 from bladefem.study.mistuning.peak_choice import chosen_peak, pattern_peak
+from bladefem.study.mistuning.sector_comparison import (
+    SectorComparison,
+    compared_with_sector,
+    with_comparison,
+)
 from bladefem.util.message import Message
 from bladefem.wheel.local_peak import LocalPeak
 from bladefem.wheel.lumped import lumped_pattern
@@ -20,7 +31,12 @@ from bladefem.wheel.model import Pattern
 from bladefem.wheel.pattern_peak import PatternPeak, compared_peaks
 from bladefem.wheel.resonance import WheelPeak
 from bladefem.wheel.scatter import Scatter, drawn_patterns
-from bladefem.wheel.statistics import Amplification, no_checks, scatter_statistics
+from bladefem.wheel.statistics import (
+    Amplification,
+    joined_loads,
+    no_checks,
+    scatter_statistics,
+)
 
 
 def test_wheels_of_the_statistics_walk_as_one_wheel_does():
@@ -62,42 +78,73 @@ def test_a_free_maximum_beside_a_lost_point_does_not_count(monkeypatch):
         monkeypatch.setattr(peak_choice, "local_peak", lambda *_, again=again: again)
         found = pattern_peak(held, free, Pattern(), grid, (2, 64), 1, DEFAULT_OPTIONS)
         assert found.asked and (found.free is not None) == known
-        assert np.isnan(found.at_least) if known else found.at_least == 2.0
 
 
-def test_a_tuned_wheel_that_moves_further_with_free_means_is_told():
-    """Where its resonance with free means is not closed in, those that are held count."""
-    heights = np.array([[2.0, 3.0], [np.nan, np.nan], [1.0, 1.0], [3.1, np.nan]])
-    compared = compared_peaks(heights)
-    assert compared.tuned == 2.0 and compared.tuned_at_least == 3.1
-    none = np.zeros((1, 1), dtype=int)
+def of_one_load(load, tuned, factors, compared):
+    """Statistics of whole wheels that were compared with the sector."""
+    none = np.zeros((1, len(factors)), dtype=int)
     one = np.ones(1)
     found = Amplification(
+        load * one,
+        tuned * one,
         one,
-        2e-6 * one,
-        one,
-        np.full((1, 1), 3e-6),
+        tuned * factors[None],
         none,
-        np.ones((1, 1)),
+        one[None],
         none,
         none,
         *no_checks(1),
-        tuned_held=2e-6 * one,
-        tuned_at_least=3.1e-6 * one,
-        held_factor=compared.held_factor[None],
-        free=compared.free[None],
     )
-    (said,) = [text for text in scatter_sentences(found) if "held" in text]
+    return with_comparison(found, compared)
+
+
+def test_amplification_is_refused_where_the_sector_moves_otherwise():
+    """Quantiles, optimum and headlines leave out what the balance of all blades does not describe;
+    the tuned amplitude is the sector's.
+    """
+    factors = np.linspace(1.1, 1.3, 40)
+    good = [
+        of_one_load(load, tuned, factors, SectorComparison(tuned, 1.02 * tuned, True))
+        for load, tuned in ((80.0, 2e-4), (160.0, 3e-4))
+    ]
+    wrong = of_one_load(40.0, 3e-4, factors, SectorComparison(3e-4, 5e-4, False))
+    found = joined_loads([wrong, *good])
+    np.testing.assert_allclose(found.tuned, [5e-4, 2e-4, 3e-4])
+    np.testing.assert_allclose(found.factor, np.tile(factors, (3, 1)))
+    table = scatter_table(found)
+    numbers = ["p50", "p95_low", "p99_high", "worst", "highest_amplitude"]
+    assert table.loc[0, numbers].isna().all() and table.loc[1:, numbers].notna().all(axis=None)
+    assert list(table["amplification_known"]) == [False, True, True]
+    (said,) = [text for text in scatter_sentences(found) if "is not known" in text]
     assert isinstance(said, Message) and said.level == "warning"
-    assert "it moves 3.1 um or more" in said
+    assert "300 um for the tuned wheel" in said and "response 500 um" in said
+    assert optimum_is_known(found)
+    # the lowest wheels of all are those that are not known
+    low = of_one_load(40.0, 3e-4, factors, SectorComparison(3e-4, 1e-4, False))
+    found = joined_loads([low, *good])
+    assert not optimum_is_known(found)
+    assert any("no robust optimum" in text for text in scatter_sentences(found))
+    optimum, amplification = scatter_headlines(found)
+    assert optimum.value == "not determined"
+    assert amplification.what.startswith("amplification at 80 N")
+
+
+@pytest.mark.parametrize(("sector", "agrees"), [(1.09, True), (1.2, False), (0.8, False)])
+def test_tuned_wheel_is_compared_within_the_error_of_the_sector(sector, agrees):
+    several = free_dampers(np.array([4.0, 2.0]), 1.5)
+    wheel = replace(several, excitation={1: several.excitation[1]})
+    curve = SimpleNamespace(peak_amplitude=sector, error=0.05)
+    found = compared_with_sector(wheel, curve, 1.0, 0.05)
+    assert found.agrees == agrees and found.sector == sector
+    # the sector's response is that to one engine order
+    assert np.isnan(compared_with_sector(several, curve, 1.0, 0.05).sector)
 
 
 def test_like_is_compared_with_like():
     """A wheel without a balance of free means keeps its amplification with held ones, and where the
     tuned wheel has none all of them do.
     """
-    nowhere = np.full(3, np.nan)
-    heights = np.array([[2.0, 3.0, 4.0], [1.9, 2.85, np.nan], [1.0, 1.0, 1.0], nowhere])
+    heights = np.array([[2.0, 3.0, 4.0], [1.9, 2.85, np.nan], [1.0, 1.0, 1.0]])
     found = compared_peaks(heights)
     assert found.tuned == 1.9 and found.tuned_held == 2.0
     np.testing.assert_allclose(found.height / found.tuned, [1.5, 2.0])
@@ -105,7 +152,6 @@ def test_like_is_compared_with_like():
     heights[1, 0] = np.nan
     without = compared_peaks(heights)
     assert without.tuned == 2.0 and not without.free.any()
-    assert np.isnan(without.tuned_at_least)
     np.testing.assert_array_equal(without.height, [3.0, 4.0])
     heights[2] = 0.0
     assert np.isnan(compared_peaks(heights).tuned_held)

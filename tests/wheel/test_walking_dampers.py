@@ -18,7 +18,6 @@ from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.mistuning.peak_choice import pattern_peak
 from bladefem.wheel.local_peak import (
     FIRST_REACH,
-    NEARER_REACH,
     LocalBalances,
     find_local_peak,
 )
@@ -227,15 +226,20 @@ def test_amplification_with_free_means_is_that_of_marches(deviation):
 
 
 class Curves:
-    """Amplitudes of two blades with a resonance each, in place of balances."""
+    """Amplitudes of two blades with a resonance each, in place of balances.
 
-    def __init__(self, centres, heights, lost=()):
-        self.centres, self.heights, self.lost = np.array(centres), np.array(heights), lost
+    Args:
+        lost: frequencies without a balance; end: none from there on.
+    """
+
+    def __init__(self, centres, heights, lost=(), end=np.inf):
+        self.centres, self.heights = np.array(centres), np.array(heights)
+        self.lost, self.end = lost, end
         self.points = {}
 
     def __call__(self, omega):
         self.points[float(omega)] = SimpleNamespace(omega=omega)
-        if any(abs(omega - at) < 1e-6 for at in self.lost):
+        if omega > self.end or any(abs(omega - at) < 1e-6 for at in self.lost):
             return np.full(2, np.nan)
         return self.heights / np.hypot(1, (omega - self.centres) / 0.01)
 
@@ -271,7 +275,7 @@ def test_a_peak_without_a_balance_is_not_searched_again():
     assert find_local_peak(Curves([1.0, 1.2], [1.0, 0.9], [HELD.omega]), HELD, 1e-4) is None
 
 
-FAR, NEAR = HELD.omega * (1 + FIRST_REACH), HELD.omega * (1 + NEARER_REACH * FIRST_REACH)
+FAR = HELD.omega * (1 + FIRST_REACH)
 
 
 def test_a_nearer_point_takes_the_place_of_one_that_is_not_solved():
@@ -282,9 +286,19 @@ def test_a_nearer_point_takes_the_place_of_one_that_is_not_solved():
 
 def test_a_peak_next_to_points_that_are_not_solved_is_not_closed_in():
     """The resonance is beyond them, and higher."""
-    curves = Curves([HELD.omega + 0.02, 1.2], [1.0, 0.1], [FAR, NEAR])
+    curves = Curves([HELD.omega + 0.02, 1.2], [1.0, 0.1], end=HELD.omega + 0.01)
     found = find_local_peak(curves, HELD, 1e-4)
-    assert found.peak.height < 0.5 and not found.peak.closed_in
+    assert found.peak.height < 0.75 and not found.peak.closed_in
+    # it was followed nearly as far as there are points
+    assert found.peak.omega > HELD.omega + 0.0099
+
+
+def test_a_peak_at_the_end_of_a_curve_is_closed_in_where_hardly_more_can_be_gained():
+    """As next to a fold, beyond which there is no such motion."""
+    curves = Curves([HELD.omega + 0.02, 1.2], [1.0, 0.1], end=HELD.omega + 0.0195)
+    found = find_local_peak(curves, HELD, 1e-4)
+    assert found.peak.closed_in and found.peak.unsolved > 0
+    assert found.peak.height == pytest.approx(1.0, rel=5e-3)
 
 
 def test_peak_of_a_blade_that_is_not_the_highest():

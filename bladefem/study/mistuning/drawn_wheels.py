@@ -17,7 +17,7 @@ from ...wheel.model import Pattern, Wheel, frequency_pattern
 from ...wheel.pattern_peak import PatternPeak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.solve import TUNED_PATTERN
-from ...wheel.statistics import Amplification, scatter_statistics
+from ...wheel.statistics import Amplification, scatter_statistics, unknown_statistics
 from ...wheel.walking import with_free_means
 from ..adaptive.choice import solver_options
 from ..pipeline.loads import Curve
@@ -32,6 +32,7 @@ from .peak_choice import (
     pattern_peak,
     wanted_truncation,
 )
+from .sector_comparison import SectorComparison, compared_with_sector, with_comparison
 from .validate import LAW_LEVEL, scene_scatter
 
 # harmonics of the engine order that many wheels take at most: what these leave is told, and most of
@@ -62,10 +63,20 @@ class DrawnWheels:
         """Circular frequencies at which the resonance with a pattern is looked for [rad/s]."""
         return frequency_grid(self.wheel, self.curve, pattern, self.spread, self.harmonic)
 
-    def peak(self, pattern: Pattern, chosen: ChosenPeak, free: bool = True) -> PatternPeak:
-        """The highest blade with a pattern, by the harmonics that were chosen.
+    @property
+    def by_damper_law(self) -> bool:
+        """The scene asks for the cheap level, with some wheels checked."""
+        return self.scene.mistuning.level == LAW_LEVEL
+
+    def with_held_means(self) -> DrawnWheels:
+        """The same wheels, not searched again with free means."""
+        return replace(self, free=None)
+
+    def peak(self, pattern: Pattern, balance: tuple[int, int], free: bool = True) -> PatternPeak:
+        """The highest blade with a pattern.
 
         Args:
+            balance: harmonics and samples of the common period.
             free: look for it with free means too, where the scene has these.
         """
         found = pattern_peak(
@@ -73,7 +84,7 @@ class DrawnWheels:
             self.free if free else None,
             pattern,
             self.grid(pattern),
-            (chosen.harmonics, chosen.samples),
+            balance,
             self.harmonic,
             solver_options(self.scene.accuracy),
         )
@@ -113,29 +124,49 @@ def drawn_statistics(
     progress: Progress,
 ) -> Amplification:
     """Statistics of the highest blade, at the level that the scene asks for."""
-    # by the first wheel drawn: all have the same contacts
-    chosen = on_root(comm, lambda: _chosen_balance(drawn))
-    tuned = on_root(comm, lambda: drawn.peak(TUNED_PATTERN, chosen))
-
-    def search(pattern: Pattern) -> PatternPeak:
-        # free means count only where the tuned wheel has them too
-        return (
-            tuned
-            if pattern is TUNED_PATTERN
-            else drawn.peak(pattern, chosen, tuned.free is not None)
-        )
-
-    if drawn.scene.mistuning.level == LAW_LEVEL:
-        found = _by_damper_law(drawn, chosen, search, comm, progress)
+    balance = scatter_balance(drawn.scene, drawn.wheel, drawn.curve)
+    truncation = float("nan")
+    tuned, compared = on_root(comm, lambda: _compared(drawn, balance))
+    # free means of others take long, and count only where the tuned wheel has them
+    free = tuned.free is not None
+    if compared.agrees:
+        chosen = on_root(comm, lambda: _chosen_balance(drawn if free else drawn.with_held_means()))
+        truncation = chosen.truncation
+        if (chosen.harmonics, chosen.samples) != balance:
+            balance = chosen.harmonics, chosen.samples
+            tuned, compared = on_root(comm, lambda: _compared(drawn, balance))
+    if not compared.agrees:
+        wheels = len(drawn.patterns)
+        checks = min(drawn.scene.mistuning.checks, wheels) if drawn.by_damper_law else 0
+        found = unknown_statistics(drawn.curve.load, tuned, wheels, checks)
+    elif drawn.by_damper_law:
+        found = _by_damper_law(drawn, balance, tuned, comm, progress)
     else:
         # one by one, dealt out over the ranks
         patterns = {drawn.curve.load: drawn.patterns}
+        search = _search(drawn, balance, tuned)
         found = scatter_statistics(patterns, lambda _, pattern: search(pattern), comm, progress)
-    return with_balance(found, chosen)
+    found = replace(found, harmonics=np.array([balance[0]]), truncation=np.array([truncation]))
+    return with_comparison(found, compared)
+
+
+def _compared(drawn: DrawnWheels, balance: tuple[int, int]) -> tuple[PatternPeak, SectorComparison]:
+    """The tuned wheel by harmonics and samples of the common period, and next to the sector."""
+    tuned = drawn.peak(TUNED_PATTERN, balance)
+    height, accuracy = tuned.peak.height, drawn.scene.accuracy
+    return tuned, compared_with_sector(drawn.wheel, drawn.curve, height, accuracy)
+
+
+def _search(
+    drawn: DrawnWheels, balance: tuple[int, int], tuned: PatternPeak
+) -> Callable[[Pattern], PatternPeak]:
+    """What looks for a pattern's highest blade, as the tuned wheel's was found."""
+    free = tuned.free is not None
+    return lambda pattern: tuned if pattern is TUNED_PATTERN else drawn.peak(pattern, balance, free)
 
 
 def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
-    """Harmonics and samples that the first wheel needs."""
+    """Harmonics and samples that the first wheel needs: all have the same contacts."""
     pattern = drawn.patterns[0]
     return chosen_peak(
         drawn.wheel,
@@ -152,8 +183,8 @@ def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
 
 def _by_damper_law(
     drawn: DrawnWheels,
-    chosen: ChosenPeak,
-    search: Callable[[Pattern], PatternPeak],
+    balance: tuple[int, int],
+    tuned: PatternPeak,
     comm: Communicator | None,
     progress: Progress,
 ) -> Amplification:
@@ -164,8 +195,9 @@ def _by_damper_law(
     scatter = scene_scatter(scene)
     mode = scene.excitation.mode - 1
     cheap = on_root(
-        comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, chosen.harmonics, band)
+        comm, lambda: law_level(wheel, drawn.patterns, scatter, curve, mode, balance[0], band)
     )
+    search = _search(drawn, balance, tuned)
     return with_checks(cheap, drawn.patterns, search, scene.mistuning.checks, comm, progress)
 
 
@@ -178,12 +210,3 @@ def scatter_balance(scene: Scene, wheel: Wheel, curve: Curve) -> tuple[int, int]
     if scene.model.harmonics is None:
         H = min(H, max(SCATTER_HARMONICS * harmonic, *wheel.excitation))
     return H, samples
-
-
-def with_balance(found: Amplification, chosen: ChosenPeak) -> Amplification:
-    """Statistics of one load with the harmonics of its whole wheels, and what these leave."""
-    return replace(
-        found,
-        harmonics=np.array([chosen.harmonics]),
-        truncation=np.array([chosen.truncation]),
-    )

@@ -130,7 +130,7 @@ def with_checks(
     places = np.unique(np.linspace(0, len(order) - 1, checks).round().astype(int))
     chosen = order[places[::-1]]
     solved = [TUNED_PATTERN, *(patterns[i] for i in chosen)]
-    heights = np.zeros((4, len(solved)))
+    heights = np.zeros((3, len(solved)))
     mine = range(rank, len(solved), ranks)
     for i in progress(list(mine), f"checks under {found.loads[0]:g} N", len(mine)):
         heights[:, i] = peak_heights(whole_peak(solved[i]))
@@ -149,7 +149,6 @@ def with_checks(
         whole=whole[None],
         law=law[None],
         tuned_held=np.array([compared.tuned_held]),
-        tuned_at_least=np.array([compared.tuned_at_least]),
         held_factor=compared.held_factor[None],
         free=compared.free[None],
     )

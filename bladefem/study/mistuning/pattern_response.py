@@ -27,6 +27,7 @@ from .peak_choice import (
     in_common_period,
     local_peak,
 )
+from .sector_comparison import SectorComparison, compared_with_sector
 
 # points of the first look at a band
 FIRST_LOOK_POINTS = 15
@@ -80,6 +81,8 @@ class PatternResponse:
     sector_difference: float
     # the highest blade of each shape at its resonance, that of the peak first
     blades: tuple[DecidingBlade, ...]
+    # the tuned peak against the resonance that the run gives
+    compared: SectorComparison
     # None where the scene holds means, or no damper has a motion that friction alone resists
     free_means: FreeMeans | None = None
     # blades of another shape
@@ -180,6 +183,7 @@ def pattern_response(
     harmonic: int = 1,
     wanted: float | None = None,
     held_means: bool = True,
+    accuracy: float = 0.0,
 ) -> PatternResponse:
     """The wheel with one pattern, under the load of a curve.
 
@@ -195,6 +199,7 @@ def pattern_response(
         wanted: estimated error by harmonics and samples above which there are more of them; None:
             those of the curve.
         held_means: the scene holds them, and nobody asks what free ones do.
+        accuracy: relative, of the comparison with the curve beyond its own error.
     """
     grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
     free = None if held_means else with_free_means(wheel)
@@ -225,6 +230,7 @@ def pattern_response(
         found.truncation,
         tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
         blades,
+        compared_with_sector(wheel, curve, tuned.height, accuracy),
         None if free is None else _free_means(found),
         others,
         lost,

@@ -10,6 +10,7 @@ from ...util.message import warning
 from .deciding_blades import DecidingBlade
 from .other_blades import other_blade_sentences
 from .pattern_response import PatternResponse
+from .sector_comparison import comparison_words
 
 # relative change of the highest amplitude by free means from which both amplitudes are told
 NOTICEABLE_CHANGE = 0.005
@@ -24,6 +25,9 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
     sentences = []
     for r in found:
         sentences.append(_peak_sentence(r))
+        if not r.compared.agrees:
+            words = comparison_words(r.compared)
+            sentences.append(warning(f"{r.load:g} N: {words}; the highest blade is as uncertain"))
         sentences.extend(_shape_sentences(r))
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))

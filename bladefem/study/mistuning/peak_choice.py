@@ -145,9 +145,9 @@ def pattern_peak(
     # what Newton does not reach from the nearest walking balance nothing else is likely to
     simply = replace(options, fallbacks=False, iterations=MOST_WALKING_ITERATIONS)
     again = local_peak(LocalBalances(free, pattern, *balance, simply, near), first, harmonic)
-    if again is None or again.peak.closed_in:
-        return PatternPeak(first, again, True)
-    return PatternPeak(first, None, True, again.peak.height)
+    # the resonance may be higher beyond a point that was not solved
+    known = again is not None and again.peak.closed_in
+    return PatternPeak(first, again if known else None, True)
 
 
 def local_peak(

@@ -39,7 +39,8 @@ class ScatteredUse:
 
 
 def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
-    """The utilisation with scatter, one a load; empty where the scene gives no diagram.
+    """The utilisation with scatter, one a load whose amplification is known; empty where the scene
+    gives no diagram.
 
     Raises:
         InputError: the diagram does not reach a mean stress of the blade.
@@ -48,7 +49,8 @@ def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
     for number, used in run_utilisation(run).items():
         load = run.response.curves[number].load
         tuned = float(used.used[used.worst])
-        places = [i for i, one in enumerate(found.loads) if one == load]
+        # an amplification that is not known leaves that of the stress unknown too
+        places = [i for i, one in enumerate(found.loads) if one == load and found.is_known[i]]
         for i in places:
             factor = found.quantile(i, SHARE)
             share = Quantile(*(tuned * one for one in (factor.value, factor.low, factor.high)))

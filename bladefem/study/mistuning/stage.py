@@ -146,6 +146,7 @@ def _best_response(
         own_harmonic(run.scene),
         wanted_truncation(run.scene),
         run.scene.model.static == "uncoupled",
+        run.scene.accuracy,
     )
 
 
