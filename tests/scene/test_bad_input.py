@@ -69,6 +69,10 @@ REFUSED = [
     ("shank.width=60 mm", "the pitch at disc.rim_radius"),
     ("shank.length=50 mm", "disc.width"),
     ("disc.sectors=90", "shank.width"),
+    # of what the count of sectors leaves no room for, both fields are named
+    ("disc.sectors=70", "platform.seat_width = 6 mm"),
+    ("disc.sectors=70", "with disc.sectors = 70"),
+    ("disc.sectors=200", "the pitch at disc.rim_radius with disc.sectors = 200"),
     ("platform.seat_width=30 mm", "platform.seat_width"),
     ("damper.length=70 mm", "platform.length"),
     ("platform.length=45 mm", "aerofoil.chord_root"),
