@@ -118,7 +118,7 @@ COLUMNS = {
     "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
     "reduction": Column("free over damped", "1", digits=4),
     "motions": Column("motions there"),
-    "reached": Column("reached by a sweep"),
+    "reached": Column("reached by"),
     "residual": Column("residual", "1", digits=2),
     "phase": Column("phase", "rad", "deg", 180 / np.pi, 4),
     "imbalance": Column("energy imbalance", "1", digits=2),
