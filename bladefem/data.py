@@ -120,6 +120,11 @@ class SectorSpan:
     next: RealArray
 
 
+# contact pairs of a damper by what files, tables and pictures call its seats: "this" lies on
+# seat_right of the blade, "next" on seat_left of the next one
+SEATS = {"this": "right", "next": "left"}
+
+
 @dataclass(frozen=True)
 class Patch:
     """Matched contact nodes of one face pair: the carrier of pressure maps and friction
@@ -142,6 +147,11 @@ class Patch:
     damper_nodes: IntegerArray
     # (n, 3) where their forces act: centroids of the areas they represent [m]
     places: RealArray | None = None
+
+    @property
+    def seat(self) -> str:
+        """What files, tables and pictures call it: "right" or "left"."""
+        return SEATS.get(self.name, self.name)
 
 
 @dataclass(frozen=True)

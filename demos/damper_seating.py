@@ -42,7 +42,7 @@ expected = pull / (2 * math.sin(scene.damper.angle))
 if comm.rank == 0:
     for seat in maps:
         print(
-            f"seat '{seat.patch.name}': {seat.force.sum():.4f} N, {np.count_nonzero(seat.force)} "
+            f"{seat.patch.seat} seat: {seat.force.sum():.4f} N, {np.count_nonzero(seat.force)} "
             f"of {len(seat.force)} nodes press, peak {seat.pressure.max() / 1e6:.2f} MPa"
         )
     if not coarse:

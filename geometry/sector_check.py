@@ -50,11 +50,11 @@ def check_sector(
             f"damper.{name}",
             angle,
             radians(85) - theta,
-            "85 deg minus half the sector angle",
+            f"85 deg minus half the sector angle of {_count(disc)}",
             "rad",
         )
     section = sector_profile(platform, shank, disc, wedge)
-    check_platform(section, platform, shank, wedge)
+    check_platform(section, platform, shank, disc, wedge)
     check_pocket(section, shank, disc, wedge)
     check_aerofoil(aerofoil, platform, section)
     check_root(root, shank, disc)
@@ -90,6 +90,11 @@ def _no_strip(
         )
 
 
+def _count(disc: Disc) -> str:
+    """The number of sectors as a scene gives it: it sets the pitch, and with it most limits."""
+    return f"disc.sectors = {disc.sectors}"
+
+
 def check_disc(
     disc: Disc,
     shank: Shank,
@@ -104,7 +109,7 @@ def check_disc(
         "shank.width",
         shank.width,
         1.9 * disc.rim_radius * sin(theta),
-        "95 % of the sector's width at the rim",
+        f"95 % of the sector's width at the rim with {_count(disc)}",
     )
     _no_strip("shank.length", shank.length, "platform.length", platform.length)
     _no_strip("shank.length", shank.length, "disc.width", disc.width)
@@ -114,11 +119,14 @@ def check_platform(
     section: Profile,
     platform: Platform,
     shank: Shank,
+    disc: Disc,
     wedge: Wedge,
 ) -> None:
     """The plate fits into the pitch and holds the seat next to the shank."""
     half = section.corners[0, 1] + platform.gap / 2
-    _at_most("platform.gap", platform.gap, half, "half the pitch at the platform")
+    _at_most(
+        "platform.gap", platform.gap, half, f"half the pitch at the platform with {_count(disc)}"
+    )
     # no mesh of it has cells that are not flat
     widest = max(platform.length, 2 * half)
     if platform.thickness < THINNEST_PLATE * widest:
@@ -133,8 +141,8 @@ def check_platform(
         "platform.seat_width",
         platform.seat_width,
         max(0.98 * room / needed, 0) * platform.seat_width,
-        "the platform's overhang next to the shank; or choose a smaller shank.width or "
-        "damper.angle",
+        f"the platform's overhang next to the shank with {_count(disc)}; or choose fewer of "
+        "these, or a smaller shank.width or damper.angle",
     )
     _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 

@@ -51,8 +51,11 @@ def refuse_picture(file: str) -> None:
     """A file of ``--view`` that no picture can be written to is refused before the work.
 
     Raises:
-        InputError: its name does not end as that of a picture.
+        InputError: its name is empty, as an unset variable of a shell leaves it, or does not end
+            as that of a picture.
     """
+    if not file:
+        raise InputError(f"--view '': expected a file name that ends with {' or '.join(PICTURES)}")
     if Path(file).suffix.lower() not in PICTURES:
         raise InputError(
             f"--view {file}: expected a file name that ends with {' or '.join(PICTURES)}"
@@ -79,7 +82,7 @@ def make_folder_of(file: str | Path, option: str) -> None:
 
 def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Mesh, its files, quality table, picture."""
-    if options.view:
+    if options.view is not None:
         refuse_picture(options.view)
     scene, folder, bars = prepared(options, comm)
     from ..io.stage_cache import on_root
@@ -87,7 +90,7 @@ def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     run = pipeline.run(scene, folder, until="mesh", comm=comm, progress=bars)
     on_root(comm, partial(save_mesh, run.mesh, folder))
-    if options.view and (comm is None or comm.rank == 0):
+    if options.view is not None and (comm is None or comm.rank == 0):
         draw(run.mesh, options.view)
     tell(options, comm, lambda: tables.mesh_quality(run.mesh), run)
 
@@ -117,6 +120,12 @@ def modes_wanted(options: argparse.Namespace) -> Wanted:
     sizes = _parse_sizes(options.converge, "converge")
     speeds = None if options.campbell is None else read_speeds(options.campbell)
     loads = None if options.forced is None else read_loads(options.forced)
+    for name, expected in (
+        ("compare", "the folder of an earlier run"),
+        ("damping", "texts like 'ratio=0.1 %'"),
+    ):
+        if getattr(options, name) == "":
+            raise InputError(f"--{name} '': expected {expected}")
     if loads is None and options.damping:
         raise InputError("--damping: expected together with --forced")
     return Wanted(

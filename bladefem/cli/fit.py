@@ -41,8 +41,9 @@ def fit(options: argparse.Namespace, comm: Communicator | None) -> None:
     from ..io.stage_cache import on_root
     from ..report.measured import fit_sentences, parameter_table, write_fit
     from ..report.tables import readable_texts
-    from ..study.measured_responses import fit_scene, read_readings
+    from ..study.measured_responses import check_parameters, fit_scene, read_readings
 
+    check_parameters(names, scene)
     readings = on_root(comm, lambda: read_readings(options.measured, scene))
     found = fit_scene(scene, readings, names, error, folder, comm, bars)
     files = on_root(comm, lambda: write_fit(found, folder))

@@ -47,11 +47,11 @@ def look(options: argparse.Namespace, comm: Communicator | None) -> None:
         if target.exists():
             raise InputError(f"--scene {target}: the file is there already, expected another name")
         make_folder_of(target, "--scene")
-    if options.view:
+    if options.view is not None:
         refuse_picture(options.view)
     found = look_at(options.file)
     print(describe_look(found))
-    if options.view:
+    if options.view is not None:
         from ..view.look import draw_look
 
         draw_look(found, options.view)

@@ -143,9 +143,6 @@ def _convergence_table(summary: pd.DataFrame) -> str:
 
 def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
     """Force and pressure of each seat, for each load."""
-    # pandas is slow to load
-    from ..report.tables import SEATS
-
     rows = []
     for load, seats in maps.items():
         for seat in seats:
@@ -153,7 +150,7 @@ def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
             rows.append(
                 [
                     show(load, "N"),
-                    SEATS.get(seat.patch.name, seat.patch.name),
+                    seat.patch.seat,
                     len(seat.force),
                     f"{seat.force.sum():.6g}",
                     f"{seat.pressure.max() / 1e6:.4g}",

@@ -121,12 +121,6 @@ def facets_by_shape(body: Body, facets: np.ndarray) -> list[tuple[str, np.ndarra
     return [*found, (shape.FACET_OF[body.mesh.cell_type], halves)] if len(halves) else found
 
 
-def face_areas(body: Body, face: str) -> np.ndarray:
-    """(n_points,) integral of each node's shape function over a face [m^2]."""
-    traction = np.eye(body.dim)[0]
-    return surface_load(body, face, traction=traction).reshape(-1, body.dim)[:, 0]
-
-
 def _quadrature_measure(
     mesh: Mesh,
     word: str,

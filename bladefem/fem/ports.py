@@ -190,18 +190,6 @@ def _coriolis_damping(con: Constrained, V: np.ndarray, spin: Spin | None) -> np.
     return spin.speed * g if abs(g).max(initial=0.0) > NO_COUPLING else None
 
 
-def port_flexibility(
-    con: Constrained,
-    P: sp.spmatrix,
-    flex: Flexibility | None = None,
-) -> np.ndarray:
-    """(p, p) static flexibility P^T T K^+ T^H P [m/N], Hermitian; without rigid motions where the
-    body floats.
-    """
-    F = _restrict_ports(con, P)
-    return _hermitian_part(inner_products(con.body.comm, F, compliance(flex or flexible(con), F)))
-
-
 def _restrict_ports(con: Constrained, P: sp.spmatrix) -> np.ndarray:
     """(n_own, p) this rank's rows of the port vectors, dense."""
     _check_ports(con, P)

@@ -159,22 +159,3 @@ def modal_forces(model: ReducedModel, points: Sequence[NonlinearMode]) -> np.nda
     return np.array(
         [abs(mode_with_others(blades, p.mode, p.omega, p.zeta).conj() @ force) for p in points]
     )
-
-
-def mode_response(
-    model: ReducedModel,
-    points: Sequence[NonlinearMode],
-    omegas: np.ndarray,
-) -> np.ndarray:
-    """(k, points) drive over the modal force at circular frequencies: 1 where that amplitude
-    answers the model's excitation.
-
-    The single nonlinear mode's equation |omega_n^2 - Omega^2 + 2i zeta omega_n Omega| a = |phi^H
-    F|; the forced response is the contour 1.
-    """
-    forces, rates = modal_forces(model, points), modal_damping(model, points)
-    found = np.empty((len(omegas), len(points)))
-    for i, p in enumerate(points):
-        Z = p.omega**2 - omegas**2 + 1j * (2 * p.zeta * p.omega + rates[i]) * omegas
-        found[:, i] = abs(Z) * p.amplitude / forces[i]
-    return found

@@ -44,7 +44,8 @@ CAPTIONS = {
     "multiples of its value, and the exact logarithmic derivatives: 0.5 means that 2 % more of the "
     "parameter give 1 % more.",
     "response/local_resonances": "Every local maximum of each response: motions found at its "
-    "frequency, and by which slow sweep it is reached (isolated: by neither).",
+    "frequency, and by which slow sweep it is reached (isolated: by neither; march in time: kept "
+    "there in time, in place of an unstable balance).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "

@@ -99,7 +99,7 @@ def contact_arrays(maps: Mapping[float, Sequence[PressureMap]]) -> xr.Dataset:
             ),
             "patch": (
                 "contact",
-                np.repeat([m.patch.name for m in patches], [len(m.force) for m in patches]),
+                np.repeat([m.patch.seat for m in patches], [len(m.force) for m in patches]),
             ),
         },
         {"load": ("load", list(maps), {"units": "N"}), "direction": ["x", "y", "z"]},

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import pandas as pd
 
-from ..study.influences import Influence
+from ..study.influences import HEIGHT_TOLERANCE, Influence
 from ..study.pipeline.best_load import BestLoad
 
 PARAMETER_NAMES = {
@@ -53,7 +53,8 @@ def influence_sentence(found: Sequence[Influence]) -> str:
         load, amplitude, _ = 100 * np.expm1(off)
         checked = (
             f"; solved again at the ends of {len(known)} ranges, the derivatives are off by up to "
-            f"{amplitude:.2g} % of the amplitude and {load:.2g} % of the best load there"
+            f"{amplitude:.2g} % of the amplitude and {load:.2g} % of the best load there, searched "
+            f"until the amplitude falls by less than {100 * HEIGHT_TOLERANCE:g} %"
         )
     failed = "".join(f"; {one.reason}" for one in found if one.reason)
     name = PARAMETER_NAMES[top.parameter.name]

@@ -33,7 +33,7 @@ def harmonic_table(patches: Sequence[Patch], cycles: Sequence[ContactCycle]) -> 
 
     Nodes are numbered from 1 along the rows of ``node_table``.
     """
-    names = np.repeat([p.name for p in patches], [len(p.area) for p in patches])
+    names = np.repeat([p.seat for p in patches], [len(p.area) for p in patches])
     frames = []
     for c in cycles:
         node, tangent, harmonic = (

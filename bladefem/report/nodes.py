@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..data import Patch
+from ..data import SEATS, Patch
 from ..study.pipeline.case_models import load_cases
 from ..study.pipeline.contact_cycle import ContactCycle, contact_cycle
 from ..study.pipeline.run_records import SolvedRun
@@ -18,10 +18,6 @@ from ..view.contact import save_faces_vtu
 from ..view.hysteresis import draw_seat_loops
 from ..view.wear import draw_work
 from .linear import linear_columns
-from .tables import SEATS
-
-# contact pairs in words, as the pictures of pressure have them
-SEAT_WORDS = {patch: f"{side} seat" for patch, side in SEATS.items()}
 
 
 def cycles_of(result: SolvedRun) -> list[ContactCycle]:
@@ -49,7 +45,7 @@ def node_table(
     A wear coefficient [m^3/J] adds the depth worn off in an hour.
     """
     place = np.concatenate([p.points for p in patches])
-    names = np.repeat([p.name for p in patches], [len(p.area) for p in patches])
+    names = np.repeat([p.seat for p in patches], [len(p.area) for p in patches])
     area = np.concatenate([p.area for p in patches])
     frames = []
     for c in cycles:
@@ -90,7 +86,7 @@ def loop_table(cycles: Sequence[ContactCycle]) -> pd.DataFrame:
                 {
                     "load": c.load,
                     **({} if c.mass is None else {"mass": c.mass}),
-                    "patch": name,
+                    "patch": SEATS.get(name, name),
                     "phase": 2 * np.pi * np.arange(len(loop.force)) / len(loop.force),
                     "displacement": loop.displacement,
                     "force": loop.force,
@@ -121,7 +117,7 @@ def wear_table(
                 {
                     "load": c.load,
                     **({} if c.mass is None else {"mass": c.mass}),
-                    "patch": patch.name,
+                    "patch": patch.seat,
                     "frequency": c.frequency,
                     "dissipated": float(work @ patch.area),
                     "wear_volume": float(depth @ patch.area),
@@ -190,7 +186,7 @@ def seat_loops(
     """Name of the load -> name of the seat -> (displacement [m], force [N]) of one period."""
     return {
         f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
-            SEAT_WORDS.get(name, name): (loop.displacement, loop.force)
+            f"{SEATS.get(name, name)} seat": (loop.displacement, loop.force)
             for name, loop in c.loops.items()
         }
         for c in cycles

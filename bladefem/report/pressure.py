@@ -23,7 +23,7 @@ from ..util.progress import Progress, without_progress
 from ..view import contact
 from .datasets import contact_arrays, resultants
 from .headlines import Headline
-from .tables import SEATS, units_of, write_tables
+from .tables import units_of, write_tables
 from .write import Page, write_report
 
 PICTURE = "pressure_on_both_seats"
@@ -111,7 +111,7 @@ def _report(
             "peak pressure",
             f"{1e-6 * worst['peak_pressure']:.4g} MPa",
             "mesh error not studied; see the warnings",
-            f"on the {SEATS.get(worst['patch'], worst['patch'])} seat under {load:.4g} N",
+            f"on the {worst['patch']} seat under {load:.4g} N",
         ),
         Headline(
             "mean pressure there",

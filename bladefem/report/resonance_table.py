@@ -7,13 +7,17 @@ from dataclasses import asdict
 
 import pandas as pd
 
+from ..hbm.stability import STABLE
 from ..study.pipeline.loads import Curve
-from ..study.pipeline.resonance_list import local_resonances
+from ..study.pipeline.resonance_list import LocalResonance, local_resonances, motions_at
+from .response_points import MARCHED
 
 
 def resonance_table(curves: Sequence[Curve]) -> dict[str, pd.DataFrame]:
-    """One row a local maximum; no table where each load has one, which the summary lists."""
-    listed = [(curve, local_resonances(curve)) for curve in curves]
+    """One row a local maximum, and one of a resonance that a march in time gives in place of the
+    balance; no table where each load has one, which the summary lists.
+    """
+    listed = [(curve, [*_marched(curve), *local_resonances(curve)]) for curve in curves]
     if all(len(found) <= 1 for _, found in listed):
         return {}
     rows = [
@@ -26,3 +30,13 @@ def resonance_table(curves: Sequence[Curve]) -> dict[str, pd.DataFrame]:
         for resonance in found
     ]
     return {"response/local_resonances": pd.DataFrame(rows)}
+
+
+def _marched(curve: Curve) -> list[LocalResonance]:
+    """The resonance that a march gives; it lies on none of the paths of balances."""
+    if curve.curve_amplitude == curve.balance_amplitude:
+        return []
+    frequency, height = curve.peak_frequency, curve.peak_amplitude
+    driven = curve.sought is None and curve.kept is not None and curve.kept.drive > 1
+    reached = f"{MARCHED} after a strong drive" if driven else MARCHED
+    return [LocalResonance(frequency, height, STABLE, "", motions_at(curve, frequency), reached)]

@@ -6,12 +6,13 @@ that ``data.sel(load=80).dropna("frequency")`` is that curve again.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
+from ..data import SEATS
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
@@ -129,20 +130,17 @@ def node_arrays(table: pd.DataFrame) -> xr.Dataset:
     return _with_mass_units(data)
 
 
-def loop_arrays(
-    cycles: Sequence[ContactCycle], names: Mapping[str, str] | None = None
-) -> xr.Dataset:
+def loop_arrays(cycles: Sequence[ContactCycle]) -> xr.Dataset:
     """Hysteresis of each seat in a period at each resonance, over (load, seat, phase).
 
     Args:
         cycles: one for each load (and mass).
-        names: of the contact pairs, where they are called otherwise.
     """
     import xarray as xr
 
     parts = []
     for cycle in cycles:
-        seats = [(names or {}).get(name, name) for name in cycle.loops]
+        seats = [SEATS.get(name, name) for name in cycle.loops]
         force = np.stack([loop.force for loop in cycle.loops.values()])
         displacement = np.stack([loop.displacement for loop in cycle.loops.values()])
         phase = 2 * np.pi * np.arange(force.shape[1]) / force.shape[1]

@@ -18,7 +18,7 @@ from ..view import mesh, modes
 from .datasets import datasets, table_dataset
 from .fatigue import save_fatigue_vtu
 from .linear import harmonic_table
-from .nodes import SEAT_WORDS, loop_table, node_table, save_cycles_vtu
+from .nodes import loop_table, node_table, save_cycles_vtu
 from .pressure import write_points
 from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
 from .tables import units_of, write_tables
@@ -81,5 +81,5 @@ def _data_sets(
         "response": curve_arrays(tables["response/points"]),
         "resonance": resonance_arrays(result.response.curves, result.response.limits),
         "cycle": node_arrays(nodes),
-        "loops": loop_arrays(cycles, SEAT_WORDS),
+        "loops": loop_arrays(cycles),
     }

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,12 +23,8 @@ class Column(NamedTuple):
     # from SI to the shown unit
     factor: float = 1.0
     digits: int = 5
-    # what people call a value, where that is another word
-    words: Mapping[str, str] = MappingProxyType({})
 
 
-# patches by the blade's faces that they lie on, seat_right and seat_left
-SEATS = {"this": "right", "next": "left"}
 RPM = 60 / (2 * np.pi)
 COLUMNS = {
     "load": Column("normal load", "N"),
@@ -123,7 +118,7 @@ COLUMNS = {
     "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
     "reduction": Column("free over damped", "1", digits=4),
     "motions": Column("motions there"),
-    "reached": Column("reached by a sweep"),
+    "reached": Column("reached by"),
     "residual": Column("residual", "1", digits=2),
     "phase": Column("phase", "rad", "deg", 180 / np.pi, 4),
     "imbalance": Column("energy imbalance", "1", digits=2),
@@ -163,7 +158,7 @@ COLUMNS = {
     "sum": Column("sum of shares", "1", "%", 100.0, 4),
     "excitation": Column("excitation", "Hz"),
     "margin": Column("margin", "1", "%", 100.0, 3),
-    "patch": Column("seat", words=SEATS),
+    "patch": Column("seat"),
     "force": Column("normal force", "N"),
     "area": Column("area", "m^2", "mm²", 1e6),
     "pressure": Column("pressure", "Pa", "MPa", 1e-6, 4),
@@ -278,7 +273,7 @@ def cell_text(value: Any, column: Column) -> str:
     if isinstance(value, int | np.integer) and column.factor == 1.0:
         return str(value)
     if not isinstance(value, float | int | np.floating | np.integer):
-        return "" if value is None else column.words.get(str(value), str(value))
+        return "" if value is None else str(value)
     if np.isinf(value):
         return "∞" if value > 0 else "-∞"
     return "" if np.isnan(value) else f"{value * column.factor:.{column.digits}g}"

@@ -15,6 +15,8 @@ from .units import is_plain, parse, readable_units, shortened, show
 # of one field: every load is a sweep of its own
 MOST_VALUES = 1000
 SUGGESTION_START = "did you mean '"
+# ends of a text that gives a share
+PERCENT = ("%", "percent")
 
 
 class Field(NamedTuple):
@@ -114,7 +116,7 @@ def _parse_int(value: object, field: Field) -> int:
     number = parse(value, "1", field.name)
     if number != int(number):
         raise InputError(f"{field.name} = {value}: expected a whole number")
-    return _in_range(int(number), field)
+    return _in_range(int(number), field, value)
 
 
 def _parse_bool(value: object, field: Field) -> bool:
@@ -206,6 +208,9 @@ def _in_range(
     unit = field.meta.get("unit") or "1"
     if _within_range(number, low, high):
         return number
+    share = unit == "1" and isinstance(written, str) and written.rstrip().endswith(PERCENT)
+    # limits as the value was written: 200 % is to be read against 0 % to 50 %
+    unit = "%" if share else unit
     if low is not None and high is not None:
         between = "or" if isinstance(number, int) and high == low + 1 else "to"
         limit = f"{show(low, unit)} {between} {show(high, unit)}"
@@ -213,7 +218,8 @@ def _in_range(
         bounds = {"at least": low, "at most": high}
         limit = " ".join(f"{word} {show(n, unit)}" for word, n in bounds.items() if n is not None)
     # -300 degC would be shown as -26.85 K, which nobody wrote
-    shown = written if unit == "K" and isinstance(written, str) else show(number, unit)
+    kept = share or (unit == "K" and isinstance(written, str))
+    shown = shortened(written) if kept else show(number, unit)
     raise InputError(f"{field.name} = {shown}: expected {limit}{_forgotten_unit(written, field)}")
 
 

@@ -23,7 +23,7 @@ from .support import area_springs, held_letters
 from .tables import Scene
 from .temperature_file import read_temperatures
 from .units import show
-from .validate_contact import contact_problems
+from .validate_contact import contact_problems, is_frictionless
 
 # letters that fit on a picture
 LONGEST_TITLE = 200
@@ -139,7 +139,8 @@ def _has_node_numbers(scene: Scene) -> bool:
 
 
 def refuse_response(scene: Scene) -> None:
-    """What modes can do without and a response cannot: damping, and a force.
+    """What modes can do without and a response cannot: damping, a force, and loads or friction by
+    which the best load is found.
 
     Raises:
         InputError: one of them is zero.
@@ -153,6 +154,11 @@ def refuse_response(scene: Scene) -> None:
         )
     if not scene.excitation.force > 0:
         raise InputError("excitation.force = 0 N: expected above 0 N for a response")
+    if is_frictionless(scene) and scene.study.loads is None:
+        raise InputError(
+            "contact.mu = 0: the seats dissipate nothing, so that no load is the best one; "
+            "expected friction, or loads to study such as study.loads = '20 N, 80 N'"
+        )
 
 
 def refuse_given_mesh(scene: Scene) -> None:

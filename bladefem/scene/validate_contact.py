@@ -118,6 +118,11 @@ def friction_of_seats(contact: Contact) -> tuple[float, float]:
     return left, right
 
 
+def is_frictionless(scene: Scene) -> bool:
+    """Two seats without friction: the damper couples the blades, and dissipates nothing."""
+    return kind_named(scene.kind).has_seats and not max(friction_of_seats(scene.contact)) > 0
+
+
 def self_locking(scene: Scene) -> str:
     """What says that friction alone holds the damper between its seats; empty where it does not."""
     flank_angles = kind_named(scene.kind).flank_angles

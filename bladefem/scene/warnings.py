@@ -9,7 +9,7 @@ from .kinds import kind_named
 from .part_materials import part_materials
 from .tables import Material, Scene
 from .units import show
-from .validate_contact import self_locking
+from .validate_contact import is_frictionless, self_locking
 
 # Young's modulus [Pa]: plastics to diamond
 MODULUS_RANGE = (1e9, 1e12)
@@ -28,6 +28,11 @@ def implausible_values(scene: Scene) -> list[str]:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
         said.append(f"{locked}, which a seating without friction does not know")
+    if is_frictionless(scene):
+        said.append(
+            "contact.mu = 0: the seats dissipate nothing, the damper adds its mass and the "
+            "stiffness of its closed contacts alone, and no best load is sought"
+        )
     return said
 
 

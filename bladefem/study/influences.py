@@ -59,6 +59,10 @@ COARSE_SETTINGS = {"harmonics": 3, "points": 8}
 # least instants of a period there: with 64 slopes ripple by a tenth, and the derivative of the best
 # load by the stiffness had the wrong sign; with so few points and harmonics they cost little
 SMOOTH_SAMPLES = 512
+# relative height at which the searches stop whose loads are compared: the minimum is flat, and with
+# the tolerance of a run, 4e-4, a search that starts at the load by the derivatives keeps it where
+# that is within 1.5 % of the best one
+HEIGHT_TOLERANCE = 1e-5
 # parameters that are solved again at the ends of their ranges
 MAX_CHECKED_PARAMETERS = 2
 
@@ -189,7 +193,13 @@ def influences(
         quick = replace(best, settings=coarse)
         if coarse != replace(best.settings, chosen=()):
             quick = find_best_load(
-                scene, changed("kt", 1.0), family_of, coarse, best.mass, start=best.load
+                scene,
+                changed("kt", 1.0),
+                family_of,
+                coarse,
+                best.mass,
+                start=best.load,
+                tolerance=HEIGHT_TOLERANCE,
             )
         if quick.reason:
             raise NotSolvedError(quick.reason)
@@ -397,6 +407,7 @@ class _Study:
             replace(self.best.settings, chosen=()),
             self.best.mass,
             start=one.predicted[end, 0],
+            tolerance=HEIGHT_TOLERANCE,
         )
         # of a point that was not solved: one of several attempts tells enough here
         first = found.reason.split("; ")[0]

@@ -18,7 +18,7 @@ from ..util.arrays import RealArray
 from ..util.communicator import Communicator
 from ..util.progress import Progress, without_progress
 from .adaptive.family import family_member
-from .contact_identification import ContactFit, MeasuredLevel, fit_contact
+from .contact_identification import CONTACT_PARAMETERS, ContactFit, MeasuredLevel, fit_contact
 from .pipeline import pipeline
 from .pipeline.case_models import family_of_case, load_cases
 from .pipeline.run_records import ReducedRun
@@ -138,6 +138,32 @@ def _only_load(scene: Scene, path: Path) -> float:
     return float(loads[0])
 
 
+def check_parameters(names: Sequence[str], scene: Scene) -> None:
+    """Parameters that no scene or that this scene does not have are refused, before any work.
+
+    Raises:
+        InputError: the first of them, with what was expected.
+    """
+    given = ", ".join(names)
+    unknown = [name for name in names if name not in CONTACT_PARAMETERS]
+    if unknown:
+        raise InputError(
+            f"--parameters {given}: '{unknown[0]}' is no parameter, expected some of "
+            f"{', '.join(CONTACT_PARAMETERS)}"
+        )
+    if len(set(names)) < len(names):
+        raise InputError(f"--parameters {given}: one is given twice, expected each once")
+    if {"kt", "kn"} & set(names) and "stiffness" in names:
+        raise InputError(
+            f"--parameters {given}: 'stiffness' is both kt and kn, expected it or these"
+        )
+    if "kt" in names and scene.contact.kn_area is None:
+        raise InputError(
+            "--parameters kt: the normal stiffness follows the tangential one in this scene, "
+            "expected 'stiffness', or contact.kn_area in the scene"
+        )
+
+
 def fit_scene(
     scene: Scene,
     readings: Readings,
@@ -162,15 +188,11 @@ def fit_scene(
             f"study.masses: {len(scene.study.masses or ())} damper masses, expected one for "
             "'bladefem fit'"
         )
+    check_parameters(names, scene)
     loads = tuple(float(load) for load in np.unique(readings.load))
     run = pipeline.run(vary(scene, study__loads=loads), folder, "reduction", comm, progress)
     levels, order = _levels(run, readings)
     chosen = tuple(names) or _parameters_of(scene, levels)
-    if "kt" in chosen and scene.contact.kn_area is None:
-        raise InputError(
-            "--parameters kt: the normal stiffness follows the tangential one in this scene, "
-            "expected 'stiffness', or contact.kn_area in the scene"
-        )
     H = max(run.settings.harmonics, FEWEST_HARMONICS)
     samples = max(run.settings.samples, FEWEST_SAMPLES, 8 * (H + 1))
     fit = fit_contact(levels, chosen, H, samples, error)

@@ -154,24 +154,6 @@ def probe_harmonics(
     return _fourier_rows(solution.flow.q @ system.probe.T, highest)
 
 
-def period_work(solution: Periodic, system: System) -> tuple[float, float]:
-    """Work of the excitation and of friction and damping in one period [J]; equal in a periodic
-    motion.
-
-    By the trapezoidal rule on the samples, which is spectrally accurate for smooth parts and second
-    order for kinks.
-    """
-    path = solution.flow
-    t = np.arange(len(path.q)) / len(path.q)
-    angles = 2 * np.pi * np.outer(np.arange(1, system.coefficients // 2 + 1), t)
-    basis = np.ones((system.coefficients, len(t)))
-    basis[1::2], basis[2::2] = np.cos(angles), np.sin(angles)
-    step = 2 * np.pi / solution.omega / len(t)
-    rate = path.v @ system.W.T
-    spent = np.sum(path.force * rate) + np.sum(path.v * (path.v @ system.damping.T))
-    return step * float(np.sum((system.force @ basis).T * path.v)), step * float(spent)
-
-
 def _fourier_rows(signal: np.ndarray, highest: int) -> np.ndarray:
     lines = np.fft.rfft(signal, axis=0)[: highest + 1].T / len(signal)
     lines[:, 1:] *= 2

@@ -45,7 +45,7 @@ def pressure_summary(seats: Sequence[PressureMap]) -> pd.DataFrame:
         (x, y, z), (fx, fy, fz), moment = total.centre, total.force, total.moment
         rows.append(
             {
-                "patch": seat.patch.name,
+                "patch": seat.patch.seat,
                 "nodes": len(seat.force),
                 "force": float(seat.force.sum()),
                 "peak_pressure": float(seat.pressure.max(initial=0.0)),
@@ -72,7 +72,7 @@ def pressure_points(seats: Sequence[PressureMap]) -> pd.DataFrame:
     frames = [
         pd.DataFrame(
             {
-                "patch": seat.patch.name,
+                "patch": seat.patch.seat,
                 "x": seat.patch.points[:, 0],
                 "y": seat.patch.points[:, 1],
                 "z": seat.patch.points[:, 2],
@@ -220,8 +220,8 @@ def arrangement(patches: Sequence[Patch]) -> tuple[tuple[int, int], tuple[float,
 
 def seat_name(patch: Patch) -> str:
     """What an engineer calls the seat of a patch."""
-    names = {"this": "right seat (this)", "next": "left seat of the next blade (next)"}
-    return names.get(patch.name, f'seat "{patch.name}"')
+    names = {"right": "right seat", "left": "left seat of the next blade"}
+    return names.get(patch.seat, f'seat "{patch.name}"')
 
 
 def caption(seat: PressureMap, between: str = ",\n") -> str:

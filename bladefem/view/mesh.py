@@ -15,7 +15,7 @@ from geometry.mesh import Mesh
 from geometry.topology import CORNERS
 
 from .skin import Skin, family, sector_motion, skin, wheel_count, wheel_skin
-from .style import COLOURS, canvas, headline, photograph, show_photograph, size_for
+from .style import canvas, headline, photograph, show_photograph
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -428,37 +428,3 @@ def draw_legend(ax: Axes, mesh: Mesh) -> None:
         fontsize=8.5,
     )
     ax.set_axis_off()
-
-
-def draw_wheel(
-    mesh: Mesh,
-    file: str | Path | None = None,
-    *,
-    title: str = "",
-) -> object:
-    """The full wheel, bodies in colour, the meshed sector marked; returns the figure."""
-    wheel = wheel_skin(mesh)
-    first = np.arange(len(wheel.triangles)) < len(wheel.triangles) // wheel_count(mesh)
-    damper = np.isin(wheel.labels, damper_labels(mesh))
-    colours = np.where(damper, 1, 0) + np.where(first, 2, 0)
-    surface = polydata(wheel)
-    surface.cell_data["part"] = colours
-    palette = [BODY_COLOURS[0], "#c9a24a", COLOURS[5], COLOURS[4]]
-    direction = view_of(mesh, (0.35, -0.35, 1.0))
-    image = photograph(
-        [{"mesh": surface, "scalars": "part", "cmap": palette, "clim": (-0.5, 3.5)}],
-        direction,
-        (0.0, 1.0, 0.0) if mesh.dimension == 3 else RADIAL_DIRECTION,
-    )
-    what = "full wheel" if mesh.sector and mesh.sector.count else "part of the row"
-    with canvas(file, size=size_for(image, 5.8)) as ax:
-        show_photograph(ax, image)
-        headline(
-            ax.figure, title or f"{what}, {wheel_count(mesh)} sectors (the meshed one in colour)"
-        )
-        return ax.figure
-
-
-def damper_labels(mesh: Mesh) -> list[int]:
-    """Numbers of the labels that belong to dampers."""
-    return [i for i, name in enumerate((*mesh.bodies, *mesh.faces)) if name.startswith("damper")]

@@ -437,6 +437,13 @@ def test_bad_input_that_the_work_finds_leaves_no_folder(pipeline, tmp_path):
         ["modes", WEDGE, "-o", "/proc/run"],
         ["modes", WEDGE, "-o", WEDGE],
         ["mesh", WEDGE, "--view", "mesh.xyz"],
+        ["run", WEDGE, "--set", "contact.mu=0", "--set", "study.loads=auto"],
+        ["study", WEDGE, "--vary", "contact.mu=0, 0.2", "--set", "study.loads=auto"],
+        ["mesh", WEDGE, "--view", ""],
+        ["look", WEDGE, "--view", ""],
+        ["modes", WEDGE, "--compare", ""],
+        ["modes", WEDGE, "--damping", ""],
+        ["modes", WEDGE, "--campbell", ""],
         ["study", WEDGE],
     ],
 )

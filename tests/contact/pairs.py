@@ -11,8 +11,7 @@ from bladefem.contact.complementarity import solve_lcp
 from bladefem.contact.partial_slip import slip_step
 from bladefem.contact.patch import initial_gap, make_patch, normal_ports, port_matrix
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import constrain
-from bladefem.fem.ports import port_flexibility
+from bladefem.study.kinds.punch import held_port_flexibility
 from geometry.contact_pairs import hertz_pair, mesh_punch
 from geometry.parameters import HertzPair, MeshSize, Punch
 
@@ -30,8 +29,8 @@ def pair_flexibility(mesh, patch, materials, tangential=False):
         ("blade", "damper"), ("clamp", "load"), materials, strict=True
     ):
         if material is not None:
-            body = constrain(assemble(mesh, side, material), clamp)
-            C += port_flexibility(body, port_matrix([patch], mesh, side)[:, columns])
+            body = assemble(mesh, side, material)
+            C += held_port_flexibility(body, port_matrix([patch], mesh, side)[:, columns], clamp)
     return C
 
 

@@ -141,7 +141,7 @@ def test_scene_drives_the_motion(tmp_path, monkeypatch):
     assert "1/2" in text and "loops" in text
     assert (tmp_path / "report.html").stat().st_size > 100_000
     assert (tmp_path / "pressure.vtu").stat().st_size > 3_000
-    face = read_results(tmp_path / "results.nc", "resultants").sel(load=50.0, seat="this")
+    face = read_results(tmp_path / "results.nc", "resultants").sel(load=50.0, seat="right")
     assert (
         float(face["normal_force"]) == pytest.approx(50.0, rel=1e-6)
         and face["normal_force"].attrs["units"] == "N"

@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 
 from bladefem.fem import shape_functions as shape
+from bladefem.fem.loads import surface_load
 from geometry.mesh import Mesh, Pair, Sector
 
 # six tetrahedra of a cube along one diagonal; corners in gmsh's order
@@ -195,3 +196,9 @@ def wheel(mesh):
         if not name.startswith("cyclic")
     }
     return Mesh(points, mesh.cell_type, bodies, faces), dense
+
+
+def face_areas(body, face):
+    """(n_points,) integral of each node's shape function over a face [m^2]."""
+    traction = np.eye(body.dim)[0]
+    return surface_load(body, face, traction=traction).reshape(-1, body.dim)[:, 0]

@@ -10,14 +10,14 @@ import decks
 import numpy as np
 import pytest
 from mixed import chequered, cut, row
-from structured import box, pair, sector, turn
+from structured import box, face_areas, pair, sector, turn
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, expand_to_mesh, in_step, restrict_load
 from bladefem.fem.flexibility import compliance, flexible
-from bladefem.fem.loads import body_volume, face_areas, surface_load
+from bladefem.fem.loads import body_volume, surface_load
 from bladefem.fem.modes import modes
 from bladefem.fem.refinement import refine_uniformly
 from bladefem.fem.shape_functions import reference_nodes

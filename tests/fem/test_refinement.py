@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from structured import box, sector
+from structured import box, face_areas, sector
 
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
-from bladefem.fem.loads import body_volume, face_areas
+from bladefem.fem.loads import body_volume
 from bladefem.fem.modes import modes
 from bladefem.fem.refinement import refine_uniformly
 from bladefem.scene.tables import Material

@@ -10,7 +10,6 @@ import numpy as np
 from bladefem.data import RigidBody
 from bladefem.friction.fourier import to_complex
 from bladefem.hbm.linear.bodies import (
-    dissipated_work,
     modal_amplitudes,
     modal_flexibility,
     port_motion,
@@ -103,6 +102,23 @@ def plain_error(linear, w, f, preload):
     bare[1:] += (linear.G[1:] @ (linear.springs * r[1:])[:, :, None])[:, :, 0]
     scale = max(np.linalg.norm(linear.free), np.linalg.norm(linear.stuck))
     return r, max(with_springs, np.linalg.norm(bare) / scale)
+
+
+def dissipated_work(
+    stack,
+    w,
+    modal,
+):
+    """(k,) work lost in the modes in one cycle of each circular frequency [J]."""
+    w = w[:, None]
+    loss = np.sum((w * stack.viscous + np.sign(w) * stack.hysteretic) * abs(modal) ** 2, axis=1)
+    if stack.coupled is not None:
+        loss = (
+            loss
+            + w[:, 0]
+            * np.sum(modal.conj() * (stack.coupled @ modal[:, :, None])[:, :, 0], axis=1).real
+        )
+    return np.pi * loss
 
 
 def plain_works(model, omega, w, f, dissipated):

@@ -22,7 +22,6 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.nonlinear_modes import (
     force_at_resonance,
     modal_forces,
-    mode_response,
     nonlinear_mode,
 )
 from bladefem.hbm.peak import find_peak
@@ -94,8 +93,6 @@ def test_resonance_of_the_balance_is_predicted(load):
     peak = find_peak(model, omega, 3, 128)
     assert predicted == pytest.approx(peak.height, rel=0.03)
     assert omega == pytest.approx(peak.omega, rel=0.005)
-    drawn = mode_response(model, points, np.array([peak.omega]))
-    assert drawn[0, i - 1] < 1.1 and drawn[0, i + 1] > 0.9
 
 
 def test_close_modes_are_followed_from_the_stuck_mode():

@@ -60,7 +60,7 @@ def nodes() -> pd.DataFrame:
         pd.DataFrame(
             {
                 "load": load,
-                "patch": ["this", "this", "next"],
+                "patch": ["right", "right", "left"],
                 "x": [0.1, 0.2, 0.3],
                 "area": 1e-6,
                 "stick": [1.0, 0.5, 0.0],
@@ -99,7 +99,7 @@ def run(tmp_path_factory):
         "response": curve_arrays(points()),
         "resonance": resonance_arrays(curves()),
         "cycle": node_arrays(nodes()),
-        "loops": loop_arrays(cycles(), {"this": "right seat"}),
+        "loops": loop_arrays(cycles()),
         "summary": xr.Dataset.from_dataframe(synthetic.summary()),
     }
     write_results(folder / "results.nc", groups, dump_scene(scene))
@@ -133,7 +133,7 @@ def test_harmonics_beyond_a_balance_are_not_numbers(run):
 
 
 def test_nodes_keep_their_place_and_patch(run):
-    assert list(run.cycle["patch"].to_numpy()) == ["this", "this", "next"]
+    assert list(run.cycle["patch"].to_numpy()) == ["right", "right", "left"]
     assert run.cycle["work"].sel(load=80, node=2) == 160.0
 
 

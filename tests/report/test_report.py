@@ -11,8 +11,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from bladefem.data import Patch, PressureMap
 from bladefem.errors import InputError
 from bladefem.io.run_folder import keep_given
+from bladefem.report.datasets import contact_arrays
 from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
@@ -29,6 +31,7 @@ from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import vary
 from bladefem.util.message import Message, method, warning
+from bladefem.view.contact import pressure_points, pressure_summary
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 import synthetic
@@ -335,10 +338,22 @@ def test_unknown_errors_are_said_to_be_unknown(error, said):
     assert said in found[1].uncertainty
 
 
-def test_seats_are_called_right_and_left_in_tables():
-    """As the fields of a scene call them; files of data keep the names of the contact pairs."""
-    table = pd.DataFrame({"patch": ["this", "next", "contact"], "force": [1.0, 2.0, 3.0]})
+def test_seats_are_called_right_and_left_in_tables_and_files():
+    """As the fields of a scene call them."""
+    maps = [pressure_map(name) for name in ("this", "next", "contact")]
+    table = pressure_summary(maps)
+    assert list(table["patch"]) == ["right", "left", "contact"]
+    assert list(pressure_points(maps)["patch"].unique()) == ["right", "left", "contact"]
     assert list(readable_texts(table)["seat"]) == ["right", "left", "contact"]
+    assert set(contact_arrays({1.0: maps})["patch"].to_numpy()) == {"right", "left", "contact"}
+
+
+def pressure_map(name):
+    """Two nodes of a face that press."""
+    frame = np.broadcast_to(np.eye(3), (2, 3, 3))
+    none = np.empty(0, int)
+    patch = Patch(name, np.eye(2, 3), np.ones(2), frame, np.empty((0, 2), int), none, none)
+    return PressureMap(patch, np.ones(2), np.zeros(2), 0.0)
 
 
 def test_roundoff_is_no_number_on_a_page():

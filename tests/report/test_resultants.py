@@ -56,8 +56,8 @@ def test_netcdf_table_and_definition_agree(tmp_path):
         assert found[name].attrs["units"] == unit, name
     for load, seats in maps.items():
         for seat in seats:
-            one, wanted = found.sel(load=load, seat=seat.patch.name), resultant(seat)
-            row = table[(table["load"] == load) & (table["patch"] == seat.patch.name)].iloc[0]
+            one, wanted = found.sel(load=load, seat=seat.patch.seat), resultant(seat)
+            row = table[(table["load"] == load) & (table["patch"] == seat.patch.seat)].iloc[0]
             for name in ("force", "moment", "centre"):
                 np.testing.assert_allclose(one[name], getattr(wanted, name), rtol=1e-12)
                 np.testing.assert_array_equal(one[name], [row[f"{name}_{axis}"] for axis in "xyz"])

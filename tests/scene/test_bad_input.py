@@ -37,6 +37,10 @@ REFUSED = [
     ("mesh.order=3", "mesh.order = 3: expected 1 or 2"),
     ("temperature.uniform=-300 degC", "temperature.uniform = -300 degC: expected 0 K to 5000 K"),
     ("disc.sectors=36 mm", "expected a plain number"),
+    # a share is told as it was written, and so are its limits
+    ("operation.damping=200 %", "operation.damping = 200 %: expected 0 % to 50 %"),
+    ("contact.mu=300percent", "contact.mu = 300percent: expected 0 % to 200 %"),
+    ("model.harmonics=-300 %", "model.harmonics = -300 %: expected 100 % to 9900 %"),
     ("operation.stiffening=maybe", "expected true or false"),
     ("operation.coriolis=maybe", "operation.coriolis = maybe: expected true, false or auto"),
     ("contact.normal=couple", "did you mean 'coupled'?"),
@@ -65,6 +69,10 @@ REFUSED = [
     ("shank.width=60 mm", "the pitch at disc.rim_radius"),
     ("shank.length=50 mm", "disc.width"),
     ("disc.sectors=90", "shank.width"),
+    # of what the count of sectors leaves no room for, both fields are named
+    ("disc.sectors=70", "platform.seat_width = 6 mm"),
+    ("disc.sectors=70", "with disc.sectors = 70"),
+    ("disc.sectors=200", "the pitch at disc.rim_radius with disc.sectors = 200"),
     ("platform.seat_width=30 mm", "platform.seat_width"),
     ("damper.length=70 mm", "platform.length"),
     ("platform.length=45 mm", "aerofoil.chord_root"),

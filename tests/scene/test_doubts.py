@@ -46,6 +46,7 @@ def test_shipped_scenes_raise_none(file):
             "mesh.size = 8 mm: larger than the thinnest part, the aerofoil halfway up with 5.18 mm",
         ),
         ("mesh.size=1 m", "mesh.size = 1 m: larger than"),
+        ("contact.mu=0", "contact.mu = 0: the seats dissipate nothing, the damper adds its mass"),
         (
             "damper.angle=16 deg",
             "friction alone holds the damper between its seats (self-locking up to 16.6992 deg), "

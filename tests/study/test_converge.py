@@ -229,3 +229,12 @@ def test_effective_masses_add_up():
     assert few["factor"].to_numpy() ** 2 == pytest.approx(few["effective_mass"].to_numpy())
     single = effective_masses([modes(constrain(body, "clamp"), 5)], body)
     assert len(single) == 30 and "nodal_diameter" not in single
+
+
+def test_first_bending_mode_carries_0_613_of_a_beams_mass():
+    """Clamped-free beam: effective mass ratio of the first mode 0.6131 (Blevins)."""
+    body = assemble(box((16, 1, 1), (1.0, 0.02, 0.015)), "blade", Material(nu=0.0))
+    table = effective_masses([modes(constrain(body, "x0"), 2)], body)
+    for number, direction in ((1, "z"), (2, "y")):
+        row = table[(table["mode"] == number) & (table["direction"] == direction)].iloc[0]
+        assert row["share"] == pytest.approx(0.6131, abs=1e-3)

@@ -71,7 +71,7 @@ def test_work_and_states_of_circular_orbits(directions):
     assert list(cycle.state) == [STICK] * 8 + [GROSS_SLIP] * 8
     table = node_table(patches, [cycle])
     assert (table["area"] * table["work"]).sum() == pytest.approx(sum(exact), rel=1e-10)
-    assert list(table["patch"]) == ["this"] * 8 + ["next"] * 8
+    assert list(table["patch"]) == ["right"] * 8 + ["left"] * 8
     np.testing.assert_allclose(
         table[["mu", "kt", "kn", "n0"]], np.tile([MU, KT, KT * (directions == 3), N], (16, 1))
     )
@@ -192,7 +192,7 @@ def test_wear_is_archards_law_on_circular_orbits(tmp_path):
     np.testing.assert_allclose(table["wear_per_hour"], exact, rtol=1e-10, atol=1e-20)
     assert "wear_per_hour" not in node_table(patches, [cycle])
     faces = wear_table(patches, [cycle], archard / MU)
-    assert list(faces["patch"]) == ["this", "next"] and faces["largest_wear"][0] == pytest.approx(
+    assert list(faces["patch"]) == ["right", "left"] and faces["largest_wear"][0] == pytest.approx(
         0, abs=1e-20
     )
     assert (

@@ -82,3 +82,22 @@ def test_bad_files_are_refused(text, message, tmp_path):
         read_readings(file, load_scene(MISTUNED, COARSE))
     with pytest.raises(InputError, match="there is no such file"):
         read_readings(tmp_path / "nowhere.csv", load_scene(MISTUNED, COARSE))
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        ("mu, speed", "--parameters mu, speed: 'speed' is no parameter, expected some of mu, kt"),
+        ("kn, stiffness", "--parameters kn, stiffness: 'stiffness' is both kt and kn"),
+        ("mu, mu", "--parameters mu, mu: one is given twice"),
+        ("kt", "--parameters kt: the normal stiffness follows"),
+    ],
+)
+def test_parameters_are_checked_before_the_readings(parameters, message, tmp_path, capsys):
+    file = tmp_path / "readings.csv"
+    file.write_text("frequency [Hz], amplitude [um]\n200, -1\n")
+    scene = ["fit", str(MISTUNED), "-o", str(tmp_path / "run"), "--measured", str(file)]
+    assert main([*scene, "--parameters", parameters]) == 2
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1
+    assert not (tmp_path / "run").exists()

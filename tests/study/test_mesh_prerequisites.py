@@ -17,10 +17,11 @@ NOSE = Scene(excitation=Excitation(at="nose"))
 
 def test_node_set_and_pair_are_missed_together():
     with pytest.raises(
-        InputError, match=r"no node set or face 'nose'.*; and the mesh has no contact pair 'this'"
+        InputError,
+        match=r"no node set or face 'nose'.*; and the mesh has no contact pair on its right seat",
     ):
         found_patches(NOSE, ring(), excited=True)
-    with pytest.raises(InputError, match=r"^the mesh has no contact pair 'this'"):
+    with pytest.raises(InputError, match=r"^the mesh has no contact pair on its right seat"):
         found_patches(NOSE, ring(), excited=False)
 
 
@@ -53,7 +54,7 @@ def no_work(monkeypatch):
 def test_names_are_checked_before_the_modes(no_work):
     with pytest.raises(InputError, match="forced, nose"):
         survey.survey_modes(Scene(), None, survey.Wanted(loads=[("nose", 500.0)]))
-    with pytest.raises(InputError, match=r"'nose'.*'this'"):
+    with pytest.raises(InputError, match=r"'nose'.*on its right seat"):
         pipeline.run(NOSE, None)
 
 

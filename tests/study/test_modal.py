@@ -14,7 +14,6 @@ from bladefem.study.modes.comparison import (
     family_table,
     mac,
     mac_of,
-    participation_factors,
     pure_shapes,
 )
 from bladefem.study.modes.mesh_transfer import (
@@ -192,43 +191,6 @@ def test_mac_between_two_meshes():
 
 def test_nodal_volumes_add_up():
     assert np.isclose(nodal_volumes(prism((12, 2, 4))).sum(), 0.12 * 0.04 * 0.004)
-
-
-def test_effective_masses_of_a_chain_add_up_to_its_mass():
-    """All modes of a clamped chain of masses: sum of effective masses = total mass, in every
-    direction.
-    """
-    n = 6
-    rng = np.random.default_rng(3)
-    mass = np.diag(np.repeat(rng.uniform(1, 2, n), 3))
-    stiffness = rng.normal(size=(3 * n, 3 * n))
-    stiffness = stiffness @ stiffness.T
-    root = np.sqrt(np.diag(mass))
-    values, vectors = np.linalg.eigh(stiffness / np.outer(root, root))
-    shapes = (vectors / root[:, None]).T.reshape(-1, n, 3)
-    points = rng.normal(size=(n, 3))
-    table = participation_factors(
-        ModeSet(np.sqrt(values), shapes, None, values * 0), mass, points, ("x", "z", "rx")
-    )
-    assert np.allclose(table.groupby("direction")["share"].sum(), 1.0)
-    total = np.diag(mass)[::3].sum()
-    assert np.isclose(table[table["direction"] == "x"]["effective_mass"].sum(), total)
-
-
-def test_first_bending_mode_carries_0_613_of_a_beams_mass():
-    """Clamped-free beam: effective mass ratio of the first mode 0.6131 (Blevins), lumped on 400
-    nodes.
-    """
-    from bladefem.study.modes.comparison import beam_function
-
-    s = (np.arange(400) + 0.5) / 400
-    shape = np.zeros((1, 400, 3))
-    shape[0, :, 1] = beam_function(0, s)
-    points = np.stack([s, 0 * s, 0 * s], 1)
-    table = participation_factors(
-        ModeSet(np.ones(1), shape, None, np.zeros(1)), np.eye(1200) / 400, points, ("y",)
-    )
-    assert np.isclose(table["share"].iloc[0], 0.6131, atol=2e-4)
 
 
 def test_wheel_modes_are_called_after_the_clamped_aerofoil():

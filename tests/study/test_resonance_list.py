@@ -12,6 +12,7 @@ from models import FOLDING, folding_pair
 from bladefem.hbm.branches import find_branches
 from bladefem.hbm.solution import size
 from bladefem.hbm.sweep import response
+from bladefem.report.resonance_table import resonance_table
 from bladefem.study.pipeline.resonance_list import local_resonances, reach_sentence
 
 BAND = (249.0, 431.0)
@@ -60,3 +61,58 @@ def test_a_plain_sweep_has_one_motion_that_both_sweeps_reach():
     assert [(r.motions, r.reached) for r in listed] == [(1, "up and down")] * len(listed)
     assert listed[0].amplitude == max(map(size, points))
     assert reach_sentence(curve_of(points)) == ""
+
+
+def sweep_with(*motions, branch=2) -> SimpleNamespace:
+    """A smooth resonance as one piece, and further motions (frequency, first harmonic) as
+    another.
+    """
+    frequency = np.linspace(*BAND, 41)
+    first = 1.0 / (1 - (frequency / 300) ** 2 + 0.05j)
+    columns = {
+        "frequency": np.concatenate([frequency, [f for f, _ in motions]]),
+        "first": np.concatenate([first, [value for _, value in motions]]),
+        "branch": np.array([1] * len(frequency) + [branch] * len(motions)),
+    }
+    count = len(columns["branch"])
+    columns["amplitude"] = abs(columns["first"])
+    columns["converged"] = np.ones(count, bool)
+    columns |= {"stability": np.full(count, ""), "bifurcation": np.full(count, "")}
+    return SimpleNamespace(
+        **columns,
+        load=8.0,
+        mass=None,
+        sought=None,
+        kept=None,
+        balance_amplitude=abs(first).max(),
+        curve_amplitude=abs(first).max(),
+    )
+
+
+@pytest.mark.parametrize("motions", [[(310.0, 40j)], [(308.0, 40j), (310.0, 39j), (312.0, 38j)]])
+def test_motions_apart_from_the_paths_are_listed(motions):
+    """Also single ones, and those that are highest at an end."""
+    top, (_, height) = local_resonances(sweep_with(*motions))[0], motions[0]
+    assert (top.frequency, top.amplitude) == (motions[0][0], abs(height))
+    assert top.reached == "isolated" and top.motions == 2
+
+
+def test_a_motion_on_the_path_is_no_other_one():
+    """The climb to a peak leaves its last point beside the path that was followed."""
+    plain = sweep_with()
+    near = sweep_with((plain.frequency[12], 0.99 * plain.first[12]), branch=0)
+    assert len(local_resonances(near)) == len(local_resonances(plain)) == 1
+
+
+def test_a_marched_resonance_has_a_row_in_the_table():
+    curve = sweep_with()
+    assert resonance_table([curve]) == {}
+    for kept, reached in (
+        (SimpleNamespace(drive=1.0), "march in time"),
+        (SimpleNamespace(drive=16.0), "march in time after a strong drive"),
+    ):
+        curve = sweep_with()
+        vars(curve).update(kept=kept, curve_amplitude=30.0, peak_amplitude=30.0, peak_frequency=310)
+        (table,) = resonance_table([curve]).values()
+        assert list(table["reached"]) == [reached, "up and down"]
+        assert list(table["amplitude"]) == [30.0, pytest.approx(curve.balance_amplitude)]

@@ -12,7 +12,7 @@ from bladefem.report.best_load import best_load_table, found_best
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as module
-from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline import pipeline, response_stage
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import BestLoad
 from bladefem.study.pipeline.loads import best_curve, study_loads
@@ -97,6 +97,14 @@ def test_a_load_under_which_the_blade_keeps_far_more_is_not_the_best():
     assert best_curve(curves, [best(2.547)]) == 0
     curves[1].error = None
     assert best_curve(curves, [best(2.547)]) == 0
+
+
+@pytest.mark.parametrize(("mu", "count"), [("0", 0), ("0.2", 1)])
+def test_none_is_sought_without_friction(mu, count):
+    """The response hangs on the load only where contacts lift off: the wedge's best was 47 kN."""
+    scene = load_scene("scenes/wedge.toml", [f"contact.mu={mu}"])
+    searches = response_stage._best_load_searches(scene, None, None, None, None, None)
+    assert len(searches) == count
 
 
 def test_its_row_is_that_of_its_response():

@@ -260,23 +260,6 @@ def damping_rate(
     )
 
 
-def dissipated_work(
-    stack: Stack,
-    w: np.ndarray,
-    modal: np.ndarray,
-) -> np.ndarray:
-    """(k,) work lost in the modes in one cycle of each circular frequency [J]."""
-    w = w[:, None]
-    loss = np.sum((w * stack.viscous + np.sign(w) * stack.hysteretic) * abs(modal) ** 2, axis=1)
-    if stack.coupled is not None:
-        loss = (
-            loss
-            + w[:, 0]
-            * np.sum(modal.conj() * (stack.coupled @ modal[:, :, None])[:, :, 0], axis=1).real
-        )
-    return np.pi * loss
-
-
 def port_receptance(
     body: PortModel,
     damping: Damping,

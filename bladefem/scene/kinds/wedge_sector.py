@@ -22,9 +22,14 @@ def conditions(scene: Scene) -> Iterator[str]:
     damper = scene.damper
     aerofoil = scene.aerofoil
     half = pi / disc.sectors
+    # more sectors leave less room to every blade: the field to change may be this one
+    count = f"disc.sectors = {disc.sectors}"
     yield from below_limit("disc.bore_radius", disc.bore_radius, disc.rim_radius, "disc.rim_radius")
     yield from below_limit(
-        "shank.width", shank.width, 2 * disc.rim_radius * tan(half), "the pitch at disc.rim_radius"
+        "shank.width",
+        shank.width,
+        2 * disc.rim_radius * tan(half),
+        f"the pitch at disc.rim_radius with {count}",
     )
     yield from at_most("shank.length", shank.length, disc.width, "disc.width, on which it is built")
     yield from at_most(
@@ -36,18 +41,18 @@ def conditions(scene: Scene) -> Iterator[str]:
         "platform.gap",
         platform.gap,
         2 * (disc.rim_radius + shank.height) * tan(half),
-        "the pitch at the platform",
+        f"the pitch at the platform with {count}",
     )
     if overhang <= 0:
         yield (
             f"shank.width = {show(shank.width, 'm')}: expected less than {show(2 * reach, 'm')}, "
-            "the width of the platform"
+            f"the width of the platform with {count}"
         )
     yield from at_most(
         "platform.seat_width",
         platform.seat_width,
         max(overhang, 0) / sin(max(damper.angles)),
-        "what the overhang of the platform next to the shank leaves at damper.angle",
+        f"what the overhang of the platform next to the shank leaves with {count} at damper.angle",
     )
     yield from at_most(
         "damper.length", damper.length, platform.length, "platform.length, under which it sits"

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -282,55 +281,6 @@ def family_names(
         f"{name}, coupled" if again and name not in ("mixed", below) else name
         for name, again in zip(own, closer, strict=True)
     ]
-
-
-def participation_factors(
-    modes: ModeSet,
-    mass: Any,
-    points: np.ndarray,
-    directions: Sequence[str] = ("x", "y", "z"),
-) -> pd.DataFrame:
-    """Participation factors and effective masses of rigid translations and rotations, one row a
-    mode and direction.
-
-    Gamma = phi^H M r / (phi^H M phi), effective mass |phi^H M r|^2 / (phi^H M phi); over all modes
-    of a body they add up to r^T M r (Clough and Penzien, Dynamics of Structures, sect. 26).
-
-    Args:
-        modes: (m, n, 3) shapes.
-        mass: (3n, 3n) or (2n, 2n) matrix, node-major; dense, or anything with ``@`` (2n: x and y
-            only).
-        points: (n, 3) [m].
-        directions: of "x", "y", "z" and rotations "rx", "ry", "rz" about the axes through the
-            origin.
-
-    Returns:
-        mode, frequency [Hz], direction, factor [kg^1/2 or kg^1/2 m], effective_mass [kg or kg m^2],
-        share [1] of the rigid body's.
-    """
-    dimension = mass.shape[0] // len(points)
-    shapes = modes.shapes[..., :dimension].reshape(len(modes.frequencies), -1)
-    moved = np.stack([mass @ shape for shape in shapes])
-    modal = np.einsum("mk,mk->m", shapes.conj(), moved).real
-    rows = []
-    for direction in directions:
-        rigid = rigid_motion(points, direction)[:, :dimension].ravel()
-        total = float(rigid @ (mass @ rigid))
-        coupling = moved.conj() @ rigid
-        effective = np.abs(coupling) ** 2 / modal
-        rows.append(
-            pd.DataFrame(
-                {
-                    "mode": np.arange(1, len(modal) + 1),
-                    "frequency": modes.frequencies,
-                    "direction": direction,
-                    "factor": np.abs(coupling) / modal,
-                    "effective_mass": effective,
-                    "share": effective / max(total, 1e-300),
-                }
-            )
-        )
-    return pd.concat(rows, ignore_index=True)
 
 
 def rigid_motion(points: np.ndarray, direction: str) -> np.ndarray:

@@ -100,6 +100,7 @@ def find_best_load(
     settings: Settings,
     mass: float | None,
     start: float | None = None,
+    tolerance: float | None = None,
 ) -> BestLoad:
     """The load with the smallest resonance, and how sure it is.
 
@@ -109,7 +110,9 @@ def find_best_load(
         settings: where to begin; what is open in them is enriched as the accuracy needs.
         start: load near the best one [N]; searched farther only where the best of its
             neighbourhood lies at an end of that.
+        tolerance: of the height, relative; HEIGHT_TOLERANCE_SHARE of the accuracy when left out.
     """
+    tolerance = tolerance or HEIGHT_TOLERANCE_SHARE * scene.accuracy
     case_at = lru_cache(maxsize=None)(case_at)
     searched = search_range(scene)
     family = family_of(case_at(start or _middle(searched)))
@@ -117,11 +120,13 @@ def find_best_load(
     # where the resonance is not solved with few harmonics, it may be with those that were asked for
     for begun in dict.fromkeys((_first_search_settings(family, settings), settings)):
         try:
-            found, chosen = _repeated_search(scene, case_at, family_of, begun, searched, start)
+            found, chosen = _repeated_search(
+                scene, case_at, family_of, begun, searched, start, tolerance
+            )
         except NotSolvedError as error:
             reason = str(error)
             continue
-        return _record(scene, found, chosen, mass, searched)
+        return _record(scene, found, chosen, mass, searched, tolerance)
     return _unknown(settings, mass, searched, reason)
 
 
@@ -145,6 +150,7 @@ def _repeated_search(
     settings: Settings,
     searched: tuple[float, float],
     start: float | None,
+    tolerance: float,
 ) -> tuple[Optimum, Settings]:
     """The best load by settings that hold there, and these.
 
@@ -157,10 +163,12 @@ def _repeated_search(
     known = None
     points = 0
     for left in reversed(range(MAX_SEARCHES)):
-        found = _search(scene, case_at, family_of, settings, bounds, start, known)
+        found = _search(scene, case_at, family_of, settings, bounds, start, known, tolerance)
         points += found.points
         if found.value in bounds and bounds != searched:
-            found = _search(scene, case_at, family_of, settings, searched, found.value, found.peak)
+            found = _search(
+                scene, case_at, family_of, settings, searched, found.value, found.peak, tolerance
+            )
             points += found.points
         if not settings.chosen and settings.error is not None:
             break
@@ -238,7 +246,8 @@ def _search(
     settings: Settings,
     bounds: tuple[float, float],
     start: float | None,
-    known: Peak | None = None,
+    known: Peak | None,
+    tolerance: float,
 ) -> Optimum:
     """The search with these settings, from a load and the resonance there, where they are known."""
     along = load_variation(case_at, family_of, settings)
@@ -252,7 +261,7 @@ def _search(
         settings.samples,
         start=middle,
         near=known,
-        tolerance=HEIGHT_TOLERANCE_SHARE * scene.accuracy,
+        tolerance=tolerance,
         rise=scene.accuracy,
         options=solver_options(scene.accuracy),
     )
@@ -309,6 +318,7 @@ def _record(
     settings: Settings,
     mass: float | None,
     searched: tuple[float, float],
+    tolerance: float,
 ) -> BestLoad:
     tried = sorted(found.tried, key=lambda peak: peak.value)
     solution = found.peak.solution
@@ -319,7 +329,7 @@ def _record(
         found.peak.height,
         solution.work.dissipated,
         solution.work.input,
-        HEIGHT_TOLERANCE_SHARE * scene.accuracy,
+        tolerance,
         tolerated_loads(tried, scene.accuracy),
         settings,
         np.array([peak.value for peak in tried]),

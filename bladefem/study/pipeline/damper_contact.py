@@ -9,7 +9,7 @@ from geometry.mesh import Mesh
 from ...contact.interface_elements import pair_ratio, with_interface_law
 from ...contact.patch import make_patch, normal_ports, port_matrix
 from ...contact.seating import ContactProblem
-from ...data import Patch
+from ...data import SEATS, Patch
 from ...errors import InputError
 from ...scene.kinds import kind_named
 from ...scene.material_table import operating_materials
@@ -26,9 +26,9 @@ def contact_patches(mesh: Mesh) -> list[Patch]:
     missing = [name for name in ("this", "next") if name not in mesh.pairs]
     if missing:
         raise InputError(
-            f"the mesh has no contact pair '{missing[0]}', a damper on its seat: expected faces "
-            "seat_right and damper_left (this), seat_left and damper_right (next) with matching "
-            "nodes; imported.seats draws a damper to a STEP file"
+            f"the mesh has no contact pair on its {SEATS[missing[0]]} seat: expected faces "
+            "seat_right and damper_left, seat_left and damper_right with matching nodes; "
+            "imported.seats draws a damper to a STEP file"
         )
     return [make_patch(mesh, name) for name in ("this", "next")]
 

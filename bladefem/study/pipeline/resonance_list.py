@@ -7,7 +7,7 @@ paths are put together again from the ends of the pieces.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,13 +17,16 @@ from .loads import Curve
 
 # distance of the first harmonics of two ends over the largest one, up to which pieces are joined
 MAX_JOINED_DISTANCE = 0.2
+# distance of a motion from the line through another piece, over its own size, up to which it lies
+# on that: the climb to a peak leaves points beside the path that was followed
+SAME_MOTION = 0.05
 # relative difference of two heights that are the same
 SAME_HEIGHT = 1e-6
 
 
 @dataclass(frozen=True)
 class LocalResonance:
-    """A local maximum along a path of motions."""
+    """A local maximum along a path of motions, or the highest of motions that no path leads to."""
 
     # [Hz]
     frequency: float
@@ -35,7 +38,8 @@ class LocalResonance:
     bifurcation: str
     # motions found at this frequency
     motions: int
-    # "up and down", "up", "down": by a slow sweep in that direction; "isolated": by neither
+    # "up and down", "up", "down": by a slow sweep in that direction; "isolated": by neither; or how
+    # a motion is reached that is none of the balance's
     reached: str
 
 
@@ -55,7 +59,10 @@ class _Piece:
 
 
 def local_resonances(curve: Curve) -> list[LocalResonance]:
-    """The local maxima of a curve by falling height."""
+    """The local maxima of a curve by falling height, and the highest motion of each path apart from
+    the others that no slow sweep visits, where that is at an end of it: single motions, and loops
+    that were begun at the top.
+    """
     pieces = _pieces_of(curve)
     visited = _swept(pieces)
     places = {piece.number: place for place, piece in enumerate(pieces)}
@@ -64,9 +71,11 @@ def local_resonances(curve: Curve) -> list[LocalResonance]:
         rows = np.concatenate([piece.rows[order] for piece, order in path])
         owners = np.concatenate([np.full(len(order), piece.number) for piece, order in path])
         heights = curve.amplitude[rows]
-        for i in range(1, len(rows) - 1):
-            if not heights[i - 1] < heights[i] >= heights[i + 1]:
-                continue
+        tops = [i for i in range(1, len(rows) - 1) if heights[i - 1] < heights[i] >= heights[i + 1]]
+        highest = int(np.argmax(heights))
+        if highest not in tops and _is_apart(pieces, path, visited, places):
+            tops.append(highest)
+        for i in tops:
             row = rows[i]
             frequency = float(curve.frequency[row])
             found.append(
@@ -75,11 +84,44 @@ def local_resonances(curve: Curve) -> list[LocalResonance]:
                     float(heights[i]),
                     str(curve.stability[row]),
                     str(curve.bifurcation[row]),
-                    sum(p.frequency[0] <= frequency <= p.frequency[-1] for p in pieces),
+                    _crossing(pieces, frequency),
                     reached_by(visited, places[int(owners[i])], frequency),
                 )
             )
     return sorted(found, key=lambda resonance: -resonance.amplitude)
+
+
+def _is_apart(
+    pieces: Sequence[_Piece],
+    path: Sequence[tuple[_Piece, np.ndarray]],
+    visited: Mapping[str, Sequence[Visit]],
+    places: Mapping[int, int],
+) -> bool:
+    """No slow sweep visits a path, and its motions do not lie on another one."""
+    own = {piece.number for piece, _ in path}
+    swept = {place for visits in visited.values() for place, _ in visits}
+    if any(places[number] in swept for number in own):
+        return False
+    others = [piece for piece in pieces if piece.number not in own]
+    return not any(_lies_on(one, other) for one, _ in path for other in others)
+
+
+def _lies_on(one: _Piece, other: _Piece) -> bool:
+    """All motions of a piece lie on the line through those of another."""
+    inside = (other.frequency[0] <= one.frequency) & (one.frequency <= other.frequency[-1])
+    if not inside.all():
+        return False
+    line = np.interp(one.frequency, other.frequency, other.first)
+    return bool((abs(one.first - line) <= SAME_MOTION * abs(one.first)).all())
+
+
+def motions_at(curve: Curve, frequency: float) -> int:
+    """Motions found at a frequency [Hz]."""
+    return _crossing(_pieces_of(curve), frequency)
+
+
+def _crossing(pieces: Sequence[_Piece], frequency: float) -> int:
+    return sum(p.frequency[0] <= frequency <= p.frequency[-1] for p in pieces)
 
 
 def reach_sentence(curve: Curve) -> str:
