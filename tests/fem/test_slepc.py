@@ -40,6 +40,7 @@ def slepc_frequencies(con, count):
 
 
 @pytest.mark.mpi
+@pytest.mark.two_ranks
 @pytest.mark.parametrize("n", [0, 1, 3])
 def test_same_frequencies(n):
     """Each frequency of the doubled pencil comes once or twice; as a set they are ours."""

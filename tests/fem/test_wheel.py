@@ -17,7 +17,9 @@ from bladefem.scene.tables import Material
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("count, clamp", [(13, "clamp"), (14, None)])
+@pytest.mark.parametrize(
+    "count, clamp", [pytest.param(13, "clamp", marks=pytest.mark.two_ranks), (14, None)]
+)
 def test_warm_start_equals_direct(count, clamp):
     """Frequencies, phases and shapes, for odd and even numbers of sectors, held and floating."""
     body = assemble(sector(count, (4, 2, 1), bump=0.2), "blade", Material())
@@ -33,6 +35,7 @@ def test_warm_start_equals_direct(count, clamp):
 
 
 @pytest.mark.mpi
+@pytest.mark.two_ranks
 def test_one_core_equals_three_matrices():
     """The interior eliminated once, and the doubled pencil of each diameter."""
     body = assemble(sector(9, (3, 2, 1), bump=0.2), "blade", Material())

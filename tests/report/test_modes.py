@@ -126,6 +126,7 @@ def test_partners_are_the_best_matches():
 
 
 @pytest.mark.mpi
+@pytest.mark.two_ranks
 def test_ranks_share_out_pictures_and_files(tmp_path, monkeypatch):
     """Every picture is drawn once, by whichever rank is free; the page holds all of them.
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mistuned import reduced_wheel
+from mistuned import COARSE_MISTUNED, reduced_wheel
 
 from bladefem.hbm.solver.newton import Options
 from bladefem.study.mistuning.validate import scene_deviations
@@ -26,7 +26,7 @@ OPTIONS = Options(tolerance=1e-6)
 
 @pytest.fixture(scope="module")
 def wheel():
-    scene, run, patches, sector, case, settings = reduced_wheel()
+    scene, run, patches, sector, case, settings = reduced_wheel(COARSE_MISTUNED)
     # two modes: what the others do without inertia is in the residual flexibility
     settings = replace(settings, modes=2)
     made = whole_wheel(scene, run.mesh, sector, patches, case, settings)

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mistuned import COARSE_MISTUNED, MISTUNED, reduced_wheel
+from mistuned import COARSE_MISTUNED, MISTUNED, ORDER, SECTORS, SMALL_MISTUNED, reduced_wheel
 
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
@@ -65,7 +65,7 @@ from bladefem.wheel.solve import free_wheel, solve_wheel
 
 @pytest.fixture(scope="module")
 def reduced():
-    return reduced_wheel()
+    return reduced_wheel(SMALL_MISTUNED)
 
 
 def test_elements_that_the_scene_gives_can_be_joined(reduced):
@@ -81,7 +81,7 @@ TIGHT = replace(DEFAULT_OPTIONS, tolerance=1e-13)
 
 
 @pytest.mark.parametrize("finest", [2, None])
-@pytest.mark.parametrize("share", [0.99, 1.03])
+@pytest.mark.parametrize("share", [0.99, 1.045])
 def test_whole_wheel_is_the_tuned_sector(reduced, finest, share):
     """Sticking and slipping, with the points of the scene and with those joined from all nodes."""
     scene, run, patches, sector, _, _ = reduced
@@ -97,7 +97,7 @@ def test_whole_wheel_is_the_tuned_sector(reduced, finest, share):
     found = solve_wheel(wheel, omega, 1, 72, options=TIGHT)
     assert one.converged and found.converged
     assert (one.states["slip"] > 0) == (share > 1)
-    turn = np.exp(2j * np.pi * 9 / 36 * np.arange(36))
+    turn = np.exp(2j * np.pi * ORDER / SECTORS * np.arange(SECTORS))
     np.testing.assert_allclose(
         found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-9 * abs(one.probe).max()
     )
@@ -122,7 +122,7 @@ def test_a_stiff_layer_is_that_of_the_tuned_sector(reduced):
         one = solve(model, omega, 1, 72, options=TIGHT)
         found = solve_wheel(wheel, omega, 1, 72, options=TIGHT)
         assert one.converged and found.converged
-        turn = np.exp(2j * np.pi * 9 / 36 * np.arange(36))
+        turn = np.exp(2j * np.pi * ORDER / SECTORS * np.arange(SECTORS))
         scale = abs(one.probe).max()
         np.testing.assert_allclose(found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-9 * scale)
         answers.append(one.probe[1, 0])
@@ -133,8 +133,8 @@ def test_stiffer_blades_raise_the_resonance_by_the_aerofoils_share(reduced):
     """1 % on all blades: the wheel's resonance rises, by less than the blades' own."""
     scene, run, patches, sector, case, settings = reduced
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
-    own = wheel.sectors[9].omega[0]
-    pattern = frequency_pattern(sector.families, np.full(36, 0.01))
+    own = wheel.sectors[ORDER].omega[0]
+    pattern = frequency_pattern(sector.families, np.full(SECTORS, 0.01))
     grid = own * np.linspace(0.999, 1.011, 241)
     size = [abs(free_wheel(wheel, w, 1, pattern)[:, 1, 0]) for w in grid]
     # all blades alike: the tuned wave in all of them
@@ -164,9 +164,9 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes, 
     family = family_of_case(scene, run.mesh, run.reduced, patches, case)
     model = family_member(family, settings).model
     # all contacts slip there
-    omega = 1.03 * model.side(1).omega[0]
+    omega = 1.045 * model.side(1).omega[0]
     one = solve(model, omega, 1, 72, options=TIGHT)
-    pattern = frequency_pattern(sector.families, np.zeros((36, 3)))
+    pattern = frequency_pattern(sector.families, np.zeros((SECTORS, 3)))
     found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=TIGHT)
     assert one.converged and one.states["slip"] == len(one.w)
     points = settings.points
@@ -177,7 +177,7 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes, 
     mean = run.strength.mean[blade]
     tuned = fatigue_utilisation(diagram, place, stress.field[blade], mean)
     solved = SolvedWheel(shapes, wheel, pattern, case, found, points)
-    for number in (0, 17):
+    for number in (0, 5):
         motion = blade_motion(solved, number)
         own = stress_of_motion(shapes.bodies, case, motion)
         used = fatigue_utilisation(diagram, place, own.field[blade], mean)
@@ -189,8 +189,8 @@ def test_blade_of_a_mistuned_wheel_moves_as_in_the_balance(reduced, shapes):
     """Waves of all nodal diameters add up to the amplitude that the reduced wheel has."""
     scene, run, patches, sector, case, settings = reduced
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
-    omega = 0.99 * wheel.sectors[9].omega[0]
-    deviation = 0.01 * np.random.default_rng(3).normal(size=(36, 3))
+    omega = 0.99 * wheel.sectors[ORDER].omega[0]
+    deviation = 0.01 * np.random.default_rng(3).normal(size=(SECTORS, 3))
     pattern = frequency_pattern(sector.families, deviation)
     point = solve_wheel(wheel, omega, 3, 72, pattern=pattern)
     assert point.converged and np.ptp(point.size()) > 0.05 * point.size().max()
@@ -214,13 +214,13 @@ def test_blade_of_another_shape_that_is_the_same_has_the_others_stress(reduced):
     sector = reduce_wheel(bodies, patches, 6, run.clamped, 3, run.modes, root=True)
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, settings)
     _, readings = blade_readings(bodies, run.clamped, 3, run.modes, root=True)
-    deviation = 0.01 * np.random.default_rng(3).normal(size=(36, 3))
+    deviation = 0.01 * np.random.default_rng(3).normal(size=(SECTORS, 3))
     deviation[4] = 0
     families = frequency_pattern(sector.families, deviation).stiffness
-    stiffness = np.zeros((36, readings.shape[1], readings.shape[1]))
+    stiffness = np.zeros((SECTORS, readings.shape[1], readings.shape[1]))
     stiffness[:, :3, :3] = families
     pattern = Pattern(stiffness)
-    point = solve_wheel(wheel, 0.99 * wheel.sectors[9].omega[0], 3, 72, pattern=pattern)
+    point = solve_wheel(wheel, 0.99 * wheel.sectors[ORDER].omega[0], 3, 72, pattern=pattern)
     shapes = WheelShapes(bodies, patches, all_modes(bodies), readings)
     solved = SolvedWheel(shapes, wheel, pattern, case, point, settings.points)
     motion, own = odd_blade_stress(run, solved, 4, scene)
@@ -241,7 +241,7 @@ def folder(tmp_path_factory):
 
 def test_a_second_run_finds_the_wheel(folder):
     """The sector in all nodal diameters and the wheel's response are kept like other stages."""
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = load_scene(MISTUNED, SMALL_MISTUNED)
     first = with_whole_wheel(pipeline.run(scene, folder))
     again = with_whole_wheel(pipeline.run(scene, folder))
     for name in ("wheel_sector", "whole_wheel"):
@@ -279,23 +279,23 @@ def test_a_second_run_finds_the_wheel(folder):
 def test_blades_of_another_shape(folder, tmp_path):
     """Two of one shape, meshed anew, on a wheel that is tuned otherwise."""
     entry = "aerofoil.chord_tip = 41 mm"
-    overrides = [f"mistuning.blades=3: {entry}, 20: {entry}", "mistuning.pattern=none.csv"]
+    overrides = [f"mistuning.blades=3: {entry}, 8: {entry}", "mistuning.pattern=none.csv"]
     # more of them are what this is not about
     overrides += ["model.harmonics=3", "model.samples=128"]
-    scene = vary(load_scene(MISTUNED, [*COARSE_MISTUNED, *overrides]), mistuning__pattern=None)
+    scene = vary(load_scene(MISTUNED, [*SMALL_MISTUNED, *overrides]), mistuning__pattern=None)
     scene = vary(scene, mistuning__scatter=None)
     run = with_whole_wheel(pipeline.run(scene, folder))
     (found,) = run.wheel
-    odd = [2, 19]
+    odd = [2, 7]
     assert set(found.others.changes) == set(odd)
     shift = found.deviation[2]
     assert 0.002 < shift[0] < 0.02
-    np.testing.assert_array_equal(found.deviation[19], shift)
-    assert not found.deviation[np.setdiff1d(np.arange(36), odd)].any()
+    np.testing.assert_array_equal(found.deviation[7], shift)
+    assert not found.deviation[np.setdiff1d(np.arange(SECTORS), odd)].any()
     assert found.factor > 1.0
     # the motion of all finite elements with the deviations' forces is that of the reduced wheel
     assert found.highest.stress.mismatch < 5e-3
-    said = [text for text in run.messages if text.startswith("blades 3, 20 of another shape")]
+    said = [text for text in run.messages if text.startswith("blades 3, 8 of another shape")]
     assert f"{100 * shift[0]:+.3g} %" in said[0]
     # one of these is the highest; its own aerofoil is a little narrower
     assert found.peak.blade in odd
@@ -324,13 +324,13 @@ def test_blades_of_another_shape(folder, tmp_path):
 def test_blades_of_another_stiffness_and_mass(folder, tmp_path):
     """A file with a density a blade, and a stiffness a family."""
     rng = np.random.default_rng(4)
-    values = 0.01 * rng.normal(size=(36, 4))
+    values = 0.01 * rng.normal(size=(SECTORS, 4))
     file = tmp_path / "pattern.csv"
     rows = [f"{b + 1}, " + ", ".join(map(repr, row.tolist())) for b, row in enumerate(values)]
     file.write_text("\n".join(["blade, mass, 1F stiffness, 2F stiffness, 1T stiffness", *rows]))
     # more of them are what this is not about
     fixed = ["model.harmonics=1", "model.samples=64", f"mistuning.pattern={file}"]
-    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, *fixed])
+    scene = load_scene(MISTUNED, [*SMALL_MISTUNED, *fixed])
     run = with_whole_wheel(pipeline.run(scene, folder))
     (found,) = run.wheel
     alone = np.sqrt((1 + values[:, 1:]) / (1 + values[:, :1])) - 1
@@ -349,7 +349,7 @@ def test_blades_of_another_stiffness_and_mass(folder, tmp_path):
 
 def test_engine_orders_of_one_period():
     """Order 9 and 6 in a period of three to a revolution; alone it is harmonic 1."""
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = load_scene(MISTUNED)
     assert own_harmonic(scene) == 1
     both = vary(scene, mistuning__orders=("6: 0.5 N; 30 deg", "18: 0.1 N"))
     assert own_harmonic(both) == 3
@@ -373,13 +373,13 @@ def test_error_by_harmonics_knows_the_third_of_each_order(excited, H, more):
 
 
 def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(folder):
-    """Order 6 next to 9, with hardly a force: harmonics 3, 6, 9 of three periods a revolution, and
-    the answer of harmonics 1, 2, 3 of nine.
+    """Order 2 next to 3, with hardly a force: harmonics 3, 6, 9 of one period a revolution, and
+    the answer of harmonics 1, 2, 3 of three.
     """
-    fixed = [*COARSE_MISTUNED, "model.harmonics=1", "model.samples=64"]
+    fixed = [*SMALL_MISTUNED, "model.harmonics=1", "model.samples=64"]
     run = pipeline.run(load_scene(MISTUNED, fixed), folder)
     one = with_whole_wheel(run)
-    faint = vary(run.scene, mistuning__orders=("6: 1e-9 N",))
+    faint = vary(run.scene, mistuning__orders=("2: 1e-9 N",))
     both = with_whole_wheel(replace(run, scene=faint))
     r, s = one.wheel[0], both.wheel[0]
     assert (r.harmonic, s.harmonic) == (1, 3)
@@ -395,7 +395,7 @@ def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(folder):
 
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     """Four wheels, the lowest and the highest also in full; a second call finds them."""
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = load_scene(MISTUNED, SMALL_MISTUNED)
     scene = vary(scene, mistuning__level="damper law", mistuning__wheels=4, mistuning__checks=2)
     run = pipeline.run(scene, folder)
     found = scatter_of_run(run)
@@ -414,16 +414,16 @@ def test_the_damper_law_knows_blades_of_another_shape(folder):
     """Two wide blades, 1 % off in frequency, next to a small scatter: amplification as of the whole
     wheel, which it is not without these blades.
     """
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = load_scene(MISTUNED, SMALL_MISTUNED)
     scene = vary(scene, mistuning__level="damper law", mistuning__wheels=3, mistuning__checks=3)
     scene = vary(scene, mistuning__scatter=0.001, mistuning__pattern=None)
     alike = scatter_of_run(pipeline.run(scene, folder))
     entry = "aerofoil.chord_tip = 41 mm"
-    scene = vary(scene, mistuning__blades=(f"3: {entry}", f"20: {entry}"))
+    scene = vary(scene, mistuning__blades=(f"3: {entry}", f"8: {entry}"))
     found = scatter_of_run(pipeline.run(scene, folder))
     assert abs(found.check_errors).max() < 0.05
     assert (found.factor > 1.03 * alike.factor.max()).all()
-    assert set(found.blade.ravel()) <= {2, 19}
+    assert set(found.blade.ravel()) <= {2, 7}
 
 
 @pytest.mark.parametrize(
@@ -513,7 +513,7 @@ def test_scatter_of_a_scene_without_a_wheel_names_its_kind():
 @pytest.mark.parametrize(("given", "H"), [(None, 3), (7, 7)])
 def test_statistics_begin_with_few_harmonics(given, H):
     """A tuned curve under a light load may need more, unless the scene gives them."""
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = load_scene(MISTUNED, SMALL_MISTUNED)
     scene = vary(scene, model__harmonics=given)
     curve = SimpleNamespace(settings=SimpleNamespace(harmonics=7, samples=64))
     wheel = SimpleNamespace(excitation={1: None})
@@ -524,12 +524,12 @@ def test_the_reported_peak_has_dampers_that_walk(tmp_path):
     """The highest blade, its factor over the tuned wheel and its stress are those of free means,
     and what held ones give stands beside them.
     """
-    free_means = [text for text in COARSE_MISTUNED if not text.startswith("model.static")]
+    free_means = [text for text in SMALL_MISTUNED if not text.startswith("model.static")]
     fixed = [*free_means, "model.harmonics=3", "model.samples=128"]
     run = with_whole_wheel(pipeline.run(load_scene(MISTUNED, fixed), tmp_path))
     (found,) = run.wheel
     free = found.free_means
-    assert free.walking == 36 and free.points >= 3
+    assert free.walking == SECTORS and free.points >= 3
     assert 0.005 < free.change < 0.03
     assert found.peak.height == pytest.approx(free.held * (1 + free.change))
     assert found.solution.size().max() == found.peak.height
@@ -538,14 +538,18 @@ def test_the_reported_peak_has_dampers_that_walk(tmp_path):
     assert abs(found.sector_difference) < 2e-3
     assert found.highest.stress.mismatch < 5e-3
     said = [text for text in run.messages if "free mean displacements" in text]
-    assert f"{1e6 * free.held:.4g} um" in said[0] and "36 of 36 dampers walk" in said[0]
+    assert (
+        f"{1e6 * free.held:.4g} um" in said[0] and f"{SECTORS} of {SECTORS} dampers walk" in said[0]
+    )
     table = pattern_table(run.wheel)
     assert table["highest_amplitude_held"][0] == free.held < table["highest_amplitude"][0]
 
 
 @pytest.fixture(scope="module")
 def narrow_blade(tmp_path_factory):
-    """A run with one blade of another shape that is not the highest."""
+    """A run with one blade of another shape that is not the highest, on all 36 blades: in a smaller
+    wheel it moves with its neighbours.
+    """
     overrides = ["mistuning.blades=3: aerofoil.chord_tip = 38 mm"]
     overrides += ["model.harmonics=1", "model.samples=64"]
     scene = load_scene(MISTUNED, [*COARSE_MISTUNED, *overrides])
@@ -567,10 +571,12 @@ def test_a_blade_of_another_shape_is_judged_where_it_moves_most(narrow_blade):
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, curve.settings)
     deviation = scene_deviations(scene, 36, 3).frequency
     pattern = found.others.added(frequency_pattern(sector.families, deviation), 36)
-    points = [
-        solve_wheel(wheel, omega, 1, 64, pattern=pattern)
-        for omega in 2 * np.pi * odd.frequency * np.linspace(0.97, 1.03, 61)
-    ]
+    points = []
+    # odd.frequency is within 0.2 % of the highest, below
+    for omega in 2 * np.pi * odd.frequency * np.linspace(0.985, 1.015, 31):
+        points.append(
+            solve_wheel(wheel, omega, 1, 64, pattern=pattern, start=points[-1] if points else None)
+        )
     assert all(point.converged for point in points)
     top = max(points, key=lambda point: point.size()[2])
     # what the search does not look for is 1 %
