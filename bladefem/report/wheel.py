@@ -365,7 +365,7 @@ def _lowest_known(found: Amplification) -> int | None:
 
 
 def optimum_is_known(found: Amplification) -> bool:
-    """There are several loads, and where the drawn wheels are lowest their amplification is known."""
+    """There are several loads, and amplifications are known where the wheels are lowest."""
     heights = np.quantile(found.peak, SHARE, axis=1)
     return len(found.loads) > 1 and bool(found.is_known[np.argmin(heights)])
 

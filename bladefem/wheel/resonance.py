@@ -19,8 +19,8 @@ MAX_ADDED_POINTS = 40
 # points closer than this are not distinguished, relative
 SAME_POINT = 1e-7
 
-# next to a point that was not solved, where the curve may end in a fold: relative gain of height that
-# is not looked for, up to that point and at least over this share of the frequency
+# next to a point that was not solved, where the curve may end in a fold: relative gain of height
+# that is not looked for, up to that point and at least over this share of the frequency
 LOST_GAIN = 0.01
 LEAST_LOOK = 5e-4
 

@@ -14,7 +14,7 @@ from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ..util.arrays import ComplexArray, RealArray
 from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
-from .newton import WheelBalance, WheelNewton, evaluate_wheel, newton_wheel
+from .newton import WheelBalance, WheelNewton, evaluate_wheel, full_newton, newton_wheel
 from .tuned import tuned_displacements
 from .walking import WheelWalk, slipping_dampers, walking_motions
 
@@ -30,9 +30,12 @@ FIRST_LOAD_SHARE = 0.02
 FIRST_LOAD_FACTOR = 2.0
 LAST_LOAD_FACTOR = 1.01
 HOMOTOPY_POINTS = 60
-# rounds in which it is found which dampers walk, and samples for each harmonic of a walk where
-# transitions were to be located exactly
-WALK_ROUNDS = 6
+# rounds in which it is found which dampers walk; a residual above this share of the largest marks
+# those that are undecided, where they are no more than this
+WALK_ROUNDS = 10
+UNDECIDED_SHARE = 0.3
+MOST_UNDECIDED = 2
+# samples for each harmonic of a walk where transitions were to be located exactly
 WALK_SAMPLES = 64
 
 
@@ -132,7 +135,6 @@ def _walking(
     """
     wheel = balance.wheel
     H = balance.stuck.shape[3] // 2
-    tangents = wheel.elements.tangents
     if balance.samples == 0:
         balance = replace(balance, samples=WALK_SAMPLES * (H + 1))
     near = start is not None and start.converged and start.walk is not None
@@ -149,25 +151,88 @@ def _walking(
         if held is None:
             return None
         w, walks = held.state.w, slipping_dampers(held.state.forces.shares)
-    iterations = products = 0
-    for _ in range(WALK_ROUNDS):
-        if not walks.any():
+    if not walks.any():
+        return None
+    tried: list[WheelNewton] = []
+    own = balance
+    # first by full steps: a line search takes long where a damper should walk and does not
+    attempts = [(full_newton, walks), (newton_wheel, walks)]
+    if not walks.all():
+        attempts.append((newton_wheel, np.ones_like(walks)))
+    for attempt, first_walks in attempts:
+        rounds = _walking_rounds(balance, motions, w, first_walks, options, attempt)
+        if rounds is None:
             return None
-        walk = WheelWalk(motions, wheel.springs, tangents, walks)
+        own, end = rounds
+        tried.append(end)
+        if end.converged:
+            break
+    if not tried[-1].converged and options.fallbacks:
+        # dampers that slip throughout have no other balance: to look for one takes longest
+        return None
+    end = replace(
+        tried[-1],
+        iterations=sum(one.iterations for one in tried),
+        products=sum(one.products for one in tried),
+    )
+    return own, end, "newton, walking"
+
+
+def _walking_rounds(
+    balance: WheelBalance,
+    motions: np.ndarray,
+    w: np.ndarray,
+    walks: np.ndarray,
+    options: Options,
+    attempt: Callable[[WheelBalance, np.ndarray, Options], WheelNewton],
+) -> tuple[WheelBalance, WheelNewton] | None:
+    """The balance in which exactly those dampers walk on which no contact sticks, and where Newton
+    ended in it, with the cost of all rounds; None where none walks in the end.
+
+    Args:
+        w: (N, n, d, K) displacements to begin with.
+        walks: (N,) dampers that walk to begin with, some of them.
+        attempt: Newton's method.
+    """
+    wheel = balance.wheel
+    iterations = products = 0
+    tried: list[np.ndarray] = []
+    while True:
+        tried.append(walks)
+        walk = WheelWalk(motions, wheel.springs, wheel.elements.tangents, walks)
         own = replace(balance, walk=walk)
-        end = newton_wheel(own, w, options)
+        end = attempt(own, w, options)
         iterations += end.iterations
         products += end.products
         end = replace(end, iterations=iterations, products=products)
-        if not end.converged:
-            # dampers that slip throughout have no other balance: to look for one takes longest
-            return None if options.fallbacks else (own, end, "newton, walking")
-        slips = slipping_dampers(end.state.forces.shares)
-        if (slips == walks).all():
-            return own, end, "newton, walking"
-        # those that stick again begin where they are
-        w, walks = replace(walk, dampers=walk.dampers & ~slips).without_steps(end.state.w), slips
-    return None
+        if end.converged:
+            slips = slipping_dampers(end.state.forces.shares)
+            if (slips == walks).all():
+                return own, end
+            # those that stick again begin where they are
+            turned = walks & ~slips
+            walks = slips
+        else:
+            turned = undecided_dampers(end.state.residual)
+            walks = walks ^ turned
+        if end.converged and not walks.any():
+            return None
+        known = not walks.any() or any((walks == one).all() for one in tried)
+        if len(tried) == WALK_ROUNDS or known:
+            why = "it is not decided which dampers walk" if end.converged else end.reason
+            return own, replace(end, converged=False, reason=why)
+        w = replace(walk, dampers=turned).without_steps(end.state.w)
+
+
+def undecided_dampers(residual: np.ndarray) -> np.ndarray:
+    """(N,) True where a residual (N, n, d, K) is left after Newton's method with given dampers that
+    walk. One that rests and should walk, or walks and should rest, has no balance and keeps its
+    residual alone, while all others are solved; none where more than a few have it.
+    """
+    sizes = np.linalg.norm(residual.reshape(len(residual), -1), axis=1)
+    large = sizes > UNDECIDED_SHARE * sizes.max()
+    few = np.isfinite(sizes).all() and np.count_nonzero(large) <= MOST_UNDECIDED
+    return large if few else np.zeros(len(sizes), dtype=bool)
 
 
 def _starts(

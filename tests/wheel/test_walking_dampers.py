@@ -24,9 +24,10 @@ from bladefem.wheel.local_peak import (
 from bladefem.wheel.lumped import PLATFORM, TIP, LumpedBlades, lumped_matrices, lumped_pattern
 from bladefem.wheel.model import engine_order, tuned_wheel
 from bladefem.wheel.resonance import find_wheel_peak
-from bladefem.wheel.solve import solve_wheel
+from bladefem.wheel.solve import solve_wheel, undecided_dampers
 from bladefem.wheel.statistics import scatter_statistics, wheel_respond
 from bladefem.wheel.tuned import tuned_sector
+from bladefem.wheel.walking import slipping_dampers
 
 COUNT, ORDER = 12, 3
 BLADES = LumpedBlades(count=COUNT, damping=0.02)
@@ -312,3 +313,33 @@ def test_peak_of_a_blade_that_is_not_the_highest():
     assert found.peak.by_blade == pytest.approx([1.0, 0.5], rel=2e-4)
     # the first search did not close it in
     assert found.change > 0.02
+
+
+@pytest.mark.parametrize("limit", [8.0, 9.6])
+def test_it_is_found_which_dampers_walk_where_some_nearly_do(limit):
+    """Between friction that all of them overcome and friction that holds all: exactly those walk on
+    which nothing sticks. Newton's method with one damper too few or too many does not converge.
+    """
+    free = free_dampers(limit * np.array([1.0, 0.5]), 1.5)
+    rng = np.random.default_rng(1)
+    options = replace(DEFAULT_OPTIONS, fallbacks=False, tolerance=1e-6)
+    walking = []
+    for _ in range(16):
+        pattern = lumped_pattern(BLADES, 0.01 * rng.standard_normal(COUNT))
+        omega = resonance() * (1 + 0.02 * rng.standard_normal())
+        point = solve_wheel(free, omega, 3, 64, pattern=pattern, options=options)
+        assert point.converged
+        slips = slipping_dampers(point.shares)
+        walks = np.zeros(COUNT, dtype=bool) if point.walk is None else point.walk.dampers
+        np.testing.assert_array_equal(slips, walks)
+        walking.append(np.count_nonzero(walks))
+    assert any(0 < number < COUNT for number in walking)
+
+
+def test_undecided_dampers_are_those_that_keep_the_residual_alone():
+    residual = np.full((12, 2, 2, 7), 1e-3)
+    assert not undecided_dampers(residual).any()
+    residual[7] = 1.0
+    np.testing.assert_array_equal(np.flatnonzero(undecided_dampers(residual)), [7])
+    residual[2] = np.nan
+    assert not undecided_dampers(residual).any()
