@@ -57,6 +57,8 @@ class LocalBalances:
     options: Options = DEFAULT_OPTIONS
     # the first point's start; the tuned wheel when None
     start: WheelSolution | None = None
+    # flexibility products of one attempt; None: as many as it takes
+    most_products: int | None = None
     # by circular frequency of the common period [rad/s]
     points: dict[float, WheelSolution] = field(default_factory=dict)
 
@@ -71,6 +73,7 @@ class LocalBalances:
                 pattern=self.pattern,
                 start=self._start(omega),
                 options=self.options,
+                most_products=self.most_products,
             )
         point = self.points[omega]
         return point.size() if point.converged else np.full(self.wheel.count, np.nan)

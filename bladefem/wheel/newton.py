@@ -47,9 +47,6 @@ QUADRATIC_REDUCTION = 1e-2
 MEAN_WEIGHT = 1e-2
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-8
-# products after which Newton is given up where its caller has no other way: with dampers that walk
-# points of the shipped wheel under 77 N that converge take 500, and under 40 N few take more
-MOST_PRODUCTS = 1500
 # full steps: at most; error over the lowest one, and error, from which they diverge
 FULL_STEPS = 8
 MOST_GROWTH = 4.0
@@ -78,6 +75,8 @@ class WheelBalance:
     samples: int
     # None: all dampers rest in the mean
     walk: WheelWalk | None = None
+    # flexibility products after which Newton is given up; None: as many as it takes
+    most_products: int | None = None
 
 
 @dataclass(frozen=True)
@@ -163,7 +162,7 @@ def newton_wheel(
             next, which does not depend on how the equations are scaled (Deuflhard, Newton Methods
             for Nonlinear Problems, 2004, Sect. 3.3), or "residual", which costs no more solves.
     """
-    steps = _Steps(balance, MOST_PRODUCTS if not options.fallbacks else None)
+    steps = _Steps(balance)
     run = iterate_newton(
         evaluate_wheel(balance, w),
         _error_of_state,
@@ -180,7 +179,7 @@ def full_newton(balance: WheelBalance, w: np.ndarray, options: Options) -> Wheel
     """Few Newton steps without a line search from the displacements w (N, n, d, K); where they do
     not converge the state with the lowest error.
     """
-    steps = _Steps(balance, MOST_PRODUCTS if not options.fallbacks else None)
+    steps = _Steps(balance)
     best = evaluate_wheel(balance, w)
 
     def advance(state: WheelState) -> WheelState:
@@ -212,10 +211,8 @@ class _Steps:
     couple, and another where the present one takes long.
     """
 
-    def __init__(self, balance: WheelBalance, most_products: int | None) -> None:
+    def __init__(self, balance: WheelBalance) -> None:
         self.balance = balance
-        # None: any number
-        self.most_products = most_products
         self.preconditioner: AnyPreconditioner | None = None
         self.stale = True
         self.products = 0
@@ -233,7 +230,8 @@ class _Steps:
 
     def step(self, state: WheelState) -> tuple[np.ndarray, bool]:
         """The step (N, n, d, K), and whether GMRES reached its accuracy."""
-        if self.most_products is not None and self.products > self.most_products:
+        most = self.balance.most_products
+        if most is not None and self.products > most:
             text = f"residual {state.error:.1e} after {self.products} flexibility products"
             raise StepError(Outcome.EXHAUSTED, text)
         accuracy = float(np.clip(0.1 * state.error, TIGHT_STEP_TOLERANCE, LOOSE_STEP_TOLERANCE))

@@ -94,6 +94,7 @@ def solve_wheel(
     pattern: Pattern = TUNED_PATTERN,
     start: WheelSolution | None = None,
     options: Options = DEFAULT_OPTIONS,
+    most_products: int | None = None,
 ) -> WheelSolution:
     """The periodic response of all blades at circular frequency omega [rad/s].
 
@@ -101,6 +102,8 @@ def solve_wheel(
         samples: time samples a period; 0 locates the transitions of 1-D elements exactly.
         pattern: what differs from blade to blade.
         start: a solved neighbour; the tuned wheel when left out, or full stick.
+        most_products: flexibility products after which an attempt is given up; None: as many as it
+            takes.
 
     Returns:
         a WheelSolution whose `converged` and `reason` must be read.
@@ -114,7 +117,9 @@ def solve_wheel(
     elements = pattern_elements(wheel, pattern)
     stuck = _shaped(wheel, linear_motion(wheel, flex, "contact"))
     first = wheel.first_forces(pattern, elements)
-    balance = WheelBalance(wheel, flex, elements, first, stuck, samples)
+    balance = WheelBalance(
+        wheel, flex, elements, first, stuck, samples, most_products=most_products
+    )
     motions = walking_motions(wheel)
     if motions.shape[2]:
         found = _walking(balance, motions, start, options)

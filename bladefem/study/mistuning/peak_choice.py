@@ -23,9 +23,10 @@ MOST_HARMONICS = 15
 JUDGING_HARMONICS = 7
 # flexibility products of one point up to which all points of a search may be solved like it
 MOST_SEARCH_PRODUCTS = 400
-# Newton iterations of a balance with free means, one of many wheels: one that is not found takes as
-# long as it may
+# Newton iterations and products of a balance with free means, one of many wheels: one that is not
+# found takes as long as it may, and those of the shipped wheel under 77 N take 500 products
 MOST_WALKING_ITERATIONS = 25
+MOST_WALKING_PRODUCTS = 1500
 # relative error of a peak's height by the search over frequencies
 SEARCH_TOLERANCE = 0.01
 
@@ -144,7 +145,8 @@ def pattern_peak(
         return PatternPeak(first, asked=free is not None)
     # what Newton does not reach from the nearest walking balance nothing else is likely to
     simply = replace(options, fallbacks=False, iterations=MOST_WALKING_ITERATIONS)
-    again = local_peak(LocalBalances(free, pattern, *balance, simply, near), first, harmonic)
+    walking = LocalBalances(free, pattern, *balance, simply, near, MOST_WALKING_PRODUCTS)
+    again = local_peak(walking, first, harmonic)
     # the resonance may be higher beyond a point that was not solved
     known = again is not None and again.peak.closed_in
     return PatternPeak(first, again if known else None, True)
