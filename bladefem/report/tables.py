@@ -35,6 +35,9 @@ COLUMNS = {
     "amplitude": Column("amplitude", "m", "µm", 1e6),
     "searched_amplitude": Column("highest balance by the search", "m", "µm", 1e6),
     "tuned_amplitude": Column("tuned wheel", "m", "µm", 1e6),
+    "tuned_amplitude_balance": Column("by the balance of all blades", "m", "µm", 1e6),
+    "tuned_amplitude_sector": Column("by the sector's response", "m", "µm", 1e6),
+    "amplification_known": Column("amplification known"),
     "tuned_amplitude_held": Column("the same, dampers held in the mean", "m", "µm", 1e6),
     "free_change": Column("free means change amplifications by", "1", "%", 100.0, 2),
     "kept_held": Column("wheels with held means"),
@@ -50,6 +53,7 @@ COLUMNS = {
     "wheels": Column("wheels"),
     "calibration": Column("law multiplied by"),
     "law_error": Column("law off the whole wheel by", "1", "%", 100.0, 2),
+    "truncation": Column("harmonics leave", "1", "%", 100.0, 2),
     "worst": Column("worst wheel", "1", digits=4),
     **{
         f"p{share}{end}": Column(f"{share} %{title}", "1", digits=4)

@@ -469,6 +469,12 @@ def _optimum_sentences(found: Amplification) -> list[str]:
         "between the loads studied both optima are those of a parabola, whose error the intervals "
         f"leave out: robust optimum {_bracket(found, robust.load.value)}",
     ]
+    unknown = found.loads[~found.is_known]
+    if len(unknown):
+        sentences.append(
+            f"under {', '.join(f'{load:g}' for load in unknown)} N, where amplifications are not "
+            "known, each drawn wheel counts as high as the tuned one, and is higher"
+        )
     if robust.at_end > 0.025:
         sentences.append(
             f"in {100 * robust.at_end:.0f} % of the resamples the robust optimum is the smallest "

@@ -102,8 +102,10 @@ def draw_bands(
             if highest > lowest:
                 ax.axvspan(lowest, highest, color="#888888", alpha=0.15, linewidth=0)
                 words += f" ({lowest:.4g} to {highest:.4g})"
-            # words on the outer side of neighbouring lines, which they would cross otherwise
-            outside = -1 if at == first and len(best) > 1 else 1
+            # words on the outer side of neighbouring lines, which they would cross otherwise, where
+            # there is room for them
+            room = np.log(at / load.min()) > 0.5 * np.log(load.max() / load.min())
+            outside = -1 if at == first and len(best) > 1 and room else 1
             ax.annotate(
                 words,
                 (at, 0.97 - 0.06 * place),
@@ -112,6 +114,7 @@ def draw_bands(
                 xytext=(4 * outside, 0),
                 ha="right" if outside < 0 else "left",
                 fontsize=8.5,
+                bbox={"facecolor": "white", "alpha": 0.8, "linewidth": 0, "pad": 1.0},
             )
         log_axis(ax, "x")
         log_axis(ax, "y")

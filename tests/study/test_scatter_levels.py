@@ -115,10 +115,11 @@ def test_amplification_is_refused_where_the_sector_moves_otherwise():
     numbers = ["p50", "p95_low", "p99_high", "worst", "highest_amplitude"]
     assert table.loc[0, numbers].isna().all() and table.loc[1:, numbers].notna().all(axis=None)
     assert list(table["amplification_known"]) == [False, True, True]
-    (said,) = [text for text in scatter_sentences(found) if "is not known" in text]
+    (said,) = [text for text in scatter_sentences(found) if "load is not known" in text]
     assert isinstance(said, Message) and said.level == "warning"
     assert "300 um for the tuned wheel" in said and "response 500 um" in said
     assert optimum_is_known(found)
+    assert any("counts as high as the tuned one" in text for text in scatter_sentences(found))
     # the lowest wheels of all are those that are not known
     low = of_one_load(40.0, 3e-4, factors, SectorComparison(3e-4, 1e-4, False))
     found = joined_loads([low, *good])
