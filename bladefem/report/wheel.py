@@ -351,7 +351,7 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
         ]
         sentences.append(
             "harmonics of whole wheels, and the estimated error that these and the samples leave "
-            f"in the amplitude of the first wheel drawn: {', '.join(parts)}"
+            f"in an amplitude: {', '.join(parts)}"
         )
     lost = int(found.unsolved.sum())
     sentences.append(f"{lost} of {int(found.points.sum())} points not solved")

@@ -31,6 +31,7 @@ from .peak_choice import (
     first_balance,
     pattern_peak,
     wanted_truncation,
+    with_free_change,
 )
 from .sector_comparison import SectorComparison, compared_with_sector, with_comparison
 from .validate import LAW_LEVEL, scene_scatter
@@ -67,10 +68,6 @@ class DrawnWheels:
     def by_damper_law(self) -> bool:
         """The scene asks for the cheap level, with some wheels checked."""
         return self.scene.mistuning.level == LAW_LEVEL
-
-    def with_held_means(self) -> DrawnWheels:
-        """The same wheels, not searched again with free means."""
-        return replace(self, free=None)
 
     def peak(self, pattern: Pattern, balance: tuple[int, int], free: bool = True) -> PatternPeak:
         """The highest blade with a pattern.
@@ -127,10 +124,8 @@ def drawn_statistics(
     balance = scatter_balance(drawn.scene, drawn.wheel, drawn.curve)
     truncation = float("nan")
     tuned, compared = on_root(comm, lambda: _compared(drawn, balance))
-    # free means of others take long, and count only where the tuned wheel has them
-    free = tuned.free is not None
     if compared.agrees:
-        chosen = on_root(comm, lambda: _chosen_balance(drawn if free else drawn.with_held_means()))
+        chosen = on_root(comm, lambda: _chosen_balance(drawn))
         truncation = chosen.truncation
         if (chosen.harmonics, chosen.samples) != balance:
             balance = chosen.harmonics, chosen.samples
@@ -146,7 +141,8 @@ def drawn_statistics(
         patterns = {drawn.curve.load: drawn.patterns}
         search = _search(drawn, balance, tuned)
         found = scatter_statistics(patterns, lambda _, pattern: search(pattern), comm, progress)
-    found = replace(found, harmonics=np.array([balance[0]]), truncation=np.array([truncation]))
+    error = with_free_change(truncation, _free_change(found))
+    found = replace(found, harmonics=np.array([balance[0]]), truncation=np.array([error]))
     return with_comparison(found, compared)
 
 
@@ -165,8 +161,21 @@ def _search(
     return lambda pattern: tuned if pattern is TUNED_PATTERN else drawn.peak(pattern, balance, free)
 
 
+def _free_change(found: Amplification) -> float:
+    """Largest relative change of an amplitude by free means, of the tuned wheel and of those solved
+    in full; zero where means are held.
+    """
+    tuned = found.tuned[0] / found.tuned_held[0]
+    if not np.isfinite(tuned):
+        return 0.0
+    changes = tuned * (1 + found.free_change[0, found.free[0]])
+    return float(abs(np.append(changes, tuned) - 1).max())
+
+
 def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
-    """Harmonics and samples that the first wheel needs: all have the same contacts."""
+    """Harmonics and samples that the first wheel needs: all have the same contacts. With held
+    means, since a richer balance with free ones takes longer than all that follows.
+    """
     pattern = drawn.patterns[0]
     return chosen_peak(
         drawn.wheel,
@@ -177,7 +186,6 @@ def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
         solver_options(drawn.scene.accuracy),
         wanted_truncation(drawn.scene),
         SCATTER_HARMONICS,
-        drawn.free,
     )
 
 
