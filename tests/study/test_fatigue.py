@@ -5,7 +5,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
+from pylife.strength.meanstress import HaighDiagram as FkmDiagram
 
 from bladefem.errors import InputError
 from bladefem.fem.stress import signed_von_mises, von_mises
@@ -42,6 +44,22 @@ def test_table_is_straight_between_its_points():
     assert diagram.allowed(np.array([-100.0, 200.0]) * MPA) == pytest.approx([325 * MPA, 240 * MPA])
     assert np.isnan(diagram.allowed(np.array([500 * MPA]))).all()
     assert haigh_diagram(Fatigue()) is None
+
+
+def test_limit_of_the_diagram_is_that_of_pylife():
+    """Diagram of the FKM guideline: sensitivity M up to R = 0, M/3 beyond, here up to R = 1/2; pyLife
+    brings the amplitudes that last at any mean stress to the endurance limit at R = -1.
+    """
+    limit, M = 300.0, 0.3
+    pressed, pulsed = limit / (1 - M), limit / (1 + M)
+    beyond = pulsed * (1 + M / 3) / (1 + M)
+    knots = [(-pressed, pressed), (0.0, limit), (pulsed, pulsed), (3 * beyond, beyond)]
+    diagram = haigh_diagram(Fatigue(haigh=tuple(f"{x!r} MPa: {y!r} MPa" for x, y in knots)))
+    mean = np.linspace(-0.99 * pressed, 2.99 * beyond, 41)
+    amplitude = diagram.allowed(mean * MPA) / MPA
+    cycles = pd.DataFrame({"range": 2 * amplitude, "mean": mean, "cycles": 1.0})
+    goodman = FkmDiagram.fkm_goodman(pd.Series({"M": M}))
+    assert goodman.transform(cycles, -1.0)["range"].to_numpy() / 2 == pytest.approx(limit, rel=1e-9)
 
 
 def test_nothing_lasts_at_the_ultimate_strength():
