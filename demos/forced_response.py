@@ -26,6 +26,7 @@ small = [
     "contact.points=6",
     "study.loads=90 N, 200 N",
     "study.own_load=false",
+    "study.stability=false",
     "model.nodal_diameters=0, 9",
     "model.modes=10",
     "model.harmonics=1",

@@ -30,7 +30,7 @@ from bladefem.study.pipeline.validate_mesh import found_patches
 
 BLADES = 4
 MODES = 12
-STEPS = 1500
+STEPS = 1000
 PERIODS = 120
 
 

@@ -175,7 +175,12 @@ def test_a_wheel_moves_at_the_probe_as_in_the_balance(order, fast):
     """Harmonics in several nodal diameters, waves with and against the rotation; with Coriolis
     forces, which move the resonance by many of its widths.
     """
-    fields = ["mesh.size=14 mm", "model.modes=20", f"excitation.engine_order={order}"]
+    fields = [
+        "mesh.size=14 mm",
+        "mesh.scale=1.5",
+        "model.modes=20",
+        f"excitation.engine_order={order}",
+    ]
     fields += ["operation.speed=9000 rpm", "operation.coriolis=true"] if fast else []
     scene = load_scene("scenes/wedge.toml", fields)
     mesh = build_mesh(scene)

@@ -34,7 +34,7 @@ COUNT = 36
 
 @pytest.fixture(scope="module")
 def reduced():
-    scene = load_scene(MISTUNED, COARSE_MISTUNED)
+    scene = load_scene(MISTUNED, [*COARSE_MISTUNED, "mesh.scale=1.5"])
     run = pipeline.run(scene, None, until="reduction")
     scene = vary(scene, aerodynamics__influence=list(INFLUENCE))
     return replace(run, scene=scene)

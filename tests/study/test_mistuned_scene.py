@@ -7,7 +7,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from mistuned import COARSE_MISTUNED, MISTUNED, ORDER, SECTORS, SMALL_MISTUNED, reduced_wheel
+from mistuned import (
+    COARSE_MISTUNED,
+    MISTUNED,
+    ORDER,
+    ROUGH_MISTUNED,
+    SECTORS,
+    SMALL_MISTUNED,
+    reduced_wheel,
+)
 
 from bladefem.errors import InputError
 from bladefem.hbm.solve import solve
@@ -241,7 +249,7 @@ def folder(tmp_path_factory):
 
 def test_a_second_run_finds_the_wheel(folder):
     """The sector in all nodal diameters and the wheel's response are kept like other stages."""
-    scene = load_scene(MISTUNED, SMALL_MISTUNED)
+    scene = load_scene(MISTUNED, ROUGH_MISTUNED)
     first = with_whole_wheel(pipeline.run(scene, folder))
     again = with_whole_wheel(pipeline.run(scene, folder))
     for name in ("wheel_sector", "whole_wheel"):
@@ -282,7 +290,7 @@ def test_blades_of_another_shape(folder, tmp_path):
     overrides = [f"mistuning.blades=3: {entry}, 8: {entry}", "mistuning.pattern=none.csv"]
     # more of them are what this is not about
     overrides += ["model.harmonics=3", "model.samples=128"]
-    scene = vary(load_scene(MISTUNED, [*SMALL_MISTUNED, *overrides]), mistuning__pattern=None)
+    scene = vary(load_scene(MISTUNED, [*ROUGH_MISTUNED, *overrides]), mistuning__pattern=None)
     scene = vary(scene, mistuning__scatter=None)
     run = with_whole_wheel(pipeline.run(scene, folder))
     (found,) = run.wheel
@@ -330,7 +338,7 @@ def test_blades_of_another_stiffness_and_mass(folder, tmp_path):
     file.write_text("\n".join(["blade, mass, 1F stiffness, 2F stiffness, 1T stiffness", *rows]))
     # more of them are what this is not about
     fixed = ["model.harmonics=1", "model.samples=64", f"mistuning.pattern={file}"]
-    scene = load_scene(MISTUNED, [*SMALL_MISTUNED, *fixed])
+    scene = load_scene(MISTUNED, [*ROUGH_MISTUNED, *fixed])
     run = with_whole_wheel(pipeline.run(scene, folder))
     (found,) = run.wheel
     alone = np.sqrt((1 + values[:, 1:]) / (1 + values[:, :1])) - 1
@@ -376,7 +384,7 @@ def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(folder):
     """Order 2 next to 3, with hardly a force: harmonics 3, 6, 9 of one period a revolution, and
     the answer of harmonics 1, 2, 3 of three.
     """
-    fixed = [*SMALL_MISTUNED, "model.harmonics=1", "model.samples=64"]
+    fixed = [*ROUGH_MISTUNED, "model.harmonics=1", "model.samples=64"]
     run = pipeline.run(load_scene(MISTUNED, fixed), folder)
     one = with_whole_wheel(run)
     faint = vary(run.scene, mistuning__orders=("2: 1e-9 N",))
@@ -395,7 +403,7 @@ def test_a_faint_further_order_moves_the_wheel_as_the_first_alone(folder):
 
 def test_statistics_by_the_damper_law_are_checked_in_full(folder):
     """Four wheels, the lowest and the highest also in full; a second call finds them."""
-    scene = load_scene(MISTUNED, SMALL_MISTUNED)
+    scene = load_scene(MISTUNED, ROUGH_MISTUNED)
     scene = vary(scene, mistuning__level="damper law", mistuning__wheels=4, mistuning__checks=2)
     run = pipeline.run(scene, folder)
     found = scatter_of_run(run)
@@ -414,7 +422,7 @@ def test_the_damper_law_knows_blades_of_another_shape(folder):
     """Two wide blades, 1 % off in frequency, next to a small scatter: amplification as of the whole
     wheel, which it is not without these blades.
     """
-    scene = load_scene(MISTUNED, SMALL_MISTUNED)
+    scene = load_scene(MISTUNED, ROUGH_MISTUNED)
     scene = vary(scene, mistuning__level="damper law", mistuning__wheels=3, mistuning__checks=3)
     scene = vary(scene, mistuning__scatter=0.001, mistuning__pattern=None)
     alike = scatter_of_run(pipeline.run(scene, folder))
@@ -513,7 +521,7 @@ def test_scatter_of_a_scene_without_a_wheel_names_its_kind():
 @pytest.mark.parametrize(("given", "H"), [(None, 3), (7, 7)])
 def test_statistics_begin_with_few_harmonics(given, H):
     """A tuned curve under a light load may need more, unless the scene gives them."""
-    scene = load_scene(MISTUNED, SMALL_MISTUNED)
+    scene = load_scene(MISTUNED, ROUGH_MISTUNED)
     scene = vary(scene, model__harmonics=given)
     curve = SimpleNamespace(settings=SimpleNamespace(harmonics=7, samples=64))
     wheel = SimpleNamespace(excitation={1: None})
@@ -524,7 +532,7 @@ def test_the_reported_peak_has_dampers_that_walk(tmp_path):
     """The highest blade, its factor over the tuned wheel and its stress are those of free means,
     and what held ones give stands beside them.
     """
-    free_means = [text for text in SMALL_MISTUNED if not text.startswith("model.static")]
+    free_means = [text for text in ROUGH_MISTUNED if not text.startswith("model.static")]
     fixed = [*free_means, "model.harmonics=3", "model.samples=128"]
     run = with_whole_wheel(pipeline.run(load_scene(MISTUNED, fixed), tmp_path))
     (found,) = run.wheel

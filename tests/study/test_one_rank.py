@@ -13,7 +13,7 @@ from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.scene_mesh import build_mesh
 
 pytestmark = pytest.mark.mpi
-COARSE = ["mesh.size=14 mm", "mesh.seat_elements=2", "aerofoil.fillet=0 mm"]
+COARSE = ["mesh.size=14 mm", "mesh.scale=1.5", "mesh.seat_elements=2", "aerofoil.fillet=0 mm"]
 
 
 def test_a_sector_is_reduced_with_the_modes_that_each_rank_has():

@@ -33,7 +33,9 @@ LOAD = 580.0
 @pytest.fixture(scope="module")
 def wheel():
     """Scene, mesh, patches, and the sector reduced in the wave's diameters and in two others."""
-    scene = load_scene("scenes/wedge.toml", ["mesh.size=14 mm", "mesh.seat_elements=4"])
+    scene = load_scene(
+        "scenes/wedge.toml", ["mesh.size=14 mm", "mesh.scale=1.5", "mesh.seat_elements=4"]
+    )
     mesh = build_mesh(scene)
     bodies = Bodies(scene, mesh)
     patches = found_patches(scene, mesh, excited=True)

@@ -5,10 +5,10 @@ import sys
 
 import numpy as np
 import pandas as pd
-from mistuned import MISTUNED, SMALL_MISTUNED
+from mistuned import MISTUNED, ROUGH_MISTUNED
 from processes import run_on_ranks
 
-FEW_WHEELS = [*SMALL_MISTUNED, "mistuning.wheels=3", "mistuning.families=1"]
+FEW_WHEELS = [*ROUGH_MISTUNED, "mistuning.wheels=3", "mistuning.families=1"]
 
 
 def scatter(folder, ranks):
