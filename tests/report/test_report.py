@@ -327,6 +327,16 @@ def test_a_flat_top_leaves_the_frequency_open():
     found = headlines(response_answer(summary, points), summary, points)
     (sure,) = [one.uncertainty for one in found if one.what == "resonance frequency there"]
     assert sure == "± 2 Hz (flat top: the amplitude is within its error there)"
+    (value,) = [one.value for one in found if one.what == "resonance frequency there"]
+    assert value == f"{best['peak_frequency']:.0f} Hz", "no more digits than are known"
+
+
+def test_one_load_alone_is_not_called_the_optimum():
+    summary = synthetic.summary().assign(error=0.01)
+    one = summary[(summary["load"] == 0) | np.isinf(summary["load"]) | (summary["load"] == 200)]
+    found = headlines(response_answer(one), one, None)
+    assert found[0][:3] == ("normal load per seat", "200 N", "only one load studied")
+    assert not any("optimum" in line.what for line in found)
 
 
 @pytest.mark.parametrize(
