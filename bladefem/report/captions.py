@@ -54,8 +54,8 @@ CAPTIONS = {
     "and amplitude over load for each value.",
     "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
     "over the values of both fields; the smallest in bold.",
-    "response/study_band": "Resonance amplitude over the load: median of the samples, the middle "
-    "80 % of them, and all; in grey the blade without damper.",
+    "response/study_band": "Resonance amplitude over the loads that all samples have: median of "
+    "the samples, the middle 80 % of them, and all; in grey the blade without damper.",
     "response/accuracy_of_methods_and_models": "Error of the resonance amplitude over computing "
     "time; the star is the automatic choice, the stairs are what no other setting beats.",
     "response/errors_of_each": "Errors of resonance amplitude and frequency of each setting.",
