@@ -417,6 +417,10 @@ def test_next_steps_name_the_mass_to_try():
     there = pd.DataFrame({"load": [lightest["load"]], "amplitude": [1e-6], "frequency": [800.0]})
     told = next_steps(Scene(), [], meshes, own, None, there)[-1]
     assert f"changes the amplitude by {100 * lightest['body_mesh']:.2g} %" in told
+    # a stress that the mesh leaves uncertain is not one to sign
+    for error, said in ((0.26, True), (0.1, False), (np.nan, False)):
+        asked = next_steps(Scene(), [], summary.assign(stress_error=error), own)
+        assert any("26 % of error in the alternating stress" in step for step in asked) == said
     kept = next_steps(Scene(), [], summary, own.assign(load=200.0))
     assert "keep its mass" in kept[0]
     assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"
