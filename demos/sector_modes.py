@@ -34,6 +34,7 @@ sets = bladefem.find_modes(bodies, diameters, count=4)
 
 # %%
 if comm.rank == 0:
+    print("nodal diameter, frequencies [Hz], largest residual")
     for s in sets:
         print(
             s.nodal_diameter,

@@ -145,10 +145,10 @@ def stress_error_words(row: pd.Series) -> str:
 
 
 def flat_range(best: pd.Series) -> str:
-    """Loads that do nearly as well, from the peaks that the search solved."""
+    """What the loads around the best one are, which stand before it as its uncertainty."""
     low, high = best.get("tolerated_from", np.nan), best.get("tolerated_to", np.nan)
     if np.isfinite(low) and np.isfinite(high):
-        return f"by exact search; {low:.3g} to {high:.3g} N keep within the accuracy of it"
+        return "by exact search; under these loads the amplitude keeps within the accuracy of it"
     return "by exact search"
 
 

@@ -15,7 +15,7 @@ CAPTIONS = {
     "modes/mode_on_the_wheel": "The excited mode on the whole wheel: displacement along its main "
     "direction, with nodal lines in black.",
     "modes/frequencies_by_nodal_diameter": "Natural frequencies over nodal diameter, without "
-    "damper; modes of one family are joined.",
+    "damper; lines join modes of one family in neighbouring nodal diameters.",
     "modes/modes": "Modes in the excited nodal diameter, named after those of the clamped blade. "
     "On the screen: choose a mode, drag to rotate, move the phase through one period.",
     "modes/excited_modes": "Modes in the excited nodal diameter, named after those of the clamped "
@@ -45,15 +45,17 @@ CAPTIONS = {
     "parameter give 1 % more.",
     "response/local_resonances": "Every local maximum of each response: motions found at its "
     "frequency, and by which slow sweep it is reached (isolated: by neither; march in time: kept "
-    "there in time, in place of an unstable balance).",
+    "there in time, in place of an unstable balance). Stability is lost by a fold (the motion "
+    "jumps), period doubling (it repeats after two periods) or a torus (a ripple of another "
+    "frequency grows).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
     "and amplitude over load for each value.",
     "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
     "over the values of both fields; the smallest in bold.",
-    "response/study_band": "Resonance amplitude over the load: median of the samples, the middle "
-    "80 % of them, and all; in grey the blade without damper.",
+    "response/study_band": "Resonance amplitude over the loads that all samples have: median of "
+    "the samples, the middle 80 % of them, and all; in grey the blade without damper.",
     "response/accuracy_of_methods_and_models": "Error of the resonance amplitude over computing "
     "time; the star is the automatic choice, the stairs are what no other setting beats.",
     "response/errors_of_each": "Errors of resonance amplitude and frequency of each setting.",
@@ -116,8 +118,9 @@ CAPTIONS = {
     "contact/own_load": "Load of a seat by the damper's own mass at the operating speed.",
     "contact/wear": "Wear in an hour of steady vibration at each resonance.",
     "response/forced_response": "Amplitude over frequency for each normal load per seat, without "
-    "damper (dashed) and in full stick (dotted). Dots are solved points, large dots the highest "
-    "of each curve.",
+    "damper (black, dashed) and in full stick (grey, dotted). Dots are solved points, large dots "
+    "the highest of each curve that is not unstable; squares are unstable motions, and coloured "
+    "lines are dashed next to them.",
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
     "The star marks the best load, by exact search where that was made, with the band of loads "
     "that keep within the accuracy of it; dashed lines the blade without damper and in full stick.",
@@ -136,7 +139,9 @@ CAPTIONS = {
     "zero flutter unless friction holds them.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "
     "resonance amplitude: of the balance, of contact points, of the body's mesh and of the layer; "
-    "stresses have one of their own by the mesh, where that of the whole motion was computed.",
+    "without damper and in full stick (load ∞) there is no balance, and none was estimated. "
+    "Stresses with an error by the mesh are those of the whole motion; the others are of the "
+    "excited mode alone, which leaves out other modes, higher harmonics and damper forces.",
     "accuracy/loads_with_doubtful_points": "Loads with points that did not converge or needed a "
     "fallback.",
 }

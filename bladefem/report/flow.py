@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..study.pipeline.flutter import wave_words
+from ..study.pipeline.flutter import growing_words, wave_words
 from ..study.pipeline.run_records import SolvedRun
 from ..view.wheel import draw_waves
 from .headlines import Headline
@@ -76,12 +76,15 @@ def flow_headlines(run: SolvedRun) -> list[Headline]:
     if found is None or not found.held:
         return []
     one = min(found.largest, key=lambda held: held.amplitude)
-    grows = "" if np.isnan(one.largest) else f"; grows from {1e6 * one.largest:.4g} µm on"
+    grows = "" if np.isnan(one.largest) else f"; motions above {growing_words(one.largest)} grow"
+    # the load that is best against the excitation need not be among these
+    loads = {held.load for held in found.largest}
+    among = f", of {len(loads)} loads the one that keeps it smallest" if len(loads) > 1 else ""
     return [
         Headline(
             "flutter held by friction",
             f"{1e6 * one.amplitude:.4g} µm",
             "in one harmonic, by the nonlinear mode",
-            f"largest of fed waves: {wave_words(one.wave)}, under {one.load:.4g} N{grows}",
+            f"largest of fed waves: {wave_words(one.wave)}, under {one.load:.4g} N{among}{grows}",
         )
     ]

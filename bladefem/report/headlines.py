@@ -7,6 +7,7 @@ were studied adds its own.
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 import numpy as np
@@ -48,17 +49,30 @@ def headlines(
     best = None if searched is None or summary is None else found_best(searched, summary)
     if best is not None:
         sure |= _of_search(best)
-    return [
-        Headline(
-            what,
-            value,
-            "see what to do next"
-            if value == NOT_DETERMINED
-            else sure.get(_quantity(what), "no estimate"),
-            remark,
-        )
-        for what, value, remark in answer.numbers
-    ]
+    found = []
+    for what, value, remark in answer.numbers:
+        quantity = _quantity(what)
+        known = sure.get(quantity, "no estimate")
+        if value == NOT_DETERMINED:
+            known = "see what to do next"
+        elif quantity == "frequency":
+            value = _as_known(value, known)
+        found.append(Headline(what, value, known, remark))
+    return found
+
+
+def _as_known(value: str, uncertainty: str) -> str:
+    """A number with a unit by as many decimals as its uncertainty has in the same unit, none added.
+
+    >>> _as_known("385.64 Hz", "± 5.7 Hz (flat top)"), _as_known("385.64 Hz", "± 0.0021 Hz")
+    ('385.6 Hz', '385.64 Hz')
+    """
+    number, _, unit = value.partition(" ")
+    known = re.match(rf"± (\d+)(?:\.(\d+))? {unit}\b", uncertainty)
+    if known is None:
+        return value
+    given = len(number.partition(".")[2])
+    return f"{float(number):.{min(given, len(known[2] or ''))}f} {unit}"
 
 
 def _quantity(what: str) -> str:
@@ -72,6 +86,7 @@ def _quantity(what: str) -> str:
         "own mass": "own load",
         "mass that makes": "mass",
         "optimum": "load",
+        "normal load": "load",
     }
     return next((key for word, key in words.items() if word in what), "")
 
@@ -113,7 +128,8 @@ def _of_search(best: pd.Series) -> dict[str, str]:
 def _flatness_text(low: float | None, high: float | None) -> str:
     """Between which loads the amplitude keeps within the accuracy, as far as the search looked."""
     if low is not None and high is not None:
-        return _between_text(low, high, "N")
+        # where the amplitude crosses the accuracy: three digits of a load that nobody sets
+        return _between_text(float(f"{low:.3g}"), float(f"{high:.3g}"), "N")
     if low is not None:
         return f"above {low:.4g} N; how far up was not found"
     if high is not None:

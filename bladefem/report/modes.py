@@ -20,6 +20,7 @@ from ..data import ModeSet
 from ..hbm.parallel import share_work
 from ..io.stage_cache import on_root, write_results
 from ..scene.tables import Scene
+from ..scene.toml import dump_scene
 from ..study.modes.comparison import family_table
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import Survey, Wanted, excited_set, survey_modes
@@ -108,7 +109,7 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
         }
     if result.convergence is not None:
         out |= {
-            "convergence": result.convergence.summary,
+            "convergence": _believed_limits(result.convergence.summary),
             "convergence_points": result.convergence.points,
         }
     if result.answer is not None:
@@ -193,12 +194,19 @@ def _file_writers(
 
     out: dict[str, Callable[[], object]] = {
         "tables": write_all_tables,
-        "modes.nc": lambda: write_results(folder / "modes.nc", {"modes": mode_shapes(run)}),
+        "modes.nc": lambda: write_results(
+            folder / "modes.nc", {"modes": mode_shapes(run)}, dump_scene(run.scene)
+        ),
     }
     if pictures:
         out["modes.vtu"] = lambda: modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
         out["stress.vtu"] = write_stresses
     return out
+
+
+def _believed_limits(summary: pd.DataFrame) -> pd.DataFrame:
+    """The table without limits where an order is not believed: the finest frequency is none."""
+    return summary.assign(limit=summary["limit"].where(summary["reason"] == ""))
 
 
 def _report(

@@ -7,6 +7,7 @@ import pandas as pd
 
 from bladefem.scene.tables import Scene
 
+from ..study.pipeline.response_remarks import TRUSTED_STRESS
 from .best_load import found_best
 from .statements import best_mass
 
@@ -42,6 +43,7 @@ def next_steps(
         best = finite.loc[finite["peak_amplitude"].idxmin()]
     if not cautions:
         steps += _mass_step(best, own, masses, "mass" in finite)
+    steps += _stress_step(best)
     steps += _mesh_step(best)
     if scene.contact.normal == "coupled" and not scene.study.stability:
         steps.append(
@@ -69,6 +71,18 @@ def _mass_step(
     return [
         f"Change the damper's mass from {1e3 * mass:.3g} g to {wanted}, and confirm with "
         f"damper.mass = '{wanted}' and study.own_load = true."
+    ]
+
+
+def _stress_step(best: pd.Series) -> list[str]:
+    """A finer mesh, where that makes the stress that is signed too uncertain."""
+    error = best.get("stress_error", np.nan)
+    if not error > TRUSTED_STRESS:
+        return []
+    return [
+        f"The mesh leaves {100 * error:.2g} % of error in the alternating stress, more than the "
+        f"{100 * TRUSTED_STRESS:g} % to rely on: take a finer mesh (mesh.size, mesh.scale), or a "
+        "fillet where the place is a sharp edge, before the stress or a utilisation is signed."
     ]
 
 

@@ -70,7 +70,10 @@ def response_answer(
         said = [f"No optimum load is named: {reason}." for reason in against]
         unknown = ("optimum normal load per seat", "not determined", against[0])
         return ResponseAnswer([unknown, lowest], [*said, *doubts])
-    numbers = _optimum_numbers(summary, best, remark)
+    # one load alone has no optimum
+    alone = found is None and len(finite) == 1
+    title = "normal load per seat" if alone else "optimum normal load per seat"
+    numbers = _optimum_numbers(summary, best, title, remark)
     return ResponseAnswer(
         [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
         doubts,
@@ -80,11 +83,12 @@ def response_answer(
 def _optimum_numbers(
     summary: pd.DataFrame,
     best: pd.Series,
+    title: str,
     remark: str,
 ) -> list[tuple[str, str, str]]:
-    """The best load and the resonance there: what, value, remark."""
+    """The best load, under a title, and the resonance there: what, value, remark."""
     numbers = [
-        ("optimum normal load per seat", f"{best['load']:.4g} N", remark),
+        (title, f"{best['load']:.4g} N", remark),
         (
             "resonance amplitude there",
             f"{1e6 * best['peak_amplitude']:.4g} µm",

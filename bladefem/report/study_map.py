@@ -69,18 +69,20 @@ def write_scatter(
     of the band and the files.
     """
     best, loads = _tables(tuple(names), variants)
-    band = band_of(loads)
+    shared = shared_loads(loads)
+    band = band_of(shared)
     files = write_tables(best, folder / "study", "best load of each sample")
     files += write_tables(loads, folder / "study_loads", "all loads of each sample")
     files += write_tables(band, folder / "study_band", "resonance amplitude over the samples")
     picture = folder / "study.png"
-    draw_band(loads, picture, title=f"scatter of {', '.join(names)}")
+    draw_band(shared, picture, title=f"scatter of {', '.join(names)}")
     robust = band.loc[band["amplitude_90"].idxmin()]
     numbers = [
         Headline(
             "most robust load",
             f"{robust['load']:.4g} N",
-            f"of {len(band)} loads, {len(variants)} samples{end_words(robust['load'], band)}",
+            f"of {len(band)} loads under which all {len(variants)} samples were studied"
+            f"{end_words(robust['load'], band)}",
             "smallest amplitude that 90 % of the samples stay below",
         ),
         Headline(
@@ -96,6 +98,19 @@ def write_scatter(
         variants[0].scene, best, band, picture, numbers, subject, folder, "response/study_band"
     )
     return band, [*files, picture, *pages]
+
+
+def shared_loads(loads: pd.DataFrame) -> pd.DataFrame:
+    """The rows of loads that every sample has.
+
+    Each run also studies the best load that it found and the one of its damper's own mass. Where
+    these differ from sample to sample a load has one sample, whose amplitude is no band.
+
+    Args:
+        loads: one row a load of each sample: value (the sample as written), load [N].
+    """
+    samples = loads.groupby("load")["value"].transform("nunique")
+    return loads[samples == loads["value"].nunique()]
 
 
 def band_of(loads: pd.DataFrame) -> pd.DataFrame:

@@ -94,9 +94,13 @@ def pattern_headlines(
         error = (
             "error unknown: more harmonics were not solved"
             if np.isnan(r.truncation)
-            else f"± {max(100 * r.truncation, 0.01):.2g} % (harmonics and samples)"
+            else f"± {max(100 * r.truncation, 0.01):.2g} % (harmonics and samples; mesh and "
+            "contact points apart, as of the tuned resonance)"
         )
-        remark = f"blade {r.peak.blade + 1} under {r.load:.4g} N, {r.factor:.3g} times the tuned"
+        remark = (
+            f"blade {r.peak.blade + 1} under {r.load:.4g} N, {r.factor:.3g} times the "
+            f"{1e6 * r.tuned:.4g} µm of the tuned wheel by the same balance of all blades"
+        )
         value = f"{1e6 * r.peak.height:.4g} µm"
         numbers.append(Headline("highest blade of the mistuned wheel", value, error, remark))
         if i < len(used):

@@ -30,7 +30,8 @@ def wave_influence(scene: Scene, count: int) -> ComplexArray:
     given = scene.aerodynamics
     if given.waves and given.influence:
         raise InputError(
-            "aerodynamics.influence: expected either the waves or the influence coefficients"
+            "aerodynamics.influence: given beside aerodynamics.waves, expected either the waves or "
+            "the influence coefficients"
         )
     return _by_diameter(given.waves, count) if given.waves else _by_distance(given, count)
 

@@ -22,6 +22,8 @@ from ..util.arrays import RealArray
 WORST_PLACES = 10
 # of the model's size: a place nearer to a worse one is the same
 SAME_PLACE = 0.01
+# of Haigh's diagram [Pa], as of the two ends of Goodman's line
+LEAST_STRESS, LARGEST_STRESS = 1e5, 1e11
 
 
 @dataclass(frozen=True)
@@ -90,8 +92,13 @@ def haigh_diagram(table: Fatigue) -> HaighDiagram | None:
     if table.endurance is None and table.ultimate is None:
         return None
     if table.endurance is None or table.ultimate is None:
-        missing = "endurance" if table.endurance is None else "ultimate"
-        raise InputError(f"fatigue.{missing}: expected with the other end of Goodman's line")
+        missing, given = "endurance", "ultimate"
+        if table.endurance is not None:
+            missing, given = given, missing
+        raise InputError(
+            f"fatigue.{missing}: expected with fatigue.{given}, the other end of Goodman's line, "
+            "and left out"
+        )
     if table.endurance > table.ultimate:
         raise InputError(
             f"fatigue.endurance = {show(table.endurance, 'Pa')}: expected at most "
@@ -119,6 +126,13 @@ def _read_diagram(texts: tuple[str, ...]) -> HaighDiagram:
             raise InputError(
                 f"fatigue.haigh: {show(following, 'Pa')} after {show(lower, 'Pa')}, expected "
                 "rising mean stresses"
+            )
+    for value in (value for row in rows for value in row):
+        # a number without a unit is in pascals
+        if value != 0 and not LEAST_STRESS <= abs(value) <= LARGEST_STRESS:
+            raise InputError(
+                f"fatigue.haigh: {show(value, 'Pa')}, expected 0, or a size from "
+                f"{show(LEAST_STRESS, 'Pa')} to {show(LARGEST_STRESS, 'Pa')}"
             )
     lowest = min(amplitude for _, amplitude in rows)
     if lowest < 0:

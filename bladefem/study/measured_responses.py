@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from pathlib import Path
 
@@ -191,9 +191,9 @@ def fit_scene(
     check_parameters(names, scene)
     loads = tuple(float(load) for load in np.unique(readings.load))
     run = pipeline.run(vary(scene, study__loads=loads), folder, "reduction", comm, progress)
-    levels, order = _levels(run, readings)
-    chosen = tuple(names) or _parameters_of(scene, levels)
     H = max(run.settings.harmonics, FEWEST_HARMONICS)
+    levels, order = _levels(run, readings, H)
+    chosen = tuple(names) or _parameters_of(scene, levels)
     samples = max(run.settings.samples, FEWEST_SAMPLES, 8 * (H + 1))
     fit = fit_contact(levels, chosen, H, samples, error)
     before, fitted = (np.empty(len(order)) for _ in range(2))
@@ -211,16 +211,20 @@ def _parameters_of(scene: Scene, levels: Sequence[MeasuredLevel]) -> tuple[str, 
     return ("mu", "kt", "load")
 
 
-def _levels(run: ReducedRun, readings: Readings) -> tuple[list[MeasuredLevel], np.ndarray]:
+def _levels(run: ReducedRun, readings: Readings, H: int) -> tuple[list[MeasuredLevel], np.ndarray]:
     """Readings by load and force with their models, and the numbers of the readings in that
     order.
+
+    Args:
+        H: harmonics of the balance: on a wheel each needs the sector in its own nodal diameter.
     """
+    settings = replace(run.settings, harmonics=H)
     scene = run.scene
     patches = list(run.contact.problem.patches)
     models = {}
     for case in load_cases(scene, run.mesh, run.contact):
         family = family_of_case(scene, run.mesh, run.reduced, patches, case)
-        models[case.load] = family_member(family, run.settings).model
+        models[case.load] = family_member(family, settings).model
     levels, order = [], []
     for load, model in models.items():
         for force in np.unique(readings.force[readings.load == load]):

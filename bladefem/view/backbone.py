@@ -138,7 +138,8 @@ def _draw_prediction(ax: Axes, found: Sequence[Backbone], colours: dict[float, A
     order = np.argsort(load)
     predicted = MICRO * np.array([one.predicted[0] for one in found])
     balance = MICRO * np.array([one.balance[0] for one in found])
-    ax.plot(load[order], predicted[order], color="#777777", label="by the mode")
+    # the line of one load alone is a point, which only its mark shows
+    ax.plot(load[order], predicted[order], "-x", color="#777777", label="by the mode")
     for one, height in zip(found, balance, strict=True):
         ax.plot(one.load, height, "o", color=colours[one.load])
     ax.plot([], [], "o", color="#777777", label="forced response")

@@ -344,10 +344,12 @@ def draw_excitations(
         ax.annotate(
             f"{order}",
             (n, f),
-            (9, -4),
+            # below its mark: beside it the next order's mark may lie
+            (0, -7),
             textcoords="offset points",
             fontsize=7,
-            va="center",
+            ha="center",
+            va="top",
             zorder=6,
             bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.5},
         )

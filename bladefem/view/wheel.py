@@ -35,7 +35,7 @@ def draw_blades(
         top.set_title(title)
         top.legend(loc="upper right")
         bottom.bar(blades, 100 * deviation, color=COLOURS[2])
-        bottom.set_ylabel("frequency [%]")
+        bottom.set_ylabel("deviation of\nfrequency [%]")
         bottom.set_xlabel("blade")
 
 

@@ -9,6 +9,7 @@ import pytest
 
 import bladefem
 from bladefem.cli.main import parser
+from bladefem.report.tables import COLUMNS
 
 ROOT = Path(__file__).parents[2]
 PAGES = sorted((ROOT / "docs").glob("*.md"))
@@ -38,6 +39,13 @@ def test_the_chain_uses_public_names(code):
     """It runs for a minute, so here only its names; demos/forced_response.py takes the same way."""
     compile(code, "page", "exec")
     assert set(re.findall(r"bladefem\.(\w+)", code)) <= {*bladefem.__all__, "open"}
+
+
+def test_columns_that_the_page_of_results_explains_are_those_of_tables():
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| [^|]*\|([^|]*)\|", text.partition("## Columns of the tables")[2], re.M)
+    named = {name for row in rows for name in re.findall(r"`(\w+)`", row)}
+    assert {"estimated_error", "body_mesh", "state"} <= named <= {*COLUMNS, "state"}
 
 
 def test_the_readme_is_one_screen():

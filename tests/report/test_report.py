@@ -327,6 +327,16 @@ def test_a_flat_top_leaves_the_frequency_open():
     found = headlines(response_answer(summary, points), summary, points)
     (sure,) = [one.uncertainty for one in found if one.what == "resonance frequency there"]
     assert sure == "± 2 Hz (flat top: the amplitude is within its error there)"
+    (value,) = [one.value for one in found if one.what == "resonance frequency there"]
+    assert value == f"{best['peak_frequency']:.0f} Hz", "no more digits than are known"
+
+
+def test_one_load_alone_is_not_called_the_optimum():
+    summary = synthetic.summary().assign(error=0.01)
+    one = summary[(summary["load"] == 0) | np.isinf(summary["load"]) | (summary["load"] == 200)]
+    found = headlines(response_answer(one), one, None)
+    assert found[0][:3] == ("normal load per seat", "200 N", "only one load studied")
+    assert not any("optimum" in line.what for line in found)
 
 
 @pytest.mark.parametrize(
@@ -407,6 +417,10 @@ def test_next_steps_name_the_mass_to_try():
     there = pd.DataFrame({"load": [lightest["load"]], "amplitude": [1e-6], "frequency": [800.0]})
     told = next_steps(Scene(), [], meshes, own, None, there)[-1]
     assert f"changes the amplitude by {100 * lightest['body_mesh']:.2g} %" in told
+    # a stress that the mesh leaves uncertain is not one to sign
+    for error, said in ((0.26, True), (0.1, False), (np.nan, False)):
+        asked = next_steps(Scene(), [], summary.assign(stress_error=error), own)
+        assert any("26 % of error in the alternating stress" in step for step in asked) == said
     kept = next_steps(Scene(), [], summary, own.assign(load=200.0))
     assert "keep its mass" in kept[0]
     assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"

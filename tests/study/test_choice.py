@@ -196,6 +196,9 @@ def test_settings_tell_how_many_contact_points_there_are():
     assert "all 23 contact points of each seat" in settings.sentence(23)
     assert "64 of 81 contact points on each seat" in settings.sentence(81)
     assert "all 23 contact points" in replace(settings, points=None).sentence(23)
+    unjudged = replace(settings, error=None)
+    assert "not estimated" in unjudged.sentence()
+    assert "(error of each load;" in unjudged.sentence(unjudged="error of each load")
 
 
 def test_exact_events_stay_exact_in_the_models_that_judge():

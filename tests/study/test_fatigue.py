@@ -100,6 +100,7 @@ def test_mean_stress_outside_of_the_diagram_names_the_place():
         ({"haigh": ["5 MPa: 1 MPa", "1 MPa: 1 MPa"]}, "expected rising mean stresses"),
         ({"haigh": ["0 MPa: 1 MPa", "1 MPa: -1 MPa"]}, "expected none below 0"),
         ({"haigh": ["0 MPa: 1 mm", "1 MPa: 1 MPa"]}, "is not a unit of this field"),
+        ({"haigh": ["0 MPa: 300 MPa", "400 MPa: 180"]}, "180 Pa, expected 0, or a size from 100 k"),
     ],
 )
 def test_diagrams_are_refused_before_long_work(changes, said):

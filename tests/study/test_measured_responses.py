@@ -65,6 +65,18 @@ def test_command_finds_the_contact_of_the_readings(measured, tmp_path, capsys):
     assert (tmp_path / "fit.png").is_file() and (tmp_path / "report_fit.html").is_file()
 
 
+def test_scene_of_one_harmonic_is_fitted_with_more(measured, tmp_path):
+    scene, file = measured
+    few = tmp_path / "few.csv"
+    few.write_text("\n".join(file.read_text().splitlines()[:7]) + "\n")
+    arguments = ["fit", str(MISTUNED), "-o", str(tmp_path / "run"), "--measured", str(few)]
+    for override in (*COARSE, "model.harmonics=1"):
+        arguments += ["--set", override]
+    assert main([*arguments, "--parameters", "stiffness", "--set", f"contact.mu={TRUE['mu']}"]) == 0
+    factor = pd.read_csv(tmp_path / "run" / "fit.csv")["over_scene"].iloc[0]
+    assert factor == pytest.approx(TRUE["stiffness"], rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -159,7 +159,22 @@ def test_band_holds_the_samples(tmp_path):
     assert all(file.is_file() for file in files)
     page = (tmp_path / "report_study.html").read_text()
     assert "most robust load" in page
-    assert "of 2 loads, 11 samples, the smallest load studied: a smaller one may do better" in page
+    assert "of 2 loads under which all 11 samples were studied" in page
+    assert "were studied, the smallest load studied: a smaller one may do better" in page
+
+
+def test_best_loads_of_single_samples_are_no_part_of_the_band(tmp_path):
+    """Each run studies the best load that it found: lower than what all samples reach."""
+    rows = [("0.2",), ("0.3",), ("0.4",)]
+    found = variants(["contact.mu"], rows, [(4e-5, 6e-5), (5e-5, 5e-5), (8e-5, 3e-5)])
+    for number, variant in enumerate(found):
+        own = SimpleNamespace(**vars(variant.response.curves[0]))
+        own.load, own.peak_amplitude = 30.0 + number, 1e-5
+        variant.response.curves.append(own)
+    band, _ = write_scatter(["contact.mu"], found, tmp_path)
+    assert list(band["load"]) == [20.0, 40.0]
+    assert list(band["smallest"]) == pytest.approx([4e-5, 3e-5])
+    assert "31" in (tmp_path / "study_loads.csv").read_text(), "they stay in the table of loads"
 
 
 def test_band_leaves_the_limits_out():

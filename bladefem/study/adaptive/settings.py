@@ -65,11 +65,14 @@ class Settings:
             "where it is as accurate"
         )
 
-    def sentence(self, nodes: int | None = None) -> str:
-        """The settings in words; ``nodes`` are those that a seat has, where known."""
-        error = (
-            "not estimated" if self.error is None else f"estimated error {100 * self.error:.2g} %"
-        )
+    def sentence(self, nodes: int | None = None, unjudged: str = "not estimated") -> str:
+        """The settings in words.
+
+        Args:
+            nodes: those that a seat has, where known.
+            unjudged: what is known of their error where it was not estimated with the choice.
+        """
+        error = unjudged if self.error is None else f"estimated error {100 * self.error:.2g} %"
         if self.error == inf:
             error = "error unknown: richer models were not solved"
         kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"

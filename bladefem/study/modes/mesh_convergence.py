@@ -322,5 +322,6 @@ def _order_doubt(order: float, mac: float, meshes: int) -> str:
     if np.isnan(order):
         return "the frequencies do not fall into line"
     if not PLAUSIBLE_ORDERS[0] <= order <= PLAUSIBLE_ORDERS[1]:
-        return f"order {order:.1f} is none that the elements can have"
+        low, high = PLAUSIBLE_ORDERS
+        return f"order {order:.1f} is none of such elements, expected {low:g} to {high:g}"
     return ""

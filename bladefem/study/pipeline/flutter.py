@@ -20,6 +20,7 @@ from ...hbm.model import ReducedModel
 from ...hbm.nonlinear_modes import NonlinearMode, modal_damping, nonlinear_mode
 from ...reduction.assemble import folded_diameter, pair_model
 from ...reduction.truncate import truncate_modes
+from ...scene.units import show
 from ...util.arrays import IntegerArray, RealArray
 from ...wheel.aerodynamics import limit_cycles, with_flow
 from ..adaptive.settings import Settings
@@ -332,7 +333,9 @@ def flutter_sentences(found: FlutterResult) -> list[str]:
     ]
     first = [one for one in found.held if one.wave == found.worst]
     for one, most in zip(first, found.largest, strict=True):
-        beyond = "" if np.isnan(one.largest) else f", and grows from {1e6 * one.largest:.4g} um on"
+        beyond = ""
+        if not np.isnan(one.largest):
+            beyond = f"; motions above {growing_words(one.largest)} grow"
         others = "" if most.wave == one.wave else f"; {_cycle(most)} in {wave_words(most.wave)}"
         sentences.append(
             f"flutter under {one.load:g} N: friction holds it in a limit cycle of "
@@ -344,6 +347,15 @@ def flutter_sentences(found: FlutterResult) -> list[str]:
             "them stays; the largest is that to judge by"
         )
     return sentences
+
+
+def growing_words(amplitude: float) -> str:
+    """The amplitude [m] from which flutter grows, far above limit cycles: three digits.
+
+    >>> growing_words(0.0187234)
+    '18.7 mm'
+    """
+    return show(float(f"{amplitude:.3g}"), "m")
 
 
 def wave_words(wave: int) -> str:

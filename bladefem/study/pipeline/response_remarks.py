@@ -60,7 +60,13 @@ def response_remarks(
         nodes: contact points of a seat.
         judged: what verdicts looked at.
     """
-    remarks: list[str] = [method(settings.sentence(nodes)), method(settings.method)]
+    # settings that a scene gives are judged by the curves alone
+    unjudged = (
+        "error estimated at each resonance"
+        if any(c.error is not None for c in curves)
+        else "not estimated"
+    )
+    remarks: list[str] = [method(settings.sentence(nodes, unjudged)), method(settings.method)]
     if scene.model.static == "uncoupled":
         remarks.append(
             method(
