@@ -1,13 +1,20 @@
 """What importing and compiling must not leave behind, and a dead build that has to be named."""
 
+import ctypes
+import gc
 import logging
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from structured import box
 
 from bladefem.errors import NotSolvedError
 from bladefem.fem import compat
+from bladefem.fem.body import assemble
+from bladefem.scene.tables import Material
 
 CHILD = """
 import sys
@@ -21,8 +28,6 @@ h5py.File("x", "w", driver="core", backing_store=False)["a"] = [1.0]
 
 def test_import_leaves_the_loader_alone():
     """dolfinx 0.5 sets RTLD_GLOBAL for good, after which h5py finds the wrong HDF5."""
-    import os
-
     clean = {
         k: v
         for k, v in os.environ.items()
@@ -68,3 +73,22 @@ def test_compiling_is_silent_and_leaves_logging_alone(caplog):
     assert compat._wait_for_build(build) == 1
     assert (root.level, list(root.handlers)) == before
     assert not caplog.records
+
+
+def resident_memory():
+    """Of this process [bytes], with what it could give back given back."""
+    gc.collect()
+    ctypes.CDLL("libc.so.6").malloc_trim(0)
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="memory is read from /proc")
+def test_matrices_that_are_dropped_are_freed():
+    """Each of the four left its matrices behind, 12 bytes an entry."""
+    mesh = box((12, 12, 12), (1.0, 1.0, 1.0))
+    size = 12 * assemble(mesh, "blade", Material(), compat.MPI.COMM_SELF).K.getInfo()["nz_used"]
+    before = resident_memory()
+    for _ in range(4):
+        assemble(mesh, "blade", Material(), compat.MPI.COMM_SELF)
+    assert resident_memory() - before < 1.5 * size
