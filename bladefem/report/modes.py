@@ -109,7 +109,7 @@ def tables_of(result: Survey) -> dict[str, pd.DataFrame]:
         }
     if result.convergence is not None:
         out |= {
-            "convergence": _believed_limits(result.convergence.summary),
+            "convergence": result.convergence.summary,
             "convergence_points": result.convergence.points,
         }
     if result.answer is not None:
@@ -202,11 +202,6 @@ def _file_writers(
         out["modes.vtu"] = lambda: modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")
         out["stress.vtu"] = write_stresses
     return out
-
-
-def _believed_limits(summary: pd.DataFrame) -> pd.DataFrame:
-    """The table without limits where an order is not believed: the finest frequency is none."""
-    return summary.assign(limit=summary["limit"].where(summary["reason"] == ""))
 
 
 def _report(

@@ -141,6 +141,16 @@ class Amplification:
         whole = self.whole if self.checked.shape[1] else self.factor
         return whole / self.held_factor - 1
 
+    @property
+    def free_effect(self) -> np.ndarray:
+        """(L,) largest relative change of an amplitude by free means, of the tuned wheel and of
+        those solved in full; zero where means are held.
+        """
+        tuned = (self.tuned / self.tuned_held)[:, None]
+        others = tuned * np.where(self.free, 1 + self.free_change, 1.0)
+        changes = abs(np.hstack([tuned, others]) - 1).max(axis=1)
+        return np.where(np.isnan(self.tuned_held), 0.0, changes)
+
     def quantile(self, load: int, share: float) -> Quantile:
         """Of the amplification under the load with a number: the interval is that of the sample,
         widened by what checked wheels are off the calibrated law.

@@ -1,11 +1,10 @@
 """The estimate of memory and its refusal."""
 
 import ctypes
-import resource
-from pathlib import Path
 
 import numpy as np
 import pytest
+from resident import needs_readings, resident_memory
 from structured import box, sector
 
 from bladefem.errors import InputError
@@ -136,35 +135,30 @@ def test_a_run_says_that_factors_are_on_disk(monkeypatch, tmp_path):
     assert str(tmp_path) in bodies.storage_remarks[0]
 
 
-def resident() -> int:
-    """Memory of this process in the machine [bytes]."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize()
-
-
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no /proc")
+@needs_readings
 def test_large_blocks_go_back_to_the_system():
     """Those below another one that is still there, too, which MPI's settings keep."""
     library = ctypes.CDLL(None)
     library.malloc.restype = ctypes.c_void_p
     library.malloc.argtypes = [ctypes.c_size_t]
     library.free.argtypes = [ctypes.c_void_p]
-    before = resident()
+    before = resident_memory()
     large = library.malloc(4 * LARGE_BLOCK)
     ctypes.memset(large, 1, 4 * LARGE_BLOCK)
     above = library.malloc(1000)
-    assert resident() - before > 3.9 * LARGE_BLOCK
+    assert resident_memory() - before > 3.9 * LARGE_BLOCK
     library.free(large)
-    assert resident() - before < LARGE_BLOCK
+    assert resident_memory() - before < LARGE_BLOCK
     library.free(above)
 
 
-@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="no /proc")
+@needs_readings
 def test_values_that_nobody_reads_give_their_memory_back():
     """Whole pages only: what stands before and behind them stays."""
     values = np.ones(4 * LARGE_BLOCK // 8)
     inside = values[7:-7]
-    before = resident()
+    before = resident_memory()
     drop_values(inside)
-    assert before - resident() > 3.9 * LARGE_BLOCK
+    assert before - resident_memory() > 3.9 * LARGE_BLOCK
     assert (values[:7] == 1).all() and (values[-7:] == 1).all()
     drop_values(np.ones(3))

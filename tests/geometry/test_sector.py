@@ -25,7 +25,8 @@ PARTS = {
     "disc": Disc(),
     "wedge": Wedge(),
 }
-# shapes, not how volumes are filled: gmsh's Delaunay takes a fifth of the time of HXT here, for cells as good
+# shapes, not how volumes are filled: gmsh's Delaunay takes a fifth of the time of HXT here, for
+# cells as good
 COARSE = MeshSize(size=7e-3, algorithm="delaunay")
 # where cells are what is tested
 BY_DEFAULT = MeshSize(size=7e-3)

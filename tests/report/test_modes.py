@@ -14,7 +14,7 @@ from bladefem.cli.main import main
 from bladefem.data import ModeSet
 from bladefem.fem.compat import MPI
 from bladefem.io.stage_cache import read_results
-from bladefem.report.modes import _believed_limits, mac_table, report_survey
+from bladefem.report.modes import mac_table, report_survey
 from bladefem.study.modes.survey import Wanted
 
 ONE_PIXEL = base64.b64decode(
@@ -85,11 +85,6 @@ def test_arrays_keep_the_scene_they_are_of(folder):
 
     kept = xr.open_dataset(folder / "modes.nc", engine="h5netcdf").attrs["scene"]
     assert kept.splitlines() == (folder / "scene.toml").read_text().splitlines()
-
-
-def test_tables_have_no_limit_where_the_order_is_not_believed():
-    summary = pd.DataFrame({"limit": [99.0, 100.0], "reason": ["", "order 6.1 is none"]})
-    assert _believed_limits(summary)["limit"].fillna(-1.0).to_list() == [99.0, -1.0]
 
 
 def test_the_page_lists_inputs_of_the_modes_alone(folder):

@@ -62,6 +62,7 @@ def test_wheels_of_the_statistics_walk_as_one_wheel_does():
     assert found.tuned_held[0] == pytest.approx(held_heights[0], rel=1e-6)
     np.testing.assert_allclose(found.held_factor[0], held_heights[1:] / held_heights[0], rtol=1e-6)
     assert abs(found.tuned[0] / found.tuned_held[0] - 1) > 0.005
+    assert found.free_effect[0] == pytest.approx(abs(heights / held_heights - 1).max(), rel=1e-6)
     assert any("free mean displacements" in text for text in scatter_sentences(found))
 
 

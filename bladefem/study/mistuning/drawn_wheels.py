@@ -141,7 +141,7 @@ def drawn_statistics(
         patterns = {drawn.curve.load: drawn.patterns}
         search = _search(drawn, balance, tuned)
         found = scatter_statistics(patterns, lambda _, pattern: search(pattern), comm, progress)
-    error = with_free_change(truncation, _free_change(found))
+    error = with_free_change(truncation, found.free_effect[0])
     found = replace(found, harmonics=np.array([balance[0]]), truncation=np.array([error]))
     return with_comparison(found, compared)
 
@@ -159,17 +159,6 @@ def _search(
     """What looks for a pattern's highest blade, as the tuned wheel's was found."""
     free = tuned.free is not None
     return lambda pattern: tuned if pattern is TUNED_PATTERN else drawn.peak(pattern, balance, free)
-
-
-def _free_change(found: Amplification) -> float:
-    """Largest relative change of an amplitude by free means, of the tuned wheel and of those solved
-    in full; zero where means are held.
-    """
-    tuned = found.tuned[0] / found.tuned_held[0]
-    if not np.isfinite(tuned):
-        return 0.0
-    changes = tuned * (1 + found.free_change[0, found.free[0]])
-    return float(abs(np.append(changes, tuned) - 1).max())
 
 
 def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:

@@ -245,8 +245,9 @@ def _judged(
 def with_free_change(truncation: float, change: float) -> float:
     """Estimated error of an amplitude with free means by harmonics and samples.
 
-    What these change with free means is between nothing and the whole of what free means change:
-    0.9 % on the shipped wheel under 77 N, where held means change by 0.1 % and free ones add 1.8 %.
+    The whole of what free means change is taken for what more harmonics may change of it. On the
+    shipped wheel under 77 N three harmonics leave 0.9 %, where held means leave 0.1 % and free ones
+    change 1.8 %; in 36 cases of twelve lumped blades the estimate is 0.88 of the error or more.
 
     Args:
         truncation: relative error with held means.

@@ -144,7 +144,8 @@ def _halved_mesh_convergence(
     summary = found.summary.merge(
         given[[*keys, "frequency"]].rename(columns={"frequency": "given"}), on=keys
     )
-    own = abs(summary["given"] / summary["limit"] - 1)
+    # where no limit is known, from the finest mesh
+    own = abs(summary["given"] / summary["limit"].fillna(summary["frequency"]) - 1)
     summary["given_error"] = np.where(
         summary["reason"] == "", own + summary["scatter"], UNTRUSTED_FACTOR * own
     )
@@ -303,7 +304,7 @@ def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
             {
                 **{name: int(line[name].iloc[0]) for name in keys},
                 "frequency": f[-1],
-                "limit": f[-1] if reason else limit,
+                "limit": np.nan if reason else limit,
                 "order": order,
                 "error": error,
                 "scatter": scatter / f[-1],

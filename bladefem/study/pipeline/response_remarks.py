@@ -60,19 +60,7 @@ def response_remarks(
         nodes: contact points of a seat.
         judged: what verdicts looked at.
     """
-    # settings that a scene gives are judged by the curves alone
-    unjudged = (
-        "error estimated at each resonance"
-        if any(c.error is not None for c in curves)
-        else "not estimated"
-    )
-    remarks: list[str] = [method(settings.sentence(nodes, unjudged)), method(settings.method)]
-    if scene.model.static == "uncoupled":
-        remarks.append(
-            method(
-                "mean displacements held as the static contact solution left them (model.static)"
-            )
-        )
+    remarks: list[str] = _of_settings(scene, settings, curves, nodes)
     if scene.study.stability:
         verdicts = [(c.stability, c.multiplier) for c in curves]
         remarks.append(method(stability_sentence(verdicts, judged)))
@@ -110,6 +98,24 @@ def response_remarks(
     remarks.extend(map(warning, filter(None, [stiff_layer_sentence(curves)])))
     remarks.extend(map(warning, resonance_warnings(curves, scene.accuracy)))
     remarks.extend(map(warning, filter(None, [beyond_tolerance(curves)])))
+    return remarks
+
+
+def _of_settings(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
+    """The model and the method, and how sure the former is."""
+    # settings that a scene gives are judged by the curves alone
+    unjudged = (
+        "error estimated at each resonance"
+        if any(c.error is not None for c in curves)
+        else "not estimated"
+    )
+    remarks: list[str] = [method(settings.sentence(nodes, unjudged)), method(settings.method)]
+    if scene.model.static == "uncoupled":
+        remarks.append(
+            method(
+                "mean displacements held as the static contact solution left them (model.static)"
+            )
+        )
     return remarks
 
 
