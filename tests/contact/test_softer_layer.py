@@ -1,6 +1,7 @@
 """A softer layer in place of a stiff one where contacts lift off, and what that changes."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from bladefem.hbm.peak import find_peak
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
+from bladefem.study.adaptive import stiff_layer
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import Settings
@@ -111,6 +113,29 @@ def test_the_change_is_that_of_the_resonances():
     shift = true.omega / soft.omega - 1
     assert shift > 5e-4
     assert found.frequency == pytest.approx(shift, abs=0.1 * shift)
+
+
+@pytest.mark.parametrize(
+    ("closed", "climbed"), [(0, [3, 7, 15, 15]), (1, [3, 7, 7])], ids=["bounces", "keeps closed"]
+)
+def test_harmonics_of_a_bouncing_damper_are_not_spent_where_contacts_keep_closed(
+    stiff, closed, climbed, monkeypatch
+):
+    family = family_of(stiff, [len(stiff.elements.kt)])
+    settings = replace(SETTINGS, softened=True, chosen=("harmonics",))
+    lifting = solve(softened_layer(stiff), OMEGA, 3, 64)
+    top = replace(lifting, states={**lifting.states, "lift": len(lifting.w) - closed})
+    asked = []
+
+    def found_at_once(model, settings, near, accuracy):
+        asked.append(settings.harmonics)
+        return SimpleNamespace(solution=near)
+
+    monkeypatch.setattr(stiff_layer, "_peak_on_the_way", found_at_once)
+    found, _ = stiff_layer.with_harmonics_of_stiff_layer(family, settings, top, 0.1)
+    assert asked == climbed and found.harmonics == climbed[-1]
+    given = replace(settings, chosen=())
+    assert stiff_layer.with_harmonics_of_stiff_layer(family, given, top, 0.1) == (given, top)
 
 
 def test_a_curve_takes_the_softer_layer_by_itself(stiff):
