@@ -27,17 +27,12 @@ Layer = TypeVar("Layer", Contact, Seat)
 RIGID_STIFFNESS = 1e22
 
 
-def mindlin_ratio(nu: float) -> float:
-    """k_t / k_n of two bodies of one material: 2 (1 - nu) / (2 - nu) (Mindlin 1949)."""
-    return 2 * (1 - nu) / (2 - nu)
-
-
 def pair_ratio(a: Material, b: Material) -> float:
     """k_t / k_n of two bodies of different materials, from 1 / k_n ~ 1 / E* and 1 / k_t ~ 1 / (4
     G*).
 
     Source: Johnson, Contact Mechanics (1985), Eq. 4.24 and 7.44: k_n = 2 a E*, k_t = 8 a G*,
-    1 / G* = sum (2 - nu) / G; equals ``mindlin_ratio`` for equal bodies.
+    1 / G* = sum (2 - nu) / G; 2 (1 - nu) / (2 - nu) for equal bodies (Mindlin 1949).
     """
     normal = sum((1 - m.nu**2) / m.E for m in (a, b))
     tangential = sum((2 - m.nu) * 2 * (1 + m.nu) / m.E for m in (a, b)) / 4

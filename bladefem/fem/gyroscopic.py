@@ -47,10 +47,6 @@ class Waves:
     forward: np.ndarray
     # (m,) [Hz], ascending
     backward: np.ndarray
-    # (modes, m) each wave as a sum of the modes that were coupled
-    forward_shapes: np.ndarray
-    # (modes, m)
-    backward_shapes: np.ndarray
 
 
 def coupling(
@@ -127,12 +123,8 @@ def waves(
     if g.shape != (m, m):
         raise InputError(f"Coriolis coupling of shape {g.shape}, expected ({m}, {m}) for {m} modes")
     root = np.diag(2 * np.pi * modes.frequencies)
-    w, Z = np.linalg.eigh(np.block([[np.zeros((m, m)), root], [root, 1j * speed * g]]))
-    order = np.argsort(np.abs(w[:m])), m + np.argsort(w[m:])
-    turned = [(np.abs(w[part]) / (2 * np.pi), _normalise_columns(Z[m:, part])) for part in order]
-    (forward, ahead), (backward, behind) = turned if sense > 0 else turned[::-1]
-    return Waves(modes.nodal_diameter, speed, forward, backward, ahead, behind)
-
-
-def _normalise_columns(Z: np.ndarray) -> np.ndarray:
-    return Z / np.maximum(np.linalg.norm(Z, axis=0), 1e-300)
+    # ascending: the first half is negative
+    w = np.linalg.eigvalsh(np.block([[np.zeros((m, m)), root], [root, 1j * speed * g]]))
+    turned = [np.sort(abs(part)) / (2 * np.pi) for part in (w[:m], w[m:])]
+    forward, backward = turned if sense > 0 else turned[::-1]
+    return Waves(modes.nodal_diameter, speed, forward, backward)

@@ -65,20 +65,6 @@ def class_angle(d: int, engine_order: int, sectors: int) -> float:
     return 2 * np.pi * d * apart / sectors
 
 
-def class_multiplier(
-    model: ReducedModel,
-    solution: Solution,
-    bodies: ReducedModel,
-    angle: float,
-    instants: int = INSTANTS_PER_PERIOD,
-    most: float = MAX_OPERATIONS,
-) -> float:
-    """Largest modulus of the Floquet multipliers of a class of disturbances; arguments and errors
-    are those of `class_growth`.
-    """
-    return class_growth(model, solution, bodies, angle, instants, most).multiplier
-
-
 def class_growth(
     model: ReducedModel,
     solution: Solution,

@@ -18,8 +18,6 @@ from ..errors import InputError
 from ..util.arrays import RealArray
 from .fit_intervals import Knowledge, what_is_known
 
-# friction coefficient [1], tangential and normal stiffness [N/m], normal load [N]
-LOOP_PARAMETERS = ("mu", "kt", "kn", "load")
 # samples of a loop that count as independent readings: neighbours share their errors
 INDEPENDENT_SAMPLES = 20
 # friction coefficients from which the fit starts, where no normal load tells it

@@ -6,12 +6,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms import jenkins_coefficients
 from friction_cases import decay, event_driven, numeric_jacobian, plain_jenkins, random_case, single
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
 from bladefem.friction.aft import evaluate
-from bladefem.friction.closed_form import jenkins, jenkins_coefficients
+from bladefem.friction.closed_form import jenkins
 from bladefem.friction.kernel_1d_exact import evaluate_exact, transitions
 from bladefem.friction.states import GROSS_SLIP, PARTIAL_SLIP, SEPARATED, STICK
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms import iwan_force, iwan_limits
 
 from bladefem.data import Elements
 from bladefem.friction.aft import evaluate
-from bladefem.friction.closed_form import iwan_force, iwan_limits
 from bladefem.friction.kernel_1d_exact import evaluate_exact
 from verification.paper.printed_laws import corrected
 

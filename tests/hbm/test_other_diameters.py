@@ -7,7 +7,7 @@ import pytest
 
 from bladefem.data import Elements
 from bladefem.hbm.model import ReducedModel
-from bladefem.hbm.other_diameters import class_angle, class_multiplier
+from bladefem.hbm.other_diameters import class_angle, class_growth
 from bladefem.hbm.sector_modes import blades_of_wave
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, stability_verdict
@@ -81,7 +81,7 @@ def test_disturbances_of_a_lumped_ring(damping, force):
     assert blades_of_wave(model) == 3
     point = solve(model, 1.3, 9, 1024)
     angle = class_angle(1, ENGINE_ORDER, SECTORS)
-    found = class_multiplier(model, point, ring_model(1, damping), angle)
+    found = class_growth(model, point, ring_model(1, damping), angle).multiplier
     assert found == pytest.approx(growth_of_odd_diameters(point, damping, force), rel=0.01)
     assert stability_verdict(model, point).verdict == STABLE
     assert (found > 1.1) == (force == 2.0)
@@ -91,11 +91,11 @@ def test_the_class_of_the_wave_itself_is_the_verdict():
     model = ring_model()
     point = solve(model, 1.3, 9, 1024)
     own = stability_verdict(model, point).multiplier
-    assert class_multiplier(model, point, model, 0.0) == pytest.approx(own, rel=1e-8)
+    assert class_growth(model, point, model, 0.0).multiplier == pytest.approx(own, rel=1e-8)
     # the same wave seen from the next blade of the ring, and the other way round
     same = replace(model, sides=ring_model(ENGINE_ORDER).sides)
     angle = class_angle(ENGINE_ORDER, ENGINE_ORDER, SECTORS)
-    assert class_multiplier(model, point, same, angle) == pytest.approx(own, rel=1e-8)
+    assert class_growth(model, point, same, angle).multiplier == pytest.approx(own, rel=1e-8)
     classes = [(ring_model(d), class_angle(d, ENGINE_ORDER, SECTORS)) for d in (1, -1)]
-    pair = [class_multiplier(model, point, *of_class) for of_class in classes]
+    pair = [class_growth(model, point, *of_class).multiplier for of_class in classes]
     assert pair[0] == pytest.approx(pair[1], rel=1e-8)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bladefem.contact.seating import solve_seating as seat
-from bladefem.hbm.other_diameters import class_angle, class_multiplier
+from bladefem.hbm.other_diameters import class_angle, class_growth
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import stability_verdict
 from bladefem.scene.toml import load_scene
@@ -73,7 +73,7 @@ def test_the_classes_of_a_wave(wheel):
     assert point.converged
     own = stability_verdict(model, point).multiplier
     same = family.disturbed(settings, 9)
-    assert class_multiplier(model, point, same, class_angle(9, 9, 36)) == pytest.approx(
+    assert class_growth(model, point, same, class_angle(9, 9, 36)).multiplier == pytest.approx(
         own, rel=1e-6
     )
     found = class_verdicts(family, settings, point, 9, 36)

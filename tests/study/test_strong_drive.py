@@ -22,7 +22,7 @@ from bladefem.study.pipeline.stability_remarks import undriven_sentence
 from bladefem.study.pipeline.strong_drive import (
     STRONG_DRIVE,
     StrongDrives,
-    band_after_strong_drive,
+    after_strong_drive,
     strong_drives,
 )
 
@@ -50,8 +50,10 @@ def test_the_high_motion_beside_a_low_one_is_found(folding, motions):
     assert low.converged
     stays = band_by_steps(model, low)
     assert stays.highest == pytest.approx(size(low), rel=1e-2)
-    found = band_after_strong_drive(model, low, 1.02 * size(low))
-    assert found is not None and found.drive == STRONG_DRIVE
+    kept = after_strong_drive(model, low, 1.02 * size(low))
+    assert kept is not None
+    found = kept.band
+    assert found.drive == STRONG_DRIVE
     # the highest of all motions near that frequency
     near = sorted(motions, key=lambda p: abs(p.omega - omega))[:6]
     highest = max(near, key=size)
@@ -66,7 +68,7 @@ def test_where_one_motion_is_all_there_is_none_is_told():
     """A contact so far open that it never closes."""
     model = rebounding(1.0, 1e3, 0.04)
     point = solve(model, 0.985, 1, 64)
-    assert band_after_strong_drive(model, point, 1.02 * size(point)) is None
+    assert after_strong_drive(model, point, 1.02 * size(point)) is None
 
 
 def lifting_curve(folding):

@@ -80,7 +80,7 @@ class StrongDrives:
 
 
 @dataclass(frozen=True)
-class _Kept:
+class KeptMotion:
     """What a march came to."""
 
     band: KeptBand
@@ -119,11 +119,11 @@ def strong_drives(
     affordable = min(MOST_FREQUENCIES, int(MOST_OPERATIONS / (FEWEST_LOOKS * of_look)))
     if affordable == 0:
         return StrongDrives(too_long=True)
-    best: tuple[Solution, _Kept] | None = None
+    best: tuple[Solution, KeptMotion] | None = None
     for point in _evenly([curve.points[i] for i in high], affordable):
         known = (1 + NO_RISE) * (given if best is None else best[1].band.highest)
         start = carried_motion(marches.models, curve.settings, point, settings)
-        kept = _after_strong_drive(model, start, known)
+        kept = after_strong_drive(model, start, known)
         if kept is not None:
             best = point, kept
     if best is None:
@@ -142,11 +142,11 @@ def _evenly(points: list[Solution], count: int) -> list[Solution]:
     return sorted((points[i] for i in chosen), key=lambda point: point.omega)
 
 
-def band_after_strong_drive(
+def after_strong_drive(
     model: ReducedModel,
     point: Solution,
     known: float,
-) -> KeptBand | None:
+) -> KeptMotion | None:
     """What the blade keeps to at the frequency of a motion after it was driven hard; None where
     that is no higher than what is known, or where the forces of a step are not found. The
     last COUNTED_LOOKS count.
@@ -157,12 +157,6 @@ def band_after_strong_drive(
     Raises:
         InputError: the model cannot be marched.
     """
-    kept = _after_strong_drive(model, point, known)
-    return None if kept is None else kept.band
-
-
-def _after_strong_drive(model: ReducedModel, point: Solution, known: float) -> _Kept | None:
-    """What ``band_after_strong_drive`` gives."""
     start = driven_anew(model, state_of_solution(model, point), Drive(point.omega, STRONG_DRIVE))
     march = march_ring(model, start, DRIVEN_PERIODS, INSTANTS_PER_PERIOD)
     return _kept_from(model, point, march.end, known) if march.settled else None
@@ -170,7 +164,7 @@ def _after_strong_drive(model: ReducedModel, point: Solution, known: float) -> _
 
 def _kept_from(
     model: ReducedModel, point: Solution, state: RingState, known: float
-) -> _Kept | None:
+) -> KeptMotion | None:
     """What the blade keeps to at the frequency of a point from a state on, under its own drive;
     None where that is no higher than what is known.
     """
@@ -190,16 +184,16 @@ def _kept_from(
     lowest, highest = zip(*ends[-COUNTED_LOOKS:], strict=True)
     periods = MOST_LOOKS * PERIODS_OF_LOOK
     band = KeptBand(point.frequency, min(lowest), max(highest), periods, drive=STRONG_DRIVE)
-    return _Kept(band, float(np.mean(means[-COUNTED_LOOKS:])), state)
+    return KeptMotion(band, float(np.mean(means[-COUNTED_LOOKS:])), state)
 
 
 def _uphill(
     model: ReducedModel,
     points: Sequence[Solution],
     point: Solution,
-    kept: _Kept,
+    kept: KeptMotion,
     given: float,
-) -> tuple[Solution, _Kept]:
+) -> tuple[Solution, KeptMotion]:
     """The highest motion on the way from frequency to frequency, the motion taken along: where the
     damper bounces it may be kept from points that a strong drive leads elsewhere from.
 
