@@ -218,17 +218,24 @@ def influences(
     ]
     found = share_work(lambda p: study.influence(p, base, sides), parameters, comm)
     found.sort(key=lambda one: -one.span)
-    ends = [(one, i) for one in found[:MAX_CHECKED_PARAMETERS] for i in (0, 1)]
+    checked = _solved_again(study, found[:MAX_CHECKED_PARAMETERS], comm)
+    return checked + found[MAX_CHECKED_PARAMETERS:]
+
+
+def _solved_again(
+    study: _Study, found: Sequence[Influence], comm: Communicator | None
+) -> list[Influence]:
+    """Influences whose predictions at both ends of the range are compared with another search."""
+    ends = [(one, i) for one in found for i in (0, 1)]
     again = share_work(lambda end: study.solved_again(*end), ends, comm)
-    checked = [
+    return [
         replace(
             one,
             solved=np.array([row for row, _ in again[2 * k : 2 * k + 2]]),
             reason="; ".join(reason for _, reason in again[2 * k : 2 * k + 2] if reason),
         )
-        for k, one in enumerate(found[:MAX_CHECKED_PARAMETERS])
+        for k, one in enumerate(found)
     ]
-    return checked + found[MAX_CHECKED_PARAMETERS:]
 
 
 def _coarse(settings: Settings) -> Settings:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi
 
 import numpy as np
 
@@ -65,9 +64,8 @@ class PatternResponse:
     deviation: np.ndarray
     # of the scene's engine order, among those of the common period of all orders
     harmonic: int
-    # peak of the tuned wheel [m] and where [Hz]
+    # peak of the tuned wheel [m]
     tuned: float
-    tuned_frequency: float
     # the mistuned wheel with friction
     peak: WheelPeak
     # its solution at the peak, in harmonics of the common period
@@ -223,7 +221,6 @@ def pattern_response(
         deviation,
         harmonic,
         tuned.height,
-        tuned.omega / (2 * pi),
         found.peak,
         found.solution,
         free_factor(wheel, pattern, grid, harmonic),
