@@ -160,8 +160,8 @@ for load in (200.0,) if coarse else (20.0, 200.0):
 
 # %%
 for kt, scene in list(scenes.items())[: 1 if coarse else 2]:
-    for load in (20.0,) if coarse else (4.0, 20.0, 100.0):
-        span = (850.0, 1300.0)
+    for load in (4.0,) if coarse else (4.0, 20.0, 100.0):
+        span = band if coarse else (850.0, 1300.0)
         plain, with_it = (
             peak(m, span, 3, 128)
             for m in (model_of(load, kt=kt), whole_model(scene, rows[kt], load))

@@ -7,6 +7,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +20,15 @@ def pytest_configure(config: pytest.Config) -> None:
     """Only rank 0 writes the usual report."""
     if RANK > 0:
         config.pluginmanager.unregister(config.pluginmanager.getplugin("terminalreporter"))
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """On several ranks files without a collective test are not even imported: most of the time
+    before the first test.
+    """
+    if SIZE == 1 or collection_path.suffix != ".py":
+        return None
+    return "mark.mpi" not in collection_path.read_text("utf-8") or None
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

@@ -21,6 +21,7 @@ from ..friction.fourier import synthesis, to_complex, to_real
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import no_inverses
 from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_envelope, scatter
+from .linear.array_copy import copy_vector
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
@@ -422,20 +423,24 @@ def _march(y, f, w, steps, readings, contacts, kept, load, free, probe, motion, 
     change = np.zeros((2, *f.shape))
     pushed = extra.reshape(w.size)
     for k in range(periods * S):
-        motion[k // S, k % S] = steady[k % S] + np.dot(reading, y[:M]) - np.dot(flexible, pushed)
+        seen, given = np.dot(reading, y[:M]), np.dot(flexible, pushed)
+        for b in range(len(seen)):
+            motion[k // S, k % S, b] = steady[k % S, b] + seen[b] - given[b]
         j = (k + 1) % S
         moved[:] = 0.0
         _add_product(E, y, moved)
         _add_product(before, modal, moved)
         c = displacements(readings, moved[:M])
-        c += free[j]
+        for b in range(len(c)):
+            for place in range(c.shape[1]):
+                c[b, place] += free[j, b, place]
         if not contact_forces(c, contacts, kept, w, f, change, extra, load[k % S], load[j], work):
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False
         modal = modal_forces(readings, extra)
         _add_product(after, modal, moved)
-        y[:] = moved
+        copy_vector(moved, y)
     return True
 
 

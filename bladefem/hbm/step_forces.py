@@ -18,6 +18,7 @@ from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, node_steps
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import by_blades, note_step
+from .linear.array_copy import copy_vector
 from .ring_contacts import NODE_OPERATIONS, displace, of_blade, subtract_moved, violation
 
 # most sweeps over the nodes in a step
@@ -63,10 +64,10 @@ def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
         note_step(kept, found)
     if not found:
         # steps that do not settle lead away
-        f[:] = ahead
+        copy_vector(ahead.reshape(f.size), f.reshape(f.size))
         found = by_blades(c, contacts, kept, w, f, before, load1, limit, work)
     if not found:
-        f[:] = before[0]
+        copy_vector(before[0].reshape(f.size), f.reshape(f.size))
         found = _together(c, contacts, w, f, before, load1, limit, work)
     for b in range(len(w)):
         _less_preload(f[b].reshape(w.shape[1]), contacts.preload, extra[b])
@@ -159,7 +160,7 @@ def _together(c, contacts, w, f, before, load1, limit, work):
     B = np.zeros((blades, width, 3, 3))
     gap = np.empty(size)
     A = np.empty((size, size))
-    start = np.empty_like(f)
+    start, target = np.empty(size), f.reshape(size)
     total = _violations(c, contacts, F, w, f, before, load1, B, gap)
     for _ in range(NEWTON_STEPS):
         worst = 0.0
@@ -167,21 +168,25 @@ def _together(c, contacts, w, f, before, load1, limit, work):
             worst = max(worst, abs(gap[row]))
         if worst <= limit:
             return True
-        start[:] = f
+        copy_vector(f.reshape(size), start)
         for row in range(size):
             b, a, i = row // (3 * width), row // width % 3, row % width
-            A[row] = 0.0
+            for column in range(size):
+                A[row, column] = 0.0
             for k in range(3):
-                A[row] += B[b, i, a, k] * F[(3 * b + k) * width + i]
+                gain, moved = B[b, i, a, k], F[(3 * b + k) * width + i]
+                for column in range(size):
+                    A[row, column] += gain * moved[column]
             A[row, row] += 1.0
-        step = np.linalg.solve(A, gap).reshape(f.shape)
+        step = np.linalg.solve(A, gap)
         work[0] += 0.7 * size**3 + 6.0 * size**2
         share = 1.0
         for halving in range(HALVINGS + 1):
             if halving == HALVINGS:
                 # a kink may have to be passed before it gets better
                 share = 1.0
-            f[:] = start + share * step
+            for row in range(size):
+                target[row] = start[row] + share * step[row]
             found = _violations(c, contacts, F, w, f, before, load1, B, gap)
             work[0] += 2.0 * size**2
             if found < (1.0 - DECREASE * share) * total:

@@ -192,7 +192,9 @@ def _taylor_series(arrays, y, contact, omega, t, series):
     _input_series(P, omega, t, p)
     _input_series(G, omega, t, wc)
     _input_series(Nn, omega, t, nc)
-    Q[0], U[0] = y[:d], y[d : 2 * d]
+    for k in range(d):
+        Q[0, k] = y[k]
+        U[0, k] = y[d + k]
     for j in range(Q.shape[0]):
         a = p[j]
         for k in range(d):
@@ -299,6 +301,20 @@ def _first_event(arrays, y, contact, series, h, step):
 
 
 @njit(cache=True)
+def _set_slider_tangent(W, V, T, i, slip):
+    """Slider i follows its element at the friction limit: d z = d w - slip d N.
+
+    A loop: products of arrays take seconds to compile wherever they stand.
+    """
+    d = W.shape[1]
+    for m in range(T.shape[1]):
+        total = 0.0
+        for k in range(d):
+            total += (W[i, k] - slip * V[i, k]) * T[k, m]
+        T[2 * d + i, m] = total
+
+
+@njit(cache=True)
 def _switch_state(arrays, y, contact, T, i, rates):
     """Change the state of element i; rates: w, N and their time derivatives at this instant."""
     W = arrays[2]
@@ -317,13 +333,13 @@ def _switch_state(arrays, y, contact, T, i, rates):
     elif old == SIGNED_SEPARATED:
         contact[i] = SIGNED_STICK if kt[i] * abs(dw) <= mu[i] * dN else (1 if dw > 0 else -1)
         y[2 * d + i] = w
-        T[2 * d + i] = W[i] @ T[:d] - dw / dN * (V[i] @ T[:d]) if dN != 0 else W[i] @ T[:d]
+        _set_slider_tangent(W, V, T, i, dw / dN if dN != 0 else 0.0)
     elif N <= 0:
         contact[i] = SIGNED_SEPARATED
     else:
         contact[i] = SIGNED_STICK
         y[2 * d + i] = w - old * mu[i] * N / kt[i]
-        T[2 * d + i] = W[i] @ T[:d] - old * mu[i] / kt[i] * (V[i] @ T[:d])
+        _set_slider_tangent(W, V, T, i, old * mu[i] / kt[i])
 
 
 @njit(cache=True)
@@ -333,11 +349,18 @@ def _advance_tangent(arrays, contact, T, x, order, memory):
     """
     key, flow = memory
     n, d = arrays[2].shape
-    if key[n] != x or np.any(key[:n] != contact):
-        key[:n] = contact
+    new = key[n] != x
+    for i in range(n):
+        new = new or key[i] != contact[i]
+    if new:
+        for i in range(n):
+            key[i] = contact[i]
         key[n] = x
         _tangent_exponential(arrays, contact, x, order, flow)
-    T[: 2 * d] = flow @ T
+    product = flow @ T
+    for k in range(2 * d):
+        for m in range(T.shape[1]):
+            T[k, m] = product[k, m]
 
 
 @njit(cache=True)
@@ -355,7 +378,8 @@ def _tangent_exponential(arrays, contact, x, order, flow):
     A = np.zeros((d, 2 * d + n))
     for k in range(d):
         A[k, k] -= L[k]
-        A[k, d : 2 * d] -= D[k]
+        for m in range(d):
+            A[k, d + m] -= D[k, m]
         for i in range(n):
             if contact[i] != SIGNED_SEPARATED:
                 gain = W[i, k] * kt[i] if contact[i] == SIGNED_STICK else 0.0
@@ -371,16 +395,18 @@ def _tangent_exponential(arrays, contact, x, order, flow):
     for k in range(2 * d):
         row[k, k] = 1.0
     for j in range(order + 1):
-        flow += row
         factor = x / (j + 1)
         for k in range(d):
-            new[k] = factor * row[d + k]
-            new[d + k] = 0.0
+            for c in range(2 * d + n):
+                flow[k, c] += row[k, c]
+                flow[d + k, c] += row[d + k, c]
+                new[k, c] = factor * row[d + k, c]
+                new[d + k, c] = factor * A[k, c] if j == 0 and c >= 2 * d else 0.0
             for m in range(2 * d):
                 if A[k, m] != 0.0:
-                    new[d + k] += factor * A[k, m] * row[m]
-            if j == 0:
-                new[d + k, 2 * d :] += factor * A[k, 2 * d :]
+                    gain = factor * A[k, m]
+                    for c in range(2 * d + n):
+                        new[d + k, c] += gain * row[m, c]
         row, new = new, row
 
 
@@ -403,7 +429,7 @@ def _advance_state(arrays, y, contact, T, series, x, memory):
             slip = contact[i] * mu[i] / kt[i] if contact[i] != SIGNED_SEPARATED else 0.0
             y[2 * d + i] = _polynomial_value(wc, i, x) - slip * _polynomial_value(nc, i, x)
             if T.shape[1] > 0:
-                T[2 * d + i] = W[i] @ T[:d] - slip * (V[i] @ T[:d])
+                _set_slider_tangent(W, V, T, i, slip)
 
 
 @njit(cache=True)
@@ -434,7 +460,7 @@ def _initial_states(arrays, y, contact, T, series):
         if N <= 0 or slip != 0:
             y[2 * d + i] = w - slip * N
             if T.shape[1] > 0:
-                T[2 * d + i] = W[i] @ T[:d] - slip * (V[i] @ T[:d])
+                _set_slider_tangent(W, V, T, i, slip)
 
 
 @njit(cache=True)
@@ -462,7 +488,8 @@ def _integrate_steps(arrays, y, T, history, omega, parts):
         _taylor_series(arrays, y, contact, omega, t, series)
         if k % parts[1] == 0:
             row = history[k // parts[1]]
-            row[: 2 * d] = y[: 2 * d]
+            for j in range(2 * d):
+                row[j] = y[j]
             for i in range(n):
                 row[2 * d + i] = series[2][0, i]
                 row[2 * d + n + i] = arrays[4][i] * (series[2][0, i] - y[2 * d + i])

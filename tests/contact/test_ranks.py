@@ -11,7 +11,7 @@ from bladefem.contact.seating import solve_mesh_seating
 from bladefem.fem.compat import MPI
 from bladefem.scene.tables import Materials
 
-pytestmark = pytest.mark.mpi
+pytestmark = [pytest.mark.mpi, pytest.mark.several_ranks]
 
 
 @pytest.mark.parametrize("dimension", [2, 3])

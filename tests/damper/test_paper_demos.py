@@ -3,6 +3,7 @@ demos/paper_NAME.py
 """
 
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -13,8 +14,9 @@ HERE = Path(__file__).resolve().parents[2]
 PINNED = {"element": 0.542996, "contact": 0.97322916, "zmass": 0.105900, "blades": 10.67432}
 
 
+@cache
 def output(name: str, ranks: int = 1) -> list[str]:
-    """Lines that a demo prints in its coarse setting."""
+    """Lines that a demo prints in its coarse setting, run once."""
     command = [sys.executable, f"demos/paper_{name}.py"]
     done = run_on_ranks(
         ranks,

@@ -10,7 +10,7 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.kinds.zmass import press_mass
 from verification.paper.plane_row import paper_model, row_of_blades
 
-pytestmark = [pytest.mark.mpi, pytest.mark.two_ranks]
+pytestmark = [pytest.mark.mpi, pytest.mark.two_ranks, pytest.mark.several_ranks]
 RANKS = (MPI.COMM_WORLD, MPI.COMM_SELF)
 
 

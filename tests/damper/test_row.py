@@ -116,16 +116,18 @@ def test_normal_motion_matters_near_the_optimum(row):
     off; 20 N: 16.8 um at 1168 Hz, but 5.90 um at 1293 Hz where the layer's normal stiffness holds
     the platforms as well.
     """
-    light, heavy = (
-        [
-            peak(m, (1050, 1700), 3, 128)
-            for m in (paper_model(SOFT, row, load), whole_model(SOFT, row, load))
-        ]
-        for load in (3.0, 20.0)
-    )
-    assert light[1].amplitude > 2 * light[0].amplitude
-    assert heavy[1].amplitude == pytest.approx(5.90e-6, rel=0.01)
-    assert heavy[1].frequency > 1.1 * heavy[0].frequency
+    light, free = paper_model(SOFT, row, 3.0), whole_model(SOFT, row, 3.0)
+    # no higher resonance above 1320 Hz could make the ratio smaller
+    one, other = (peak(model, (1100, 1320), 3, 128) for model in (light, free))
+    assert other.amplitude > 2 * one.amplitude
+    heavy, held = paper_model(SOFT, row, 20.0), whole_model(SOFT, row, 20.0)
+    low, high = peak(heavy, (1050, 1700), 3, 128), peak(held, (1270, 1320), 3, 128)
+    assert high.amplitude == pytest.approx(5.90e-6, rel=0.01)
+    assert high.frequency > 1.1 * low.frequency
+    # nowhere else does it move as much
+    points = list(response(held, 2 * np.pi * np.linspace(1050, 1700, 66), 3, 128))
+    assert all(point.converged for point in points)
+    assert max(map(size, points)) <= high.amplitude
 
 
 def test_two_motions_where_the_normal_load_follows(row):
@@ -157,7 +159,7 @@ def test_the_whole_plane_model_against_integration_in_time(row):
     model = in_one_body(whole_model(SOFT, row, 20.0))
     omega = 2 * np.pi * 1292.6
     found, system = solve(model, omega, 5, 512), time_system(model, 1)
-    exact = periodic_solution(system, omega, samples=256)
+    exact = periodic_solution(system, omega, samples=256, most=12)
     assert found.converged
     assert found.states["lift"] + found.states["slip"] > 0
     assert abs(found.probe[1, 0] / probe_harmonics(exact, system, 1)[0, 1] - 1) < 2e-3

@@ -97,6 +97,7 @@ def test_wrong_size():
 
 
 @pytest.mark.mpi
+@pytest.mark.several_ranks
 def test_coupling_does_not_depend_on_ranks():
     mesh = sector(6, (4, 2, 1), bump=0.2)
     g = []

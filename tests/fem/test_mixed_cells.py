@@ -244,6 +244,7 @@ def test_a_wedge_that_is_turned_over():
 
 
 @pytest.mark.mpi
+@pytest.mark.several_ranks
 @pytest.mark.parametrize("n", [pytest.param(0, marks=pytest.mark.two_ranks), 2])
 def test_mixed_cells_do_not_depend_on_ranks(n, tmp_path):
     _, mesh = sector_mesh(tmp_path, (4, 3, 2))

@@ -14,7 +14,7 @@ from bladefem.fem.modes import modes
 from bladefem.fem.ports import port_model
 from bladefem.scene.tables import Material
 
-pytestmark = pytest.mark.mpi
+pytestmark = [pytest.mark.mpi, pytest.mark.several_ranks]
 
 
 @pytest.mark.parametrize("n", [0, 1, 3])

@@ -167,6 +167,7 @@ def test_wrong_speeds_and_states_without_equilibrium():
 
 
 @pytest.mark.mpi
+@pytest.mark.several_ranks
 @pytest.mark.parametrize("linear", [False, pytest.param(True, marks=pytest.mark.two_ranks)])
 def test_rotation_does_not_depend_on_ranks(linear):
     mesh = sector(6, (4, 2, 1), bump=0.2)

@@ -187,6 +187,7 @@ def test_hot_sector_equals_hot_wheel():
 
 
 @pytest.mark.mpi
+@pytest.mark.several_ranks
 @pytest.mark.two_ranks
 def test_heat_does_not_depend_on_ranks():
     mesh = held_bar()

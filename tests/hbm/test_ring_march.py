@@ -11,6 +11,7 @@ from test_stability import marched
 from bladefem.hbm.flow_map import flow_map
 from bladefem.hbm.ring_march import Drive, driven_anew, march_ring, state_of_solution
 from bladefem.hbm.sector_modes import sector_modes
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import free_response, solve
 from bladefem.hbm.stability import _handed_on, linearised_contacts
 
@@ -34,6 +35,18 @@ def test_a_march_by_steps_is_the_plain_one(omega):
     # where it bounces irregularly, two marches part after some periods
     kept = 5 if abs(plain[-1] / plain[0] - 1) > 0.02 else PERIODS
     assert own[1:kept] == pytest.approx(plain[1:kept], rel=0.02)
+
+
+@pytest.mark.parametrize(("omega", "phase"), [(1.3, 1.0), (1.6, 1.0), (1.6, 1.0j)])
+def test_a_normal_load_that_varies_is_marched_as_balanced(omega, phase):
+    """In stick, slip and lift-off, where its variation changes the amplitude by a half and more."""
+    model = replace(bouncing(), normal={1: np.array([0.3 * phase])})
+    point = solve(model, omega, 15, 1024)
+    assert point.converged
+    constant = solve(bouncing(), omega, 15, 1024)
+    assert abs(size(point) / size(constant) - 1) > 0.4
+    found = march_ring(model, state_of_solution(model, point), PERIODS, 512)
+    assert heights(found.motion[1:, 0]) == pytest.approx(size(point), rel=2e-3)
 
 
 def test_blades_without_coupling_march_as_one_alone():

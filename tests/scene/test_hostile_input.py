@@ -249,7 +249,7 @@ def test_dollar_signs_in_a_title_are_dollar_signs(tmp_path):
     assert (tmp_path / "title.png").stat().st_size > 1000
 
 
-COARSE_MESH = {"size": "20 mm", "order": 1}
+COARSE_MESH = {"size": "20 mm", "order": 1, "algorithm": "delaunay"}
 
 
 def test_names_are_those_of_the_meshes(mesh_of):

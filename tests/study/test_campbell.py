@@ -91,6 +91,7 @@ def test_too_few_speeds(wheel):
 
 
 @pytest.mark.mpi
+@pytest.mark.several_ranks
 @pytest.mark.two_ranks
 def test_campbell_does_not_depend_on_ranks():
     from mpi4py import MPI

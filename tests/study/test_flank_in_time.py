@@ -126,20 +126,31 @@ def test_steps_keep_to_the_band_of_the_plain_march(model, points, truth):
     assert band.lowest == pytest.approx(truth[0], rel=0.1)
 
 
-def test_the_exact_march_is_asked_where_steps_come_to_no_end(model, points, truth, monkeypatch):
-    lost = replace(band_by_steps(model, points[0]), reason="forces of a step were not found")
+@pytest.fixture(scope="module")
+def exact(model, points):
+    """By the exact march."""
+    return kept_band(model, points[0])
+
+
+def test_the_exact_march_is_asked_where_steps_come_to_no_end(model, points, exact, monkeypatch):
+    asked = []
+    lost = replace(exact, reason="forces of a step were not found")
     monkeypatch.setattr(error_in_time, "band_by_steps", lambda *_: lost)
+    monkeypatch.setattr(error_in_time, "exact_band", lambda *given: asked.append(given) or exact)
     family = family_of(model)
-    band = Marches(family).band(settings_of(family), points[0])
-    assert band.reason == ""
-    assert band.highest == pytest.approx(truth[1], rel=0.1)
+    assert Marches(family).band(settings_of(family), points[0]) is exact
+    ((marched, point),) = asked
+    assert point is points[0]
+    for name in ("kt", "kn", "mu", "n0"):
+        np.testing.assert_array_equal(
+            getattr(marched.elements, name), getattr(model.elements, name)
+        )
 
 
-def test_the_exact_march_goes_on_until_the_band_is_that_of_the_plain_one(model, points, truth):
-    band = kept_band(model, points[0])
-    assert band.reason == ""
-    assert band.highest == pytest.approx(truth[1], rel=0.1)
-    assert band.lowest == pytest.approx(truth[0], rel=0.1)
+def test_the_exact_march_goes_on_until_the_band_is_that_of_the_plain_one(exact, truth):
+    assert exact.reason == ""
+    assert exact.highest == pytest.approx(truth[1], rel=0.1)
+    assert exact.lowest == pytest.approx(truth[0], rel=0.1)
 
 
 def test_steps_and_the_exact_march_keep_to_one_band_on_a_stiff_contact():
