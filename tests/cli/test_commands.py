@@ -51,7 +51,13 @@ def fake_curve(load, amplitude):
 
 def fake_limit(load, frequency):
     return SimpleNamespace(
-        load=load, peak_frequency=frequency, peak_amplitude=8e-5, frequency=np.arange(3.0)
+        load=load,
+        peak_frequency=frequency,
+        peak_amplitude=8e-5,
+        frequency=np.arange(3.0),
+        error=0.002,
+        halved=np.nan,
+        body_mesh=0.001,
     )
 
 
