@@ -55,6 +55,8 @@ class Knowledge:
         """
         half = np.minimum(self.half + by, MAX_LOG_HALF_WIDTH)
         ends = self.intervals * np.exp(np.outer(np.minimum(by, MAX_LOG_HALF_WIDTH), SIDES))
+        # beyond what is told nothing is known on either side
+        ends[half >= MAX_LOG_HALF_WIDTH] = 0.0, np.inf
         wide = replace(self, half=half, intervals=ends)
         told = {name for one in self.open for name in one}
         lost = [n for n, k in zip(names, wide.known, strict=True) if not k and n not in told]

@@ -140,6 +140,7 @@ def test_a_richer_model_that_is_not_solved_leaves_the_contact_open(readings, mon
     fit = fit_contact(levels, ("mu",), H=1, samples=64)
     assert fit.left_out[0].unsolved == readings.size
     assert not fit.knowledge.known.any() and fit.knowledge.open == [("mu",)]
+    assert fit.knowledge.intervals.tolist() == [[0.0, np.inf]]
 
 
 def test_a_constant_normal_load_and_friction_are_known_by_their_product():
