@@ -53,4 +53,4 @@ if comm.rank == 0:
             f"error {100 * c.error:.2g} %"
         )
     best = result.response.curves[result.response.best_curve]
-    print(f"resonance amplitude at the best load [um]: {1e6 * best.peak_amplitude:.8f}")
+    print(f"resonance amplitude at the best load [um]: {1e6 * best.peak_amplitude:.4g}")

@@ -42,4 +42,4 @@ if comm.rank == 0:
     for name, pair in result.mesh.pairs.items():
         print(f"pair {name}: {pair.nodes.shape[1]} matched nodes")
     print(f"load of a seat by the damper's own mass [N]: {result.contact.own:.3f}")
-    print(f"damper's mass [g]: {1e3 * result.contact.problem.mass:.8f}")
+    print(f"damper's mass [g]: {1e3 * result.contact.problem.mass:.4g}")

@@ -72,4 +72,4 @@ if not coarse:
     )
 
 # %%
-print(f"approach over that of a half space: {approach:.8f}")
+print(f"approach over that of a half space: {approach:.4f}")

@@ -58,4 +58,4 @@ print(
     f"best load {10 * best.value:.3f} N, {best.points} points solved, peak at "
     f"{best.peak.omega:.2f} rad/s"
 )
-print(f"lowest highest peak [um]: {1e6 * best.peak.height:.8f}")
+print(f"lowest highest peak [um]: {1e6 * best.peak.height:.4g}")

@@ -52,5 +52,5 @@ if comm.rank == 0:
         draw_wheel_mode(mesh, excited, 0, "runs/demos/wheel_mode.png")
     print(
         f"first frequency of nodal diameter {excited.nodal_diameter} [Hz]: "
-        f"{excited.frequencies[0]:.8f}"
+        f"{excited.frequencies[0]:.2f}"
     )

@@ -290,10 +290,13 @@ def prepared(
         scene = given_scene(options, responds)
         given = _given_fields(options)
         options.held.enter_context(lock_run_folder(folder))
-        moved = take_folder(folder, scene, same_mesh)
+
+        def tell_of_moves(sentence: str) -> None:
+            if not options.quiet:
+                print(f"bladefem: {sentence}", file=sys.stderr, flush=True)
+
+        take_folder(folder, scene, same_mesh, tell_of_moves)
         keep_given(folder, given)
-        if moved and not options.quiet:
-            print(f"bladefem: {moved}", file=sys.stderr, flush=True)
         return scene
 
     scene = on_root(comm, prepare)

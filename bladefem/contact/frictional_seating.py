@@ -28,6 +28,7 @@ from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
 from ..fem.flexibility import Flexibility
 from ..fem.loads import body_mass, centrifugal
+from ..scene.units import newtons
 from ..util.arrays import RealArray
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
@@ -213,8 +214,8 @@ def seat_with_friction(
             return found
         scale = scale / (1 + error)
     raise NotSolvedError(
-        f"normal load {normal:g} N on each seat: no damper load was found that presses so after "
-        f"the history of speeds, {error:.1e} is left"
+        f"normal load {newtons(normal)} on each seat: no damper load was found that presses so "
+        f"after the history of speeds, {error:.1e} is left"
     )
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from ..errors import InputError, NotSolvedError
+from ..scene.units import newtons
 from .as_array import as_float_array
 
 ROUND_OFF = 1e-12
@@ -68,7 +69,7 @@ def slip_step(
     limit, n = as_float_array("limit", limit, (None,)), len(limit)
     C = as_float_array("C", C, (n, n))
     if (limit < 0).any():
-        raise InputError(f"limit of a node is {limit.min():g} N, expected at least 0 N")
+        raise InputError(f"limit of a node is {newtons(limit.min())}, expected at least 0 N")
     for name, value in (("shift", shift), ("total", total)):
         if value is not None:
             as_float_array(name, value, ())
@@ -76,8 +77,8 @@ def slip_step(
         raise InputError("slip_step needs exactly one of shift and total")
     if total is not None and not abs(total) < limit.sum():
         raise InputError(
-            f"total tangential force is {total:g} N, expected below the limits' sum "
-            f"{limit.sum():g} N"
+            f"total tangential force is {newtons(total)}, expected below the limits' sum "
+            f"{newtons(limit.sum())}"
         )
     before = before or SlipState(np.zeros(n), 0.0, np.zeros(n), np.zeros(n, int), 0.0)
     as_float_array("before.force", before.force, (n,))

@@ -37,6 +37,7 @@ from ..fem.flexibility import Flexibility, compliance, flexible
 from ..fem.linalg import inner_products
 from ..fem.loads import body_mass, centrifugal
 from ..scene.tables import Materials
+from ..scene.units import newtons
 from ..util.arrays import RealArray
 from ..util.communicator import Communicator
 from .as_array import as_float_array
@@ -176,7 +177,7 @@ def solve_seating(
     try:
         return _maps(problem, _wanted(problem, g0, normal, active))
     except NotSolvedError as error:
-        raise NotSolvedError(f"normal load {normal:g} N on each seat: {error}") from error
+        raise NotSolvedError(f"normal load {newtons(normal)} on each seat: {error}") from error
 
 
 def _check_load(
@@ -378,7 +379,8 @@ def _wanted(
         if abs(error) < 1e-10:
             return _state(problem, g0, scale, active)
     raise NotSolvedError(
-        f"no damper load was found that presses with {normal:g} N on each seat, {error:.1e} is left"
+        f"no damper load was found that presses with {newtons(normal)} on each seat, "
+        f"{error:.1e} is left"
     )
 
 

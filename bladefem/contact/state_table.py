@@ -16,6 +16,7 @@ import numpy as np
 from ..data import Patch
 from ..errors import InputError
 from ..scene.tables import Material
+from ..scene.units import plain_number
 
 # what "much larger" means in T >> D / c
 MUCH_LARGER_RATIO = 10.0
@@ -122,7 +123,7 @@ class QuasiStatic:
         return (
             f"quasi-static contact {'holds' if self.holds else 'does NOT hold'}: the period "
             f"{self.period:.3g} s is {self.period / self.transit:.3g} wave transits of the patch "
-            f"(at least {MUCH_LARGER_RATIO:g} wanted; up to {self.limit:.3g} Hz)"
+            f"(at least {MUCH_LARGER_RATIO:g} wanted; up to {plain_number(self.limit, 3)} Hz)"
         )
 
 

@@ -91,7 +91,11 @@ def stability_verdict(
         finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS_PER_PERIOD, most)
         leading = leading if finer is None else finer
     if leading is None:
-        return Verdict(UNKNOWN, reason=f"it would take more than {most:.0e} operations")
+        return Verdict(
+            UNKNOWN,
+            reason="it takes longer than is spent on it; fewer contact.points or model.modes "
+            "shorten it",
+        )
     if abs(leading) <= 1 + UNSTABLE_GROWTH:
         return Verdict(STABLE, float(abs(leading)))
     return Verdict(UNSTABLE, float(abs(leading)), _bifurcation(leading))

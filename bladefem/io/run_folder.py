@@ -8,11 +8,12 @@ import fcntl
 import json
 import os
 import shutil
-from collections.abc import Callable, Container, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
 from ..errors import InputError
+from ..scene.fields import each_field, value_at
 from ..scene.tables import Scene
 from ..scene.toml import dump_scene, load_scene
 from .folder_undo import (
@@ -30,6 +31,9 @@ from .stage_cache import open_folder, write_text
 NAMED_MESH = "named_mesh.msh"
 # what belongs to the mesh alone
 MESH_FILES = (NAMED_MESH, "mesh.vtu")
+# of what is put away, and of the reasons for it: those that are named
+NAMED_FILES = 3
+NAMED_FIELDS = 3
 RESULT_SUFFIXES = (
     ".csv",
     ".gif",
@@ -87,6 +91,7 @@ def take_folder(
     folder: str | Path,
     scene: Scene,
     same_mesh: Callable[[Scene, Scene], bool] | None = None,
+    tell: Callable[[str], None] | None = None,
 ) -> str:
     """Write the scene into a run folder; results of another scene are put away into its folder
     "earlier".
@@ -97,6 +102,7 @@ def take_folder(
     Args:
         same_mesh: whether two scenes have the same mesh, whose files then stay; files of the mesh
             go with the other results when left out.
+        tell: takes a sentence about what will be put away and why, before it is.
 
     Returns:
         a sentence about what was put away, or "".
@@ -111,7 +117,10 @@ def take_folder(
         held = _read(file)
         if held != scene:
             keep_mesh = same_mesh is not None and held is not None and same_mesh(held, scene)
-            said = _put_away(folder, MESH_FILES if keep_mesh else ())
+            results = _results_in(folder, MESH_FILES if keep_mesh else ())
+            if results and tell is not None:
+                tell(_announcement(folder, results, _differing(held, scene)))
+            said = _put_away(folder, results)
     write_text(file, dump_scene(scene))
     return said
 
@@ -159,9 +168,36 @@ def _read(file: Path) -> Scene | None:
         return None
 
 
-def _put_away(folder: Path, kept: Container[str]) -> str:
-    """Move results other than the kept files, with the scene that they belong to."""
-    results = [
+def _differing(one: Scene | None, other: Scene) -> list[str]:
+    """Dotted names of the fields in which two scenes differ; none where one is not readable."""
+    if one is None:
+        return []
+    return [
+        field.name
+        for field in each_field()
+        if value_at(one, field.name) != value_at(other, field.name)
+    ]
+
+
+def _announcement(folder: Path, results: Sequence[Path], fields: Sequence[str]) -> str:
+    """What will be put away, why, what stays, and what else can be done."""
+    names = sorted(path.name for path in results)
+    more = f" and {len(names) - NAMED_FILES} more" if len(names) > NAMED_FILES else ""
+    why = ""
+    if fields:
+        others = f" and {len(fields) - NAMED_FIELDS} more" if len(fields) > NAMED_FIELDS else ""
+        why = f", which differs in {', '.join(fields[:NAMED_FIELDS])}{others}"
+    return (
+        f"{folder} holds results of another scene{why}: {', '.join(names[:NAMED_FILES])}{more} are "
+        f"moved to {folder / EARLIER_FOLDER}, since tables and reports have one scene; stored "
+        "stages stay, and those that do not depend on it are not computed again; another folder, "
+        "-o, keeps both"
+    )
+
+
+def _results_in(folder: Path, kept: Container[str]) -> list[Path]:
+    """Results in a folder other than the kept files."""
+    return [
         p
         for p in folder.iterdir()
         if (p.suffix in RESULT_SUFFIXES or p.name == NAMED_MESH)
@@ -169,6 +205,10 @@ def _put_away(folder: Path, kept: Container[str]) -> str:
         and p.name not in kept
         and p.is_file()
     ]
+
+
+def _put_away(folder: Path, results: Sequence[Path]) -> str:
+    """Move results, with the scene that they belong to."""
     if not results:
         return ""
     earlier = folder / EARLIER_FOLDER

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..io.run_folder import take_folder
+from ..scene.units import newtons
 from ..study.backbone import Backbone
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..util.message import warning
@@ -67,7 +68,7 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
     i = int(np.argmax(np.where(most.converged, most.friction, -np.inf)))
     sentences = [
         f"friction damps at most {100 * most.friction[i]:.3g} % of critical, under "
-        f"{most.load:.4g} N at {1e6 * most.amplitude[i]:.4g} um"
+        f"{newtons(most.load, 4)} at {1e6 * most.amplitude[i]:.4g} um"
     ]
     reached = [one for one in found if np.isfinite(one.error)]
     if reached:
@@ -75,7 +76,7 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
         sentences.append(
             "resonances predicted by the nonlinear mode alone are off by "
             f"{100 * abs(worst.error):.2g} % of the balance's amplitude at most, under "
-            f"{worst.load:.4g} N"
+            f"{newtons(worst.load, 4)}"
         )
     for one in found:
         if one.fold.any():
@@ -84,7 +85,7 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
                 for i in np.flatnonzero(one.fold)
             )
             sentences.append(
-                f"load {one.load:g} N: the nonlinear mode turns back in amplitude at {turns}; "
+                f"load {newtons(one.load)}: the nonlinear mode turns back in amplitude at {turns}; "
                 "several motions share the amplitudes between"
             )
         lost = np.flatnonzero(~one.converged)
@@ -93,13 +94,13 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
             between = f"from {first:.4g} to {last:.4g} um" if len(lost) > 1 else f"{first:.4g} um"
             sentences.append(
                 warning(
-                    f"load {one.load:g} N: {len(lost)} of {len(one.converged)} amplitudes not "
+                    f"load {newtons(one.load)}: {len(lost)} of {len(one.converged)} amplitudes not "
                     f"solved, {between}: {one.lost}"
                 )
             )
         if not np.isfinite(one.error):
             sentences.append(
-                warning(f"load {one.load:g} N: the mode reaches no resonance under this force")
+                warning(f"load {newtons(one.load)}: the mode reaches no resonance under this force")
             )
     return sentences
 
@@ -125,7 +126,7 @@ def write_backbones(
             "resonance by the nonlinear mode, at the best load studied",
             f"{1e6 * best.predicted[0]:.4g} µm",
             f"off by {100 * best.error:+.2g} % from the balance",
-            f"under {best.load:.4g} N at {best.predicted[1]:.5g} Hz",
+            f"under {newtons(best.load, 4)} at {best.predicted[1]:.5g} Hz",
         ),
         Headline(
             "largest friction damping under that load",

@@ -8,6 +8,7 @@ from dataclasses import asdict
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newtons
 from ..study.pipeline.best_load import BestLoad, studied_load
 from ..study.pipeline.loads import Curve, lower_studied
 
@@ -77,7 +78,8 @@ def _passed_over(there: Curve, lower: Curve) -> str:
     """Why the load of a search is not the best one."""
     return (
         f"it compares balances, and the blade keeps {1e6 * there.peak_amplitude:.4g} um under "
-        f"{there.load:.4g} N, {1e6 * lower.peak_amplitude:.4g} um under {lower.load:.4g} N"
+        f"{newtons(there.load, 4)}, {1e6 * lower.peak_amplitude:.4g} um under "
+        f"{newtons(lower.load, 4)}"
     )
 
 
@@ -199,8 +201,8 @@ def _at_end(best: pd.Series) -> list[str]:
     ):
         if near:
             return [
-                f"the resonance amplitude {side} load searched, {bound:.3g} N, so that no minimum "
-                "lies between"
+                f"the resonance amplitude {side} load searched, {newtons(bound, 3)}, so that no "
+                "minimum lies between"
             ]
     return []
 

@@ -13,6 +13,7 @@ import pandas as pd
 from geometry.mesh import Mesh
 
 from ..errors import InputError
+from ..scene.units import newtons
 from ..study.fatigue import Utilisation, haigh_diagram
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.wheel_utilisation import BladeUse, wheel_utilisation
@@ -157,12 +158,12 @@ def utilisation_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
     number = run.response.best_curve
     load = run.response.curves[number].load
     field = _on_mesh(run.mesh, found[number].used)
-    title = f"utilisation at the resonance under {load:.4g} N"
+    title = f"utilisation at the resonance under {newtons(load, 4)}"
     drawings: dict[str, Callable[[Path], object]] = {
         "modes/utilisation": lambda file: draw_utilisation(run.mesh, field, title, file)
     }
     for response, (worst, *_) in known_wheel_use(run):
-        words = f"utilisation of blade {worst.blade.blade + 1} under {response.load:.4g} N"
+        words = f"utilisation of blade {worst.blade.blade + 1} under {newtons(response.load, 4)}"
         values = _on_mesh(worst.mesh, worst.used.used)
         drawings["wheel/utilisation_of_the_worst_blade"] = partial(
             draw_utilisation, worst.mesh, values, words
@@ -179,12 +180,12 @@ def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
         return
     fields = {"mean stress [Pa]": run.strength.mean}
     for number, used in found.items():
-        load = f"{run.response.curves[number].load:g} N"
+        load = f"{newtons(run.response.curves[number].load)}"
         fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run.mesh, used.alternating)
         fields[f"utilisation, {load} [1]"] = _on_mesh(run.mesh, used.used)
     for response, (worst, *_) in known_wheel_use(run):
         mesh, used = worst.mesh, worst.used
-        name = f"blade {worst.blade.blade + 1}, {response.load:g} N"
+        name = f"blade {worst.blade.blade + 1}, {newtons(response.load)}"
         own = {
             f"alternating stress, {name} [Pa]": _on_mesh(mesh, used.alternating),
             f"utilisation, {name} [1]": _on_mesh(mesh, used.used),

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newtons
 from ..study.pipeline.flutter import growing_words, wave_words
 from ..study.pipeline.run_records import SolvedRun
 from ..view.wheel import draw_waves
@@ -77,7 +78,6 @@ def flow_headlines(run: SolvedRun) -> list[Headline]:
         return []
     one = min(found.largest, key=lambda held: held.amplitude)
     grows = "" if np.isnan(one.largest) else f"; motions above {growing_words(one.largest)} grow"
-    # the load that is best against the excitation need not be among these
     loads = {held.load for held in found.largest}
     among = f", of {len(loads)} loads the one that keeps it smallest" if len(loads) > 1 else ""
     return [
@@ -85,6 +85,7 @@ def flow_headlines(run: SolvedRun) -> list[Headline]:
             "flutter held by friction",
             f"{1e6 * one.amplitude:.4g} µm",
             "in one harmonic, by the nonlinear mode",
-            f"largest of fed waves: {wave_words(one.wave)}, under {one.load:.4g} N{among}{grows}",
+            f"largest of fed waves: {wave_words(one.wave)}, under {newtons(one.load, 4)}"
+            f"{among}{grows}",
         )
     ]

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newton_range, newtons
 from .best_load import error_words, found_best, stress_error_words
 from .statements import ResponseAnswer
 
@@ -131,9 +132,9 @@ def _flatness_text(low: float | None, high: float | None) -> str:
         # where the amplitude crosses the accuracy: three digits of a load that nobody sets
         return _between_text(float(f"{low:.3g}"), float(f"{high:.3g}"), "N")
     if low is not None:
-        return f"above {low:.4g} N; how far up was not found"
+        return f"above {newtons(low, 4)}; how far up was not found"
     if high is not None:
-        return f"below {high:.4g} N; how far down was not found"
+        return f"below {newtons(high, 4)}; how far down was not found"
     return "how flat the optimum is was not found"
 
 
@@ -154,12 +155,16 @@ def _between_text(
     unit: str,
     factor: float = 1.0,
 ) -> str:
+    """Of loads [N] and of what is in proportion to them."""
     if low is not None and high is not None:
-        return f"between {factor * low:.4g} and {factor * high:.4g} {unit}"
-    if low is not None:
-        return f"above {factor * low:.4g} {unit}, no upper bound studied"
-    if high is not None:
-        return f"below {factor * high:.4g} {unit}, no lower bound studied"
+        ends = newton_range(low, high).replace(" to ", " and ")
+        if unit != "N":
+            ends = f"{factor * low:.4g} and {factor * high:.4g} {unit}"
+        return f"between {ends}"
+    for side, end, other in (("above", low, "upper"), ("below", high, "lower")):
+        if end is not None:
+            told = newtons(end, 4) if unit == "N" else f"{factor * end:.4g} {unit}"
+            return f"{side} {told}, no {other} bound studied"
     return "only one load studied"
 
 

@@ -7,7 +7,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..scene.units import show
+from ..scene.units import newtons, show
+from ..study.contact_identification import ContactFit
+from ..study.fit_intervals import UNKNOWN_LOG_HALF_WIDTH
+from ..study.fit_truncation import LeftOut
 from ..study.measured_responses import FittedScene
 from ..util.message import warning
 from ..view.measured import draw_measured
@@ -31,6 +34,10 @@ FIELDS = {
 }
 
 
+# smallest shift of a logarithm that is told
+COUNTED_SHIFT = 5e-4
+
+
 def parameter_table(found: FittedScene) -> pd.DataFrame:
     """One row a parameter: the factor on the scene's value, with its interval."""
     fit = found.fit
@@ -40,9 +47,18 @@ def parameter_table(found: FittedScene) -> pd.DataFrame:
             "over_scene": fit.factors,
             "factor_low": fit.knowledge.intervals[:, 0],
             "factor_high": fit.knowledge.intervals[:, 1],
+            **_shares_of_half_widths(fit),
             "determined": ["yes" if known else "no" for known in fit.knowledge.known],
         }
     )
+
+
+def _shares_of_half_widths(fit: ContactFit) -> dict[str, np.ndarray]:
+    """Columns of the half widths of the logarithms: by the readings, and by what richer models
+    change.
+    """
+    model = np.sum([np.zeros(len(fit.names)), *(abs(o.shift) for o in fit.held)], axis=0)
+    return {"log_half_by_readings": fit.half_by_readings, "log_half_by_model": model}
 
 
 def readings_table(found: FittedScene) -> pd.DataFrame:
@@ -69,7 +85,8 @@ def fit_sentences(found: FittedScene) -> list[str]:
     sentences = [
         f"{len(off)} readings, by the fitted contact off by {_percent(off)} (root of the mean "
         f"square; by the scene's {_percent(found.before / found.readings.amplitude - 1)}); "
-        f"{100 * found.error:.3g} % were assumed as their error; {found.harmonics} harmonics",
+        f"{100 * found.error:.3g} % were assumed as their error; "
+        f"{found.settings.harmonics} harmonics",
         fit.sentence(),
     ]
     if found.scene_values:
@@ -78,6 +95,7 @@ def fit_sentences(found: FittedScene) -> list[str]:
             for name, value in found.scene_values.items()
         )
         sentences.append(f"for the scene, under [contact]: {', '.join(rows)}")
+    sentences += left_out_sentences(fit)
     if fit.misfit > 2:
         sentences.append(
             warning(
@@ -88,6 +106,48 @@ def fit_sentences(found: FittedScene) -> list[str]:
     if not kept.all():
         sentences.append(warning(f"{int((~kept).sum())} of {len(off)} readings not solved"))
     return sentences
+
+
+def left_out_sentences(fit: ContactFit) -> list[str]:
+    """What the intervals hold of the model's own error, and what they do not."""
+    sentences = []
+    counted = [one for one in fit.held if (abs(one.shift) >= COUNTED_SHIFT).any()]
+    if counted:
+        rows = (f"{one.what} {_shifts(fit.names, one)}" for one in counted)
+        sentences.append(
+            "the intervals hold what more of the model would change: " + "; ".join(rows)
+        )
+    lost = [f"{one.what} {one.unsolved}" for one in fit.held if one.unsolved]
+    if lost:
+        sentences.append(
+            warning(
+                "readings that richer models did not solve, in which the intervals do not hold "
+                f"what these change: {', '.join(lost)}"
+            )
+        )
+    for one in fit.left_out:
+        if not one.widens and (abs(one.shift) > fit.half_by_readings).any():
+            sentences.append(
+                warning(
+                    f"the estimated error of {one.what} would move {_shifts(fit.names, one)}, "
+                    "which the intervals do not hold: a smaller mesh.size, or an E of the blade "
+                    "that brings its frequency without damper to the measured one"
+                )
+            )
+    return sentences
+
+
+def _shifts(names: tuple[str, ...], one: LeftOut) -> str:
+    """By how much each parameter moves."""
+    return ", ".join(
+        f"{name} by {_shift(shift)}" for name, shift in zip(names, one.shift, strict=True)
+    )
+
+
+def _shift(shift: float) -> str:
+    if abs(shift) >= UNKNOWN_LOG_HALF_WIDTH:
+        return "more than a factor of two"
+    return f"{100 * np.expm1(shift):+.2g} %"
 
 
 def _percent(off: np.ndarray) -> str:
@@ -114,7 +174,7 @@ def write_fit(found: FittedScene, folder: Path) -> list[Path]:
     for load, force in sorted(set(zip(readings.load, readings.force, strict=True))):
         rows = np.flatnonzero((readings.load == load) & (readings.force == force))
         rows = rows[np.argsort(readings.frequency[rows])]
-        levels[f"{load:.4g} N, force {force:.4g} N"] = (
+        levels[f"{newtons(load, 4)}, force {newtons(force, 4)}"] = (
             readings.frequency[rows],
             readings.amplitude[rows],
             found.before[rows],

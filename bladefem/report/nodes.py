@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ..data import SEATS, Patch
+from ..scene.units import newtons
 from ..study.pipeline.case_models import load_cases
 from ..study.pipeline.contact_cycle import ContactCycle, contact_cycle
 from ..study.pipeline.run_records import SolvedRun
@@ -133,8 +134,9 @@ def wear_sentence(cycles: Sequence[ContactCycle], coefficient: float) -> str:
     worst = max(cycles, key=lambda c: float(c.wear(coefficient).max()))
     return (
         f"wear: up to {1e6 * worst.wear(coefficient).max():.3g} µm in an hour of steady vibration "
-        f"at the resonance under {worst.load:g} N, both faces together; depth = {coefficient:.3g} "
-        "m³/J times the friction work an area, while pressure and motion stay as they are"
+        f"at the resonance under {newtons(worst.load)}, both faces together; depth = "
+        f"{coefficient:.3g} m³/J times the friction work an area, while pressure and "
+        "motion stay as they are"
     )
 
 
@@ -149,7 +151,7 @@ def save_cycles_vtu(
     """
     fields: dict[str, np.ndarray] = {}
     for c in cycles:
-        at = f"at {c.load:.6g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.6g} g")
+        at = f"at {newtons(c.load)}" + ("" if c.mass is None else f", {1e3 * c.mass:.6g} g")
         fields |= {f"friction work [J/m2] {at}": c.work, f"state {at}": c.state}
         fields |= {
             f"share of {name} {at}": c.shares[:, k]
@@ -171,7 +173,7 @@ def draw_wear(
         cycle.work,
         cycle.state,
         file,
-        title=f"friction work of a period at the resonance, {cycle.load:g} N per seat",
+        title=f"friction work of a period at the resonance, {newtons(cycle.load)} per seat",
     )
 
 
@@ -185,7 +187,7 @@ def seat_loops(
 ) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Name of the load -> name of the seat -> (displacement [m], force [N]) of one period."""
     return {
-        f"{c.load:.4g} N" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
+        f"{newtons(c.load, 4)}" + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
             f"{SEATS.get(name, name)} seat": (loop.displacement, loop.force)
             for name, loop in c.loops.items()
         }

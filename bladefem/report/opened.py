@@ -22,6 +22,7 @@ from ..io.stage_cache import read_results
 from ..io.stored_stage import stored_stage
 from ..scene.tables import Scene
 from ..scene.toml import load_scene
+from ..scene.units import newtons
 from ..util.picture_files import PICTURES
 from ..view import contact, hysteresis, modes, response
 from .tables import COLUMNS
@@ -205,7 +206,7 @@ class RunFolder:
             start = rows.stop
             force, gap = part["force"].to_numpy()[rows], part["gap"].to_numpy()[rows]
             maps.append(contact.PressureMap(patch, force, gap, 0.0))
-        title = f"contact pressure under {chosen:g} N per seat"
+        title = f"contact pressure under {newtons(chosen)} per seat"
         return contact.draw_pressure(maps, file, title=title)
 
     def _draw_modes(
@@ -341,7 +342,7 @@ def _draw_loops(data: xr.Dataset, file: str | Path | None = None) -> object:
     cases = {}
     for load in data["load"].to_numpy():
         part = data.sel(load=load)
-        cases[f"{load:.4g} N"] = {
+        cases[f"{newtons(load, 4)}"] = {
             f"{seat} seat": (
                 part["displacement"].sel(seat=seat).to_numpy(),
                 part["force"].sel(seat=seat).to_numpy(),

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..io.stage_cache import on_root, read_results, write_results, write_table
 from ..scene.tables import Scene
 from ..scene.toml import dump_scene
+from ..scene.units import newtons
 from ..study.pipeline import pipeline
 from ..study.pipeline.run_records import SeatedRun, folder_of
 from ..util.communicator import Communicator
@@ -76,7 +77,7 @@ def draw_seats(
 ) -> object:
     """The picture of both seats under one of the loads."""
     return contact.draw_pressure(
-        maps[load], file, title=f"contact pressure under {load:g} N per seat"
+        maps[load], file, title=f"contact pressure under {newtons(load)} per seat"
     )
 
 
@@ -111,7 +112,7 @@ def _report(
             "peak pressure",
             f"{1e-6 * worst['peak_pressure']:.4g} MPa",
             "mesh error not studied; see the warnings",
-            f"on the {worst['patch']} seat under {load:.4g} N",
+            f"on the {worst['patch']} seat under {newtons(load, 4)}",
         ),
         Headline(
             "mean pressure there",
@@ -125,7 +126,7 @@ def _report(
         numbers.append(
             Headline(
                 "load of a seat by the damper's own mass",
-                f"{own:.4g} N",
+                f"{newtons(own, 4)}",
                 "by equilibrium, no model error",
                 f"{1e3 * result.contact.problem.mass:.3g} g",
             )

@@ -6,16 +6,18 @@ that ``data.sel(load=80).dropna("frequency")`` is that curve again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from ..data import SEATS
+from ..hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
+from .response_points import LINEAR
 from .tables import units_of
 
 if TYPE_CHECKING:
@@ -36,6 +38,23 @@ CURVE_MEANINGS = {
     "slipping": "elements that slip or lift off",
     "drift": "speed at which the damper walks",
 }
+STABILITY_MEANINGS = {
+    "verdict": "verdict on the stability of the motion",
+    "multiplier": "largest modulus of the Floquet multipliers; NaN where it was not computed",
+}
+# verdicts on the motion of a point, by their numbers, as CF conventions have flags (section 3.5)
+NOT_JUDGED = "not_judged"
+FLAGS = (
+    NOT_JUDGED,
+    UNIQUE,
+    STABLE,
+    UNSTABLE,
+    "unstable_fold",
+    "unstable_period_doubling",
+    "unstable_torus",
+)
+# number in the file where a curve has no point; xarray makes it NaN
+NO_POINT = -1
 
 
 def curve_arrays(points: pd.DataFrame) -> xr.Dataset:
@@ -44,18 +63,63 @@ def curve_arrays(points: pd.DataFrame) -> xr.Dataset:
     Args:
         points: one row a response point, SI columns; the linear limits have no mass.
     """
-    columns = [name for name in CURVE_MEANINGS if name in points]
+    names = {name: text for name, text in CURVE_MEANINGS.items() if name in points}
+    return _over_frequency(points.astype({"converged": float}), names)
+
+
+def stability_arrays(points: pd.DataFrame) -> xr.Dataset:
+    """Verdicts and multipliers of response points, over the dimensions of ``curve_arrays``.
+
+    Args:
+        points: as there.
+    """
+    judged = points.assign(
+        verdict=_flag_numbers(points),
+        multiplier=points["multiplier"] if "multiplier" in points else np.nan,
+    )
+    data = _over_frequency(judged, STABILITY_MEANINGS)
+    data["verdict"].attrs |= {
+        "flag_values": np.arange(len(FLAGS), dtype=np.int8),
+        "flag_meanings": " ".join(FLAGS),
+    }
+    data["verdict"].encoding |= {"dtype": "int8", "_FillValue": np.int8(NO_POINT)}
+    return data
+
+
+def _over_frequency(points: pd.DataFrame, names: Mapping[str, str]) -> xr.Dataset:
+    """Columns of a response table over (mass,) load and frequency.
+
+    Args:
+        names: of the columns, to long names.
+    """
     if "mass" in points:
         points = _for_each_mass(points)
     keys = [name for name in ("mass", "load", "frequency") if name in points]
     units = units_of(points)
-    table = points[keys + columns].drop_duplicates(keys).astype({"converged": float})
-    data = table.set_index(keys).to_xarray()
-    for name in columns:
-        data[name].attrs |= {"units": units.get(name, "1"), "long_name": CURVE_MEANINGS[name]}
+    data = points[[*keys, *names]].drop_duplicates(keys).set_index(keys).to_xarray()
+    for name, long_name in names.items():
+        data[name].attrs |= {"units": units.get(name, "1"), "long_name": long_name}
     data["load"].attrs |= LOAD_ATTRIBUTES
     data["frequency"].attrs |= {"units": "Hz", "long_name": "excitation frequency"}
     return _with_mass_units(data)
+
+
+def _flag_numbers(points: pd.DataFrame) -> list[float]:
+    """Places in FLAGS of the verdicts of a table; a linear motion is the only one."""
+    nothing = pd.Series("", index=points.index)
+    verdicts = points.get("stability", nothing).fillna("")
+    kinds = points.get("bifurcation", nothing).fillna("")
+    linear = points.get("method", nothing) == LINEAR
+    return [
+        float(FLAGS.index(UNIQUE if is_linear else _flag(verdict, kind)))
+        for verdict, kind, is_linear in zip(verdicts, kinds, linear, strict=True)
+    ]
+
+
+def _flag(verdict: str, kind: str) -> str:
+    if verdict in ("", UNKNOWN):
+        return NOT_JUDGED
+    return "_".join([verdict, *kind.split()]) if verdict == UNSTABLE else verdict
 
 
 def _for_each_mass(points: pd.DataFrame) -> pd.DataFrame:

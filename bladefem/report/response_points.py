@@ -12,6 +12,8 @@ from ..study.pipeline.loads import Curve
 # methods of points that the balance of the curve does not give
 MARCHED = "march in time"
 FOLLOWED = "followed to the stiff layer"
+# and of those of a linear limit
+LINEAR = "linear"
 
 
 def points_of(curve: Curve) -> pd.DataFrame:
@@ -91,16 +93,16 @@ def linear_points(limit: Limit) -> pd.DataFrame:
             "amplitude": abs(limit.first),
             "phase": np.angle(limit.first),
             "converged": True,
-            "method": "linear",
-            "route": "linear",
+            "method": LINEAR,
+            "route": LINEAR,
             "residual": 0.0,
             "iterations": 0,
             "slipping": 0,
             "drift": 0.0,
             "dissipated": 0.0,
             "imbalance": 0.0,
-            "estimated_error": 0.0,
-            "tolerated_error": 0.0,
-            "error_checked": False,
+            "estimated_error": limit.estimated,
+            "tolerated_error": np.nan,
+            "error_checked": np.isfinite(limit.estimated),
         }
     )

@@ -20,7 +20,13 @@ from .fatigue import save_fatigue_vtu
 from .linear import harmonic_table
 from .nodes import loop_table, node_table, save_cycles_vtu
 from .pressure import write_points
-from .response_arrays import curve_arrays, loop_arrays, node_arrays, resonance_arrays
+from .response_arrays import (
+    curve_arrays,
+    loop_arrays,
+    node_arrays,
+    resonance_arrays,
+    stability_arrays,
+)
 from .tables import units_of, write_tables
 
 # file of mode shapes for ParaView
@@ -79,6 +85,7 @@ def _data_sets(
         "approximation": table_dataset(harmonic_table(patches, cycles), "row"),
         "hysteresis": table_dataset(loop_table(cycles), "row"),
         "response": curve_arrays(tables["response/points"]),
+        "stability": stability_arrays(tables["response/points"]),
         "resonance": resonance_arrays(result.response.curves, result.response.limits),
         "cycle": node_arrays(nodes),
         "loops": loop_arrays(cycles),

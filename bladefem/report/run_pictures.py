@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from ..scene.tables import Scene
-from ..scene.units import show
+from ..scene.units import newtons, show
 from ..study.modes.survey import excited_set
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.run_records import SolvedRun
@@ -85,7 +85,7 @@ def _live_wheel(result: SolvedRun) -> dict[str, dict[str, Any]]:
     if result.wheel is None:
         return {}
     r = shown_response(result.wheel)
-    title = f"{r.load:.4g} N per seat, {r.frequency:.5g} Hz"
+    title = f"{newtons(r.load, 4)} per seat, {r.frequency:.5g} Hz"
     return {WHEEL_FIGURE: live_wheel(r.solution.probe[:, 1:, 0], title)}
 
 
@@ -96,14 +96,13 @@ def _motions(result: SolvedRun) -> dict[str, ComplexArray]:
     curves = result.response.curves
     order = sorted(result.damped, key=lambda number: curves[number].peak_amplitude)
     found = {
-        f"{result.damped[number].load:.4g} N per seat, {curves[number].peak_frequency:.5g} Hz": (
-            result.damped[number].motion
-        )
+        f"{newtons(result.damped[number].load, 4)} per seat, "
+        f"{curves[number].peak_frequency:.5g} Hz": (result.damped[number].motion)
         for number in order
     }
     if result.wheel is not None:
         r = shown_response(result.wheel)
-        name = f"blade {r.peak.blade + 1} of the mistuned wheel, {r.load:.4g} N"
+        name = f"blade {r.peak.blade + 1} of the mistuned wheel, {newtons(r.load, 4)}"
         found[name] = r.highest.stress.motion
     return found
 

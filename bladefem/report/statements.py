@@ -13,6 +13,7 @@ from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
+from ..scene.units import newtons
 from .best_load import certainty, flat_range, found_best, reasons_against
 
 # of the resonance frequency: farther off, an engine order does not drive it
@@ -65,7 +66,7 @@ def response_answer(
         lowest = (
             "lowest resonance amplitude found",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
-            f"at {best['load']:.4g} N and {best['peak_frequency']:.5g} Hz",
+            f"at {newtons(best['load'], 4)} and {best['peak_frequency']:.5g} Hz",
         )
         said = [f"No optimum load is named: {reason}." for reason in against]
         unknown = ("optimum normal load per seat", "not determined", against[0])
@@ -88,7 +89,7 @@ def _optimum_numbers(
 ) -> list[tuple[str, str, str]]:
     """The best load, under a title, and the resonance there: what, value, remark."""
     numbers = [
-        (title, f"{best['load']:.4g} N", remark),
+        (title, f"{newtons(best['load'], 4)}", remark),
         (
             "resonance amplitude there",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
@@ -177,7 +178,7 @@ def own_mass(
     return [
         (
             "load of a seat by the damper's own mass",
-            f"{load:.4g} N",
+            f"{newtons(load, 4)}",
             f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}",
         ),
         ("mass that makes the optimum load", *best_mass(best, mass / load, masses)),
@@ -309,7 +310,7 @@ def cautions(
         )
     cut = cut_peaks(finite, points)
     if cut:
-        named = ", ".join(f"{load:.4g} N" for load in cut)
+        named = ", ".join(f"{newtons(load, 4)}" for load in cut)
         found.append(
             f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end of "
             "the frequency band, so that no resonance was seen; widen study.band."

@@ -12,7 +12,7 @@ import pandas as pd
 
 from ..scene.fields import field_at, value_at
 from ..scene.tables import Scene
-from ..scene.units import parse, show
+from ..scene.units import newtons, parse, show
 from ..study.pipeline.loads import design_table
 from ..study.pipeline.run_records import Response
 from ..view.study import draw_study
@@ -117,7 +117,7 @@ def place_of_value(best: str, values: Sequence[str]) -> str:
 
 def load_words(load: float, loads: pd.DataFrame) -> str:
     """The load of a best value, and whether it is at an end of those studied."""
-    return f"with {load:.4g} N on each seat{end_words(load, loads)}"
+    return f"with {newtons(load, 4)} on each seat{end_words(load, loads)}"
 
 
 def end_words(load: float, loads: pd.DataFrame) -> str:

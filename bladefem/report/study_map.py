@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 
 from ..scene.tables import Scene
+from ..scene.units import newtons
 from ..view.study_map import draw_band, draw_map
 from .best_load import error_words
 from .headlines import Headline
@@ -80,7 +81,7 @@ def write_scatter(
     numbers = [
         Headline(
             "most robust load",
-            f"{robust['load']:.4g} N",
+            f"{newtons(robust['load'], 4)}",
             f"of {len(band)} loads under which all {len(variants)} samples were studied"
             f"{end_words(robust['load'], band)}",
             "smallest amplitude that 90 % of the samples stay below",

@@ -11,6 +11,8 @@ import pandas as pd
 
 from bladefem.io.stage_cache import write_table, write_text
 
+from ..scene.units import plain_number
+
 
 class Column(NamedTuple):
     """How a column of SI numbers is shown."""
@@ -102,6 +104,8 @@ COLUMNS = {
     "over_scene": Column("over the scene's", "1", digits=4),
     "factor_low": Column("95 % interval from", "1", digits=4),
     "factor_high": Column("to", "1", digits=4),
+    "log_half_by_readings": Column("± by the readings", "1", "%", 100.0, 2),
+    "log_half_by_model": Column("± by what the model leaves out", "1", "%", 100.0, 2),
     "determined": Column("determined by the readings"),
     "excitation_force": Column("force", "N"),
     "measured_amplitude": Column("measured", "m", "µm", 1e6),
@@ -280,7 +284,7 @@ def cell_text(value: Any, column: Column) -> str:
         return "" if value is None else str(value)
     if np.isinf(value):
         return "∞" if value > 0 else "-∞"
-    return "" if np.isnan(value) else f"{value * column.factor:.{column.digits}g}"
+    return "" if np.isnan(value) else plain_number(float(value * column.factor), column.digits)
 
 
 def is_number(text: str) -> bool:

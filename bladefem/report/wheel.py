@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newton_range, newtons
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.scatter_use import SHARE, ScatteredUse
 from ..study.mistuning.sector_comparison import SectorComparison, comparison_words
@@ -98,14 +99,14 @@ def pattern_headlines(
             "contact points apart, as of the tuned resonance)"
         )
         remark = (
-            f"blade {r.peak.blade + 1} under {r.load:.4g} N, {r.factor:.3g} times the "
+            f"blade {r.peak.blade + 1} under {newtons(r.load, 4)}, {r.factor:.3g} times the "
             f"{1e6 * r.tuned:.4g} µm of the tuned wheel by the same balance of all blades"
         )
         value = f"{1e6 * r.peak.height:.4g} µm"
         numbers.append(Headline("highest blade of the mistuned wheel", value, error, remark))
         if i < len(used):
             use = used[i]
-            remark = f"under {r.load:.4g} N; {use.tuned:.3g} on the tuned wheel"
+            remark = f"under {newtons(r.load, 4)}; {use.tuned:.3g} on the tuned wheel"
             upper = f"up to {use.bound:.3g} with the errors of mesh and loading history"
             name = "utilisation of that blade"
             if use.blade != r.peak.blade:
@@ -124,13 +125,13 @@ def pattern_drawings(
 ) -> dict[str, Callable[[Path], object]]:
     """Pictures of `shown_response`."""
     r = shown_response(found)
-    title = f"{r.load:g} N: blade {r.peak.blade + 1} is {r.factor:.3g} times the tuned wheel"
+    title = f"{newtons(r.load)}: blade {r.peak.blade + 1} is {r.factor:.3g} times the tuned wheel"
     return {
         "wheel/blades": lambda file: view.draw_blades(
             r.peak.by_blade, r.deviation[:, 0], r.tuned, title, file
         ),
         WHEEL_FIGURE: lambda file: view.draw_wheel_motion(
-            r.solution.size(), r.phase, f"{r.frequency:.5g} Hz, {r.load:g} N", file
+            r.solution.size(), r.phase, f"{r.frequency:.5g} Hz, {newtons(r.load)}", file
         ),
     }
 
@@ -249,7 +250,7 @@ def use_headlines(used: Sequence[ScatteredUse]) -> list[Headline]:
             f"utilisation that {100 * SHARE:g} % of wheels stay below",
             f"{one.share.value:.3g}",
             f"up to {_upper(one.highest)} with the errors of sample, mesh and loading history",
-            f"under {one.load:.4g} N; {one.tuned:.3g} on the tuned wheel",
+            f"under {newtons(one.load, 4)}; {one.tuned:.3g} on the tuned wheel",
         )
     ]
 
@@ -257,7 +258,7 @@ def use_headlines(used: Sequence[ScatteredUse]) -> list[Headline]:
 def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
     """The same in words, with what it assumes."""
     return [
-        f"utilisation under {one.load:.4g} N: {100 * SHARE:g} % of wheels stay below "
+        f"utilisation under {newtons(one.load, 4)}: {100 * SHARE:g} % of wheels stay below "
         f"{one.share.value:.3g} (95 % interval {one.share.low:.3g} to {_upper(one.share.high)}), "
         f"the tuned wheel uses {one.tuned:.3g}; with the upper ends of the errors of mesh and "
         f"loading history {_upper(one.highest)}; the highest blade is taken to move in the tuned "
@@ -281,7 +282,7 @@ def scatter_headlines(found: Amplification) -> list[Headline]:
     return [
         *numbers,
         Headline(
-            f"amplification at {found.loads[i]:.4g} N, where the tuned wheel is lowest",
+            f"amplification at {newtons(found.loads[i], 4)}, where the tuned wheel is lowest",
             f"{factor.value:.3g}",
             f"95 % interval {factor.low:.3g} to {_upper(factor.high)}",
             f"highest blade over the tuned wheel, {100 * SHARE:g} % of {found.peak.shape[1]} "
@@ -297,13 +298,13 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
     return [
         Headline(
             ROBUST_OPTIMUM,
-            f"{robust.load.value:.4g} N",
-            f"95 % interval {robust.load.low:.4g} to {robust.load.high:.4g} N",
+            f"{newtons(robust.load.value, 4)}",
+            f"95 % interval {newton_range(robust.load.low, robust.load.high)}",
             f"lowest amplitude that {words} stay below, by the bootstrap over the wheels",
         ),
         Headline(
             "optimum of the tuned wheel",
-            f"{load:.4g} N",
+            f"{newtons(load, 4)}",
             _bracket(found, load),
             f"{1e6 * height:.4g} µm where all blades are alike",
         ),
@@ -322,7 +323,7 @@ def _bracket(found: Amplification, load: float) -> str:
     upper = found.loads[found.loads > load]
     if not len(lower) or not len(upper):
         return "an end of the loads studied"
-    return f"between {lower.max():.4g} and {upper.min():.4g} N studied"
+    return f"between {lower.max():.4g} and {newtons(upper.min(), 4)} studied"
 
 
 def _upper(value: float) -> str:
@@ -340,7 +341,7 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
     if i is not None:
         q = found.quantile(i, 0.95)
         sentences.append(
-            f"at {found.loads[i]:g} N, where the tuned wheel is lowest, 95 % of "
+            f"at {newtons(found.loads[i])}, where the tuned wheel is lowest, 95 % of "
             f"{found.peak.shape[1]} wheels stay below {q.value:.3g} times it (95 % interval "
             f"{q.low:.3g} to {_upper(q.high)})"
         )
@@ -350,7 +351,7 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
     sentences.extend(_mean_sentences(found, held_means))
     if len(found.harmonics):
         parts = [
-            f"{load:g} N: {H} ({'unknown' if np.isnan(error) else f'{100 * error:.2g} %'})"
+            f"{newtons(load)}: {H} ({'unknown' if np.isnan(error) else f'{100 * error:.2g} %'})"
             for load, H, error in zip(found.loads, found.harmonics, found.truncation, strict=True)
         ]
         sentences.append(
@@ -378,7 +379,7 @@ def _comparison_sentences(found: Amplification) -> list[str]:
     """Loads under which the balance of all blades does not describe the wheel."""
     return [
         warning(
-            f"{found.loads[i]:g} N: "
+            f"{newtons(found.loads[i])}: "
             + comparison_words(
                 SectorComparison(found.tuned_balance[i], found.tuned_sector[i], agrees=False)
             )
@@ -404,8 +405,8 @@ def _law_sentences(found: Amplification) -> list[str]:
         if not known:
             continue
         text = (
-            f"{load:g} N: wheels by the law of one damper, harmonics 1 to {harmonics}; {checks} "
-            f"of them solved in full, from the lowest to the highest: the law is off by "
+            f"{newtons(load)}: wheels by the law of one damper, harmonics 1 to {harmonics}; "
+            f"{checks} of them solved in full, from the lowest to the highest: the law is off by "
             f"{error.min():+.2g} to {error.max():+.2g} % in amplification"
         )
         if checks < wheels:
@@ -435,7 +436,7 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
             continue
         if not known.any():
             said.append(
-                f"{found.loads[i]:g} N: mean displacements are held in the preload state, no "
+                f"{newtons(found.loads[i])}: mean displacements are held in the preload state, no "
                 "balance with free ones was found"
             )
             continue
@@ -443,9 +444,10 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
         kept = np.count_nonzero(~known)
         lost = f"; {kept} of these wheels keep their amplification with held ones" if kept else ""
         said.append(
-            f"{found.loads[i]:g} N: wheels solved in full have free mean displacements, dampers "
-            "walk where friction alone holds them, and so has the tuned wheel; against held ones "
-            f"this changes the tuned amplitude by {100 * (found.tuned[i] / held - 1):+.2g} % and "
+            f"{newtons(found.loads[i])}: wheels solved in full have free mean displacements, "
+            "dampers walk where friction alone holds them, and so has the tuned wheel; against "
+            "held ones this changes the tuned amplitude by "
+            f"{100 * (found.tuned[i] / held - 1):+.2g} % and "
             f"the amplification of {len(change)} wheels by {change.min():+.2g} to "
             f"{change.max():+.2g} %{lost}"
         )
@@ -465,10 +467,10 @@ def _optimum_sentences(found: Amplification) -> list[str]:
         ]
     (load, height), robust = optima_of_scatter(found)
     sentences = [
-        f"tuned optimum: {load:.4g} N, {1e6 * height:.4g} um",
+        f"tuned optimum: {newtons(load, 4)}, {1e6 * height:.4g} um",
         f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
-        f"{robust.load.value:.4g} N (95 % interval {robust.load.low:.4g} to "
-        f"{robust.load.high:.4g} N), {1e6 * robust.height.value:.4g} um "
+        f"{newtons(robust.load.value, 4)} (95 % interval "
+        f"{newton_range(robust.load.low, robust.load.high)}), {1e6 * robust.height.value:.4g} um "
         f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
         "between the loads studied both optima are those of a parabola, whose error the intervals "
         f"leave out: robust optimum {_bracket(found, robust.load.value)}",
@@ -504,7 +506,7 @@ def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]
     if i is not None:
         marks = {f"{100 * s:g} %": found.quantile(i, s).value for s in SCATTER_QUANTILES[:2]}
         drawings["wheel/scatter_histogram"] = partial(
-            view.draw_histogram, found.factor[i], marks, f"{found.loads[i]:g} N"
+            view.draw_histogram, found.factor[i], marks, f"{newtons(found.loads[i])}"
         )
     if len(found.loads) > 1:
         optima = marked_optima(found) if optimum_is_known(found) else []

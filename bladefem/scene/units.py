@@ -93,6 +93,10 @@ _NUMBER = re.compile(
 _POWER = re.compile(r"(.+?)\^?(-?\d)?")
 # letters of a unit text: longer ones are no units
 LONGEST_UNIT = 60
+# [N] from which forces are told in kN
+FIRST_KILONEWTONS = 1e4
+# from which a plain number is told by a power of ten
+FIRST_POWER_OF_TEN = 1e7
 
 
 def parse(
@@ -165,6 +169,43 @@ def show(value: float, unit: str = "1") -> str:
     """
     number, written = _scale_unit(value, unit or "1")
     return f"{number:.6g} {written}".rstrip()
+
+
+def newtons(force: float, digits: int = 6) -> str:
+    """A force in words of a report: in N, from ten thousand on in kN, so that no power of ten is
+    read.
+
+    >>> newtons(2.25), newtons(1100.0), newtons(49999.6, 4), newtons(0.0)
+    ('2.25 N', '1100 N', '50 kN', '0 N')
+    """
+    rounded = float(f"{force:.{digits}g}")
+    if abs(rounded) >= FIRST_KILONEWTONS:
+        return f"{plain_number(rounded / 1e3, digits)} kN"
+    return f"{plain_number(rounded, digits)} N"
+
+
+def newton_range(low: float, high: float, digits: int = 4) -> str:
+    """Two forces in the unit of the larger one.
+
+    >>> newton_range(900.0, 1100.0), newton_range(9000.0, 5e4)
+    ('900 to 1100 N', '9 to 50 kN')
+    """
+    text = newtons(high, digits)
+    factor = 1e-3 if text.endswith("kN") else 1.0
+    return f"{plain_number(low * factor, digits)} to {text}"
+
+
+def plain_number(value: float, digits: int = 6) -> str:
+    """So many significant digits without a power of ten, but for numbers that nobody would write
+    out: the rule of cells of tables and of forces in sentences.
+
+    >>> plain_number(5e4, 4), plain_number(123456.7, 4), plain_number(2.1e11, 4)
+    ('50000', '123500', '2.1e+11')
+    """
+    text = f"{value:.{digits}g}"
+    if "e+" in text and abs(value) < FIRST_POWER_OF_TEN:
+        return f"{float(text):.0f}"
+    return text
 
 
 def show_exactly(value: float, unit: str = "1") -> str:

@@ -2,13 +2,14 @@
 and normal load as factors on those of a model.
 
 Least squares on the logarithms of the amplitudes, with the exact sensitivities of the balance; the
-logarithms of the factors are sought, so that intervals are factors as well.
+logarithms of the factors are sought, so that intervals are factors as well. They hold what richer
+models change (`fit_truncation`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.optimize import OptimizeResult, least_squares
@@ -19,8 +20,11 @@ from ..hbm.parameters import vary
 from ..hbm.sensitivity import sensitivities
 from ..hbm.solution import Solution
 from ..hbm.solve import solve
+from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ..util.arrays import RealArray
+from .adaptive.indicators import ESTIMATE_OPTIONS
 from .fit_intervals import Knowledge, what_is_known
+from .fit_truncation import LeftOut, RicherBalance, left_out, richer_balances
 
 # factors that can be fitted: of the friction coefficient, the tangential and the normal stiffness,
 # both of these at once, and the normal load; each with its names in `hbm.parameters`
@@ -42,6 +46,8 @@ MAX_STARTS = 3
 LOST_RATIO = 0.1
 # misfit over the stated error with which no other start is tried
 ENOUGH_MISFIT = 1.5
+# of the half width of an interval by the readings: a shift by a richer model that counts little
+SMALL_SHIFT = 0.25
 # relative change of the sum of squares and of the logarithms at which a fit ends
 FIT_TOLERANCE = 1e-6
 
@@ -73,6 +79,15 @@ class ContactFit:
     # where it was not solved
     before: list[RealArray]
     fitted: list[RealArray]
+    # half widths (p,) of the 95 % intervals of the logarithms by the readings alone
+    half_by_readings: RealArray
+    # what richer models change, in the order in which they were given
+    left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def held(self) -> tuple[LeftOut, ...]:
+        """What is left out of the model and held by the intervals."""
+        return tuple(one for one in self.left_out if one.widens)
 
     def sentence(self) -> str:
         """What the data determine, and what they do not."""
@@ -90,6 +105,7 @@ class _Fit:
     error: float
     # of each level, the last motions that were solved
     known: list[list[Solution]] = field(default_factory=list)
+    options: Options = DEFAULT_OPTIONS
 
     def misfit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(k,) deviations of the logarithms over the error of measurement, and (k, p) derivatives.
@@ -110,10 +126,14 @@ class _Fit:
                 slopes.append(slope / self.error if lost else slope / (value * self.error))
         return np.array(values), np.array(slopes)
 
+    def solved(self, misfit: np.ndarray) -> np.ndarray:
+        """(k,) the deviations, NaN where the motion was not solved."""
+        lost = np.isclose(np.exp(self.error * misfit), LOST_RATIO, rtol=1e-9, atol=0)
+        return np.where(lost, np.nan, misfit)
+
     def amplitudes(self, misfit: np.ndarray) -> list[RealArray]:
         """Of each level, the amplitudes that have these deviations [m]; NaN where not solved."""
-        ratios = np.exp(self.error * misfit)
-        ratios[np.isclose(ratios, LOST_RATIO, rtol=1e-9, atol=0)] = np.nan
+        ratios = np.exp(self.error * self.solved(misfit))
         cuts = np.cumsum([len(level.omega) for level in self.levels])[:-1]
         measured = np.concatenate([level.amplitude for level in self.levels])
         return np.split(ratios * measured, cuts)
@@ -121,7 +141,7 @@ class _Fit:
     def _reading(self, i: int, model: ReducedModel, omega: float) -> tuple[float, np.ndarray]:
         """Amplitude [m] and its derivatives (p,) at one frequency; zeros where it is not solved."""
         start = min(self.known[i], key=lambda s: abs(s.omega - omega), default=None)
-        point = solve(model, omega, self.H, self.samples, start=start)
+        point = solve(model, omega, self.H, self.samples, start=start, options=self.options)
         if not point.converged:
             return 0.0, np.zeros(len(self.names))
         self.known[i] = [s for s in self.known[i] if s.omega != omega] + [point]
@@ -137,12 +157,18 @@ def fit_contact(
     H: int = 3,
     samples: int = 128,
     error: float = 0.05,
+    richer: Sequence[RicherBalance] | None = None,
+    start: RealArray | None = None,
 ) -> ContactFit:
     """Factors on the contact that bring the amplitudes of all levels closest to the measured ones.
 
     Args:
         names: of CONTACT_PARAMETERS.
         error: to which an amplitude was measured, relative.
+        richer: models that have what those of the levels leave out, by which the intervals are
+            widened; more harmonics and samples when left out.
+        start: (p,) factors to begin with; where a stiffness is sought several are tried when left
+            out.
 
     Raises:
         InputError: unknown names, no readings, or fewer of them than parameters.
@@ -153,22 +179,59 @@ def fit_contact(
     fit = _Fit(levels, chosen, H, samples, error, [[] for _ in levels])
     begun, _ = fit.misfit(np.zeros(len(chosen)))
     ends: list[OptimizeResult] = []
-    for start in _starts(fit):
-        ends.append(_least_squares(fit, start))
+    for first in _starts(fit) if start is None else [np.log(start)]:
+        ends.append(_least_squares(fit, first))
         if np.mean(ends[-1].fun ** 2) < ENOUGH_MISFIT**2:
             break
     end = min(ends, key=lambda one: float(one.cost))
     fitted = fit.amplitudes(end.fun)
     if all(np.isnan(part).all() for part in fitted):
         raise NotSolvedError("no measured level could be solved with any contact")
+    known = what_is_known(end.x, lambda x: fit.misfit(x)[0], end.jac, chosen)
+    if richer is None:
+        richer = richer_balances([level.model for level in levels], H, samples)
+    left = tuple(_left_out(fit, end, one, SMALL_SHIFT * known.half) for one in richer)
+    shifts = [abs(one.shift) for one in left if one.widens]
+    together = np.sum([np.zeros(len(chosen)), *shifts], axis=0)
     return ContactFit(
         chosen,
         np.exp(end.x),
-        what_is_known(end.x, lambda x: fit.misfit(x)[0], end.jac, chosen),
+        known.widened(together, chosen),
         float(np.sqrt(np.mean(end.fun**2))),
         fit.amplitudes(begun),
         fitted,
+        known.half,
+        left,
     )
+
+
+def _left_out(fit: _Fit, end: OptimizeResult, richer: RicherBalance, small: RealArray) -> LeftOut:
+    """What a richer model changes at the end of a fit."""
+    models = zip(fit.levels, richer.models, strict=True)
+    levels = [replace(level, model=model) for level, model in models]
+    starts = [
+        [start for point in points if (start := _as_start(point, level.model, richer.H))]
+        for level, points in zip(levels, fit.known, strict=True)
+    ]
+    other = _Fit(levels, fit.names, richer.H, richer.samples, fit.error, starts, ESTIMATE_OPTIONS)
+
+    def deviations(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        values, J = other.misfit(x)
+        return other.solved(values), J
+
+    return left_out(richer, deviations, end.x, np.isfinite(fit.solved(end.fun)), small)
+
+
+def _as_start(point: Solution, model: ReducedModel, H: int) -> Solution | None:
+    """A motion as a start for one of other harmonics on the same contact points; None where the
+    points are others.
+    """
+    if point.w.shape[:2] != (len(model.elements.kt), model.directions):
+        return None
+    kept = min(point.w.shape[2], 2 * H + 1)
+    w = np.zeros((*point.w.shape[:2], 2 * H + 1))
+    w[..., :kept] = point.w[..., :kept]
+    return replace(point, w=w)
 
 
 def _starts(fit: _Fit) -> list[np.ndarray]:

@@ -5,7 +5,7 @@ parameters that the data leave open, alone or together.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -45,6 +45,22 @@ class Knowledge:
         """(p,) determined within a factor of two on both sides."""
         low, high = self.intervals.T
         return (self.half < UNKNOWN_LOG_HALF_WIDTH) & (low > 0) & np.isfinite(high)
+
+    def widened(self, by: RealArray, names: Sequence[str]) -> Knowledge:
+        """With an error of the model that all readings share.
+
+        Args:
+            by: (p,) shifts of the logarithms, not negative.
+            names: of the parameters.
+        """
+        half = np.minimum(self.half + by, MAX_LOG_HALF_WIDTH)
+        ends = self.intervals * np.exp(np.outer(np.minimum(by, MAX_LOG_HALF_WIDTH), SIDES))
+        # beyond what is told nothing is known on either side
+        ends[half >= MAX_LOG_HALF_WIDTH] = 0.0, np.inf
+        wide = replace(self, half=half, intervals=ends)
+        told = {name for one in self.open for name in one}
+        lost = [n for n, k in zip(names, wide.known, strict=True) if not k and n not in told]
+        return replace(wide, open=[*self.open, *((name,) for name in lost)])
 
     def sentence(self, what: str) -> str:
         """What the data leave open, in words.

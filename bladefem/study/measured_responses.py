@@ -3,45 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import pi
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..hbm.parameters import vary as vary_model
 from ..scene.tables import Scene
 from ..scene.toml import vary
 from ..scene.units import parse
 from ..util.arrays import RealArray
 from ..util.communicator import Communicator
 from ..util.progress import Progress, without_progress
-from .adaptive.family import family_member
+from .adaptive.settings import Settings
 from .contact_identification import CONTACT_PARAMETERS, ContactFit, MeasuredLevel, fit_contact
+from .fit_intervals import MAX_LOG_HALF_WIDTH
+from .measured_models import MeasuredModels, Readings, first_fit_settings, measured_models
 from .pipeline import pipeline
-from .pipeline.case_models import family_of_case, load_cases
 from .pipeline.run_records import ReducedRun
 from .pipeline.stage_runner import Folder
 
 # column of the file to the unit inside; the first two may be left out for those of the scene
 COLUMNS = {"load": "N", "force": "N", "frequency": "Hz", "amplitude": "m"}
 OPTIONAL_COLUMNS = ("load", "force")
-# of the balance: three harmonics leave up to 6 % of plane blades whose dampers lift off
-FEWEST_HARMONICS = 7
-FEWEST_SAMPLES = 128
-
-
-@dataclass(frozen=True)
-class Readings:
-    """k readings at the probe."""
-
-    # (k,) normal load of a seat and size of the excitation [N]
-    load: RealArray
-    force: RealArray
-    # (k,) [Hz], and root of the sum of squares of the moving harmonics [m]
-    frequency: RealArray
-    amplitude: RealArray
+# of the half width of an interval by the readings: up to such a shift by a richer model the
+# interval is widened, beyond it a richer model is fitted
+ENOUGH_SHIFT = 0.5
+# fits with richer models, each of which begins where the last one ended
+MOST_ENRICHMENTS = 4
 
 
 @dataclass(frozen=True)
@@ -56,9 +45,8 @@ class FittedScene:
     # (k,) by the contact of the scene as it is, and by the fitted one [m]; NaN where not solved
     before: RealArray
     fitted: RealArray
-    # harmonics and samples of the balance
-    harmonics: int
-    samples: int
+    # the model that was fitted
+    settings: Settings
 
     @property
     def scene_values(self) -> dict[str, float]:
@@ -191,15 +179,56 @@ def fit_scene(
     check_parameters(names, scene)
     loads = tuple(float(load) for load in np.unique(readings.load))
     run = pipeline.run(vary(scene, study__loads=loads), folder, "reduction", comm, progress)
-    H = max(run.settings.harmonics, FEWEST_HARMONICS)
-    levels, order = _levels(run, readings, H)
+    models = measured_models(run, readings)
+    settings = first_fit_settings(run.settings)
+    levels, order = models.levels(settings)
     chosen = tuple(names) or _parameters_of(scene, levels)
-    samples = max(run.settings.samples, FEWEST_SAMPLES, 8 * (H + 1))
-    fit = fit_contact(levels, chosen, H, samples, error)
+    first = fit = _fitted(models, settings, chosen, error)
+    for _ in range(MOST_ENRICHMENTS):
+        more = _missing(models, settings, fit)
+        if more is None:
+            break
+        settings = more
+        fit = _fitted(models, settings, chosen, error, fit.factors)
     before, fitted = (np.empty(len(order)) for _ in range(2))
-    before[order] = np.concatenate(fit.before)
+    before[order] = np.concatenate(first.before)
     fitted[order] = np.concatenate(fit.fitted)
-    return FittedScene(run, readings, fit, error, before, fitted, H, samples)
+    return FittedScene(run, readings, fit, error, before, fitted, settings)
+
+
+def _fitted(
+    models: MeasuredModels,
+    settings: Settings,
+    names: tuple[str, ...],
+    error: float,
+    start: RealArray | None = None,
+) -> ContactFit:
+    """With a model of these settings, its intervals widened by what richer ones change."""
+    levels, _ = models.levels(settings)
+    richer = models.richer(settings)
+    H, samples = settings.harmonics, settings.samples
+    return fit_contact(levels, names, H, samples, error, richer, start)
+
+
+def _missing(models: MeasuredModels, settings: Settings, fit: ContactFit) -> Settings | None:
+    """Settings richer in what moves some parameter most, against its interval by the readings;
+    None where nothing moves any by much, or no more can be had.
+    """
+    told = fit.half_by_readings < MAX_LOG_HALF_WIDTH
+    if not told.any():
+        return None
+    sizes = {
+        one.what: float((abs(one.shift) / fit.half_by_readings)[told].max())
+        for one in fit.left_out
+        if one.widens
+    }
+    for what in sorted(sizes, key=sizes.__getitem__, reverse=True):
+        if sizes[what] <= ENOUGH_SHIFT:
+            break
+        more = models.enriched(settings, what, sizes[what] / ENOUGH_SHIFT)
+        if more is not None:
+            return more
+    return None
 
 
 def _parameters_of(scene: Scene, levels: Sequence[MeasuredLevel]) -> tuple[str, ...]:
@@ -209,29 +238,3 @@ def _parameters_of(scene: Scene, levels: Sequence[MeasuredLevel]) -> tuple[str, 
     if all((level.model.elements.kn > 0).any() for level in levels):
         return ("mu", "kt", "kn", "load")
     return ("mu", "kt", "load")
-
-
-def _levels(run: ReducedRun, readings: Readings, H: int) -> tuple[list[MeasuredLevel], np.ndarray]:
-    """Readings by load and force with their models, and the numbers of the readings in that
-    order.
-
-    Args:
-        H: harmonics of the balance: on a wheel each needs the sector in its own nodal diameter.
-    """
-    settings = replace(run.settings, harmonics=H)
-    scene = run.scene
-    patches = list(run.contact.problem.patches)
-    models = {}
-    for case in load_cases(scene, run.mesh, run.contact):
-        family = family_of_case(scene, run.mesh, run.reduced, patches, case)
-        models[case.load] = family_member(family, settings).model
-    levels, order = [], []
-    for load, model in models.items():
-        for force in np.unique(readings.force[readings.load == load]):
-            rows = np.flatnonzero((readings.load == load) & (readings.force == force))
-            rows = rows[np.argsort(readings.frequency[rows])]
-            driven = vary_model(model, "force", float(force) / scene.excitation.force)
-            omega = 2 * pi * readings.frequency[rows]
-            levels.append(MeasuredLevel(driven, omega, readings.amplitude[rows]))
-            order.append(rows)
-    return levels, np.concatenate(order)

@@ -17,6 +17,7 @@ from matplotlib.tri import Triangulation
 from bladefem.contact.resultants import resultant
 from bladefem.data import Patch, PressureMap
 
+from ..scene.units import newtons
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
@@ -102,7 +103,7 @@ def save_pressure_vtu(states: Mapping[float, Sequence[PressureMap]], file: str |
             ("gap [m]", "gap"),
             ("normal force [N]", "force"),
         ):
-            fields[f"{name} at {load:.6g} N"] = np.concatenate(
+            fields[f"{name} at {newtons(load)}"] = np.concatenate(
                 [getattr(seat, values) for seat in seats]
             )
     return save_faces_vtu([seat.patch for seat in next(iter(states.values()))], fields, file)
@@ -228,7 +229,7 @@ def caption(seat: PressureMap, between: str = ",\n") -> str:
     """Resultant, peak and pressed share of one face."""
     row = pressure_summary([seat]).iloc[0]
     return (
-        f"{seat_name(seat.patch)}: {row.force:.4g} N, peak {row.peak_pressure / 1e6:.3g} "
+        f"{seat_name(seat.patch)}: {newtons(row.force, 4)}, peak {row.peak_pressure / 1e6:.3g} "
         f"MPa{between}{100 * row.contact_share:.0f} % of {1e6 * row.area:.3g} mm² pressed"
     )
 

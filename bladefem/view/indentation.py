@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 
 from bladefem.data import PressureMap
 
+from ..scene.units import newtons
 from .contact import OPEN_FACE_COLOUR, PRESSURE_COLOURS, colour_pressure
 from .style import COLOURS, canvas, headline
 
@@ -56,7 +57,7 @@ def draw_indentation(
                 axes[0, 0], seats[largest], edge, 1.5 * _inner(seats[largest], radius, edge)
             )
             axes[0, 0].set_title(
-                f"load {largest:.5g} N, meshed quarter", fontsize=9, fontweight="normal"
+                f"load {newtons(largest, 5)}, meshed quarter", fontsize=9, fontweight="normal"
             )
         _over_radius(axes[0, -1], seats, radius, exact, edge)
         axes[0, -1].set_xlabel(
@@ -125,7 +126,7 @@ def _over_radius(
             "o",
             ms=2.5,
             color=COLOURS[i % len(COLOURS)],
-            label=f"finite elements, {load:.5g} N",
+            label=f"finite elements, {newtons(load, 5)}",
         )
     inner = max(_inner(seat, radius, edge) for seat in seats.values())
     ax.set(

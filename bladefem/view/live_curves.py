@@ -9,6 +9,7 @@ import matplotlib.colors
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newtons
 from .optimum import exact_optimum
 from .response import load_colours, load_name, pieces_of, smooth_curve
 from .style import COLOURS, FAILED_COLOUR
@@ -156,7 +157,7 @@ def live_optimum(
         if exact is not None:
             shapes += _tolerated_band(exact, colour)
     if own is not None:
-        shapes.append(_level_line("x", own, "dot", f"own load {own:.4g} N", "end"))
+        shapes.append(_level_line("x", own, "dot", f"own load {newtons(own, 4)}", "end"))
     finite = summary[np.isfinite(summary["load"]) & (summary["load"] > 0)]
     loads = _log_axis(finite["load"])
     layout = {
@@ -212,7 +213,7 @@ def _optimum_curve(
         "marker": {"symbol": symbols, "size": 7, "color": colours},
         "error_y": {"type": "data", "array": json_numbers(bars), "thickness": 1},
         "text": hover,
-        "hovertemplate": "%{x:.4g} N, %{y:.4g} µm<br>%{text}<extra></extra>",
+        "hovertemplate": "%{x:.4~r} N, %{y:.4g} µm<br>%{text}<extra></extra>",
     }
     lower = {
         **common,
@@ -220,7 +221,7 @@ def _optimum_curve(
         "xaxis": "x2",
         "yaxis": "y2",
         "showlegend": False,
-        "hovertemplate": "%{x:.4g} N, %{y:.6g} Hz<extra></extra>",
+        "hovertemplate": "%{x:.4~r} N, %{y:.6g} Hz<extra></extra>",
     }
     best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
     return [upper, lower, *_optimum_stars(best, name, colour)]
@@ -241,7 +242,7 @@ def _optimum_stars(best: pd.Series, name: str, colour: str) -> list[dict[str, An
         "x": json_numbers([best["load"]]),
         "marker": {"symbol": "star", "size": 15, "color": colour, "line": {"width": 1}},
     }
-    words = "best load %{x:.4g} N, "
+    words = "best load %{x:.4~r} N, "
     return [
         {
             **star,

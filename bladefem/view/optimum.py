@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newton_range, newtons
 from .response import load_name
 from .style import COLOURS, FAILED_COLOUR, canvas, log_axis
 
@@ -63,7 +64,7 @@ def draw_optimum(
                     color="#555555",
                     lw=1.2,
                     ls=(0, (1, 1)),
-                    label=f"the damper's own load, {own:.4g} N" if axis is axes[0] else None,
+                    label=f"the damper's own load, {newtons(own, 4)}" if axis is axes[0] else None,
                 )
         axes[0].set(ylabel="resonance amplitude [µm]", title=title or "optimum load")
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
@@ -108,7 +109,7 @@ def draw_optimum_curve(
     best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
     if exact is not None:
         _draw_tolerated_loads(axes, exact, colour)
-    text = f"optimum {best['load']:.4g} N: {MICRO * best['peak_amplitude']:.4g} µm"
+    text = f"optimum {newtons(best['load'], 4)}: {MICRO * best['peak_amplitude']:.4g} µm"
     free = table.loc[table["load"] == 0, "peak_amplitude"]
     if len(free):
         text += f"\n{100 * (1 - best['peak_amplitude'] / free.iloc[0]):.1f} % below the free blade"
@@ -147,7 +148,7 @@ def _draw_tolerated_loads(axes: Any, exact: pd.Series, colour: str) -> None:
     low, high = exact.get("tolerated_from", np.nan), exact.get("tolerated_to", np.nan)
     if not (np.isfinite(low) and np.isfinite(high)):
         return
-    label = f"{low:.3g} to {high:.3g} N: within accuracy of the optimum"
+    label = f"{newton_range(low, high, 3)}: within accuracy of the optimum"
     for axis, words in zip(axes, (label, None), strict=True):
         axis.axvspan(low, high, color=colour, alpha=0.12, lw=0, label=words, zorder=0)
 

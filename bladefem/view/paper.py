@@ -15,6 +15,7 @@ from matplotlib.tri import Triangulation
 from bladefem.damper.zmass import Footprint
 from bladefem.data import PressureMap
 
+from ..scene.units import newtons
 from .style import COLOURS, canvas, log_axis
 
 MICRO = 1e6
@@ -91,7 +92,7 @@ def draw_footprint(
             xlabel="x [mm]",
             ylabel="y [mm]",
             aspect="equal",
-            title=f"{seat.force.sum():.4g} N, mean {mean / 1e3:.4g} kPa",
+            title=f"{newtons(seat.force.sum(), 4)}, mean {mean / 1e3:.4g} kPa",
         )
         place = MILLI * points.points
         share = len(points.share) * points.share
@@ -297,7 +298,7 @@ def draw_histories(
                     "o-",
                     ms=3.5,
                     color=shades[load],
-                    label=f"{load:g} N: {error:.3g} % off",
+                    label=f"{newtons(load)}: {error:.3g} % off",
                 )
             ax.axhline(wanted, color="#888888", ls="--", lw=1)
             ax.set(xlabel="turn", title=way)

@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import PchipInterpolator
 
+from ..scene.units import newtons
 from .style import FAILED_COLOUR, canvas, log_axis
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def load_colours(loads: np.ndarray) -> dict[float, Any]:
 
 def load_name(load: float) -> str:
     """ "250 N", or the name of the limit."""
-    return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, f"{load:.4g} N")
+    return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, f"{newtons(load, 4)}")
 
 
 def draw_curve(

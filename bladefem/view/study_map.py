@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from ..scene.units import newtons
 from .style import COLOURS, canvas, log_axis
 
 MICRO = 1e6
@@ -41,7 +42,9 @@ def draw_map(
         ax.grid(False)
         best = np.nanargmin(amplitude) if np.isfinite(amplitude).any() else -1
         for number, (value, at) in enumerate(zip(amplitude.flat, load.flat, strict=True)):
-            shown = f"{MICRO * value:.4g} µm\n{at:.4g} N" if np.isfinite(value) else "not solved"
+            shown = (
+                f"{MICRO * value:.4g} µm\n{newtons(at, 4)}" if np.isfinite(value) else "not solved"
+            )
             red, green, blue, _ = image.cmap(image.norm(MICRO * value))
             dark = 0.3 * red + 0.59 * green + 0.11 * blue < DARK_LUMINANCE
             ax.text(

@@ -17,6 +17,7 @@ from ..hbm.model import ReducedModel
 from ..hbm.solution import Solution
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
+from ..scene.units import newtons
 from ..util.arrays import BooleanArray, IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
@@ -222,7 +223,7 @@ def _statistics_of_load(
     mine = range(rank, len(patterns), ranks)
     tuned = search(load, TUNED_PATTERN)
     rows = np.zeros((7, len(patterns)))
-    for j in progress(list(mine), f"wheels under {load:g} N", len(mine)):
+    for j in progress(list(mine), f"wheels under {newtons(load)}", len(mine)):
         found = search(load, patterns[j])
         # where the tuned wheel has no free means, the others' do not count
         peak = found.held if tuned.free is None else found.peak

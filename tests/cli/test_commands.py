@@ -51,7 +51,13 @@ def fake_curve(load, amplitude):
 
 def fake_limit(load, frequency):
     return SimpleNamespace(
-        load=load, peak_frequency=frequency, peak_amplitude=8e-5, frequency=np.arange(3.0)
+        load=load,
+        peak_frequency=frequency,
+        peak_amplitude=8e-5,
+        frequency=np.arange(3.0),
+        error=0.002,
+        halved=np.nan,
+        body_mesh=0.001,
     )
 
 
@@ -355,8 +361,10 @@ def test_results_of_another_scene_are_put_away(pipeline, tmp_path, capsys):
     assert main([*mesh, "--set", "contact.mu=0.2"]) == 0
     said = capsys.readouterr().err
     assert (
-        said == f"bladefem: {tmp_path} holds results of another scene: 3 files moved to "
-        f"{tmp_path / 'earlier'}\n"
+        said == f"bladefem: {tmp_path} holds results of another scene, which differs in "
+        f"contact.mu: first.png, given.json, report.html are moved to {tmp_path / 'earlier'}, "
+        "since tables and reports have one scene; stored stages stay, and those that do not depend "
+        "on it are not computed again; another folder, -o, keeps both\n"
     )
     assert {p.name for p in (tmp_path / "earlier").iterdir()} == {
         "report.html",

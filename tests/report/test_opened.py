@@ -20,6 +20,7 @@ from bladefem.report.response_arrays import (
     loop_arrays,
     node_arrays,
     resonance_arrays,
+    stability_arrays,
 )
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump_scene
@@ -258,3 +259,53 @@ def test_files_of_a_run_in_memory_are_refused():
 def test_an_unknown_stage_is_refused_before_any_work():
     with pytest.raises(InputError, match="until = 'respons'.*did you mean 'response'"):
         pipeline.run(Scene(), None, until="respons")
+
+
+def test_stability_is_a_flag_that_xarray_reads(tmp_path):
+    """Every verdict with its kind, the linear limits, and curves without a point there."""
+    table = points()
+    table["method"] = np.where(np.isfinite(table["load"]) & (table["load"] > 0), "", "linear")
+    told = {
+        1: ("unstable", "fold", 1.2),
+        2: ("unstable", "period doubling", 1.3),
+        3: ("unstable", "torus", 1.4),
+        4: ("stable", "", 0.9),
+        5: ("unknown", "", np.nan),
+        6: ("unstable", "", 1.1),
+    }
+    rows = table.index[table["load"] == 200.0]
+    for name in ("stability", "bifurcation"):
+        table[name] = np.where(table["method"] == "linear", None, "")
+    table["multiplier"] = np.nan
+    for place, values in told.items():
+        table.loc[rows[place], ["stability", "bifurcation", "multiplier"]] = values
+    write_results(
+        tmp_path / "results.nc",
+        {"response": curve_arrays(table), "stability": stability_arrays(table)},
+    )
+    data = xr.open_dataset(tmp_path / "results.nc", group="stability", engine="h5netcdf")
+    flag = data["verdict"]
+    meanings = flag.attrs["flag_meanings"].split()
+    assert len(meanings) == len(flag.attrs["flag_values"])
+    assert flag.attrs["flag_values"].dtype == flag.encoding["dtype"] == np.int8
+    words = {
+        1: "unstable_fold",
+        2: "unstable_period_doubling",
+        3: "unstable_torus",
+        4: "stable",
+        5: "not_judged",
+        6: "unstable",
+    }
+    for place, word in words.items():
+        at = {"load": 200.0, "frequency": table.loc[rows[place], "frequency"]}
+        assert meanings[int(flag.sel(at))] == word
+        assert float(data["multiplier"].sel(at)) == pytest.approx(told[place][2], nan_ok=True)
+    free = flag.sel(load=0.0)
+    assert {meanings[int(number)] for number in free.dropna("frequency")} == {"unique"}
+    # where a curve has no point there is no verdict
+    assert np.array_equal(np.isnan(flag), np.isnan(curve_arrays(table)["converged"]))
+
+
+def test_stability_that_was_not_asked_for_is_not_judged():
+    flag = stability_arrays(points())["verdict"]
+    assert set(flag.to_numpy()[np.isfinite(flag)]) == {0.0}

@@ -37,7 +37,13 @@ def curve(load, amplitude):
 def response(*amplitudes):
     limits = [
         SimpleNamespace(
-            load=load, peak_frequency=800.0, peak_amplitude=1e-4, frequency=np.arange(3.0)
+            load=load,
+            peak_frequency=800.0,
+            peak_amplitude=1e-4,
+            frequency=np.arange(3.0),
+            error=0.002,
+            halved=np.nan,
+            body_mesh=0.001,
         )
         for load in (0.0, np.inf)
     ]

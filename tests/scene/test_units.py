@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene.units import parse, show, show_exactly
+from bladefem.scene.units import newton_range, newtons, parse, plain_number, show, show_exactly
 
 # The right column is worked out by hand, not by the table of units.
 VALUES = [
@@ -117,3 +117,30 @@ def test_exact_text_brings_the_very_same_number_back(unit):
         *(rng.standard_normal(200) * 10.0 ** rng.integers(-12, 12, 200)),
     ]:
         assert parse(show_exactly(value, unit), unit) == value
+
+
+@pytest.mark.parametrize(
+    ("force", "said"),
+    [
+        (0.0, "0 N"),
+        (2.25, "2.25 N"),
+        (9999.4, "9999 N"),
+        (9999.6, "10 kN"),
+        (5e4, "50 kN"),
+        (123456.0, "123.5 kN"),
+        (3.4e7, "34000 kN"),
+        (-5e4, "-50 kN"),
+    ],
+)
+def test_forces_in_sentences_have_no_powers_of_ten(force, said):
+    assert newtons(force, 4) == said
+
+
+def test_two_forces_share_a_unit():
+    assert newton_range(9000.0, 5e4, 3) == "9 to 50 kN"
+    assert newton_range(900.0, 1100.0) == "900 to 1100 N"
+
+
+def test_cells_write_out_what_people_do():
+    assert plain_number(49999.0, 4) == "50000"
+    assert plain_number(4.2e7, 2) == "4.2e+07" and plain_number(1e-9, 4) == "1e-09"

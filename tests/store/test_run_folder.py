@@ -52,6 +52,28 @@ def test_results_go_with_their_scene_and_stages_stay(tmp_path):
     assert (tmp_path / "earlier" / "report.md").read_text() == "first"
 
 
+def test_what_is_put_away_is_told_before_it_is(tmp_path):
+    """Other numbers of wheels: the files of the run are named, and what keeps them."""
+    take_folder(tmp_path, Scene())
+    names = [f"{letter}.csv" for letter in "abcde"]
+    for name in names:
+        (tmp_path / name).write_text("first")
+    told = []
+
+    def tell(sentence):
+        told.append(sentence)
+        assert {name for name in names if (tmp_path / name).exists()} == set(names)
+
+    other = vary(Scene(), mistuning__friction=0.07)
+    assert "5 files moved" in take_folder(tmp_path, other, None, tell)
+    (sentence,) = told
+    assert "differs in mistuning.friction: a.csv, b.csv, c.csv and 2 more" in sentence
+    assert "stages stay" in sentence and "-o" in sentence
+    # nothing is left to be told of
+    take_folder(tmp_path, Scene(), None, tell)
+    assert len(told) == 1
+
+
 def test_files_of_a_mesh_stay_while_it_is_the_same(tmp_path):
     take_folder(tmp_path, Scene())
     for name in ("mesh.vtu", "named_mesh.msh", "report.md"):

@@ -98,6 +98,51 @@ def test_intervals_hold_what_they_promise(readings):
     assert high / low < 1.3
 
 
+@pytest.mark.parametrize("noise", [0.003, 0.01])
+def test_intervals_hold_what_a_balance_of_one_harmonic_leaves_out(readings, noise):
+    """Of 12 sets of a marched mass; by the readings alone no interval of mu holds the true one."""
+    rng = np.random.default_rng(3)
+    held, alone = [], []
+    for _ in range(12):
+        noisy = readings * (1 + noise * rng.normal(size=readings.shape))
+        fit = fit_contact(levels_of(noisy, **TRUE), ("mu", "kt"), H=1, samples=64, error=noise)
+        low, high = fit.knowledge.intervals.T
+        held.append((low < 1) & (high > 1))
+        alone.append(abs(np.log(fit.factors[0])) < fit.half_by_readings[0])
+        assert fit.knowledge.known.all()
+    assert np.mean(held, axis=0).min() >= 0.9
+    assert np.mean(alone) < 0.2
+    harmonics = fit.left_out[0]
+    assert harmonics.what == "harmonics" and not harmonics.unsolved
+    # a step towards the richer model: the true value is 0.77 % lower
+    assert harmonics.shift[0] == pytest.approx(-0.0077, rel=0.35)
+
+
+def test_a_model_of_seven_harmonics_leaves_little_out(readings):
+    fit = fit_contact(levels_of(readings, **TRUE), ("mu", "kt"), H=7, samples=256, error=0.01)
+    for one in fit.left_out:
+        assert (abs(one.shift) < 0.5 * fit.half_by_readings).all(), one
+
+
+def test_a_richer_model_that_is_not_solved_leaves_the_contact_open(readings, monkeypatch):
+    fit = fit_contact(levels_of(readings, **TRUE), ("mu",), H=1, samples=64, richer=())
+    assert fit.knowledge.known.all() and not fit.left_out
+    levels = levels_of(readings, **TRUE)
+    from bladefem.study import contact_identification as module
+
+    whole = module.solve
+
+    def solved_with_one(model, omega, H, *rest, **more):
+        point = whole(model, omega, H, *rest, **more)
+        return point if H == 1 else replace(point, converged=False)
+
+    monkeypatch.setattr(module, "solve", solved_with_one)
+    fit = fit_contact(levels, ("mu",), H=1, samples=64)
+    assert fit.left_out[0].unsolved == readings.size
+    assert not fit.knowledge.known.any() and fit.knowledge.open == [("mu",)]
+    assert fit.knowledge.intervals.tolist() == [[0.0, np.inf]]
+
+
 def test_a_constant_normal_load_and_friction_are_known_by_their_product():
     """Two factors on one limit, told as such; the stiffness is known."""
     true, force = single_mass(kt=1.0, limit=0.5), 1.0

@@ -3,6 +3,7 @@ limit cycle of fed waves against the balance; bad input.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from bladefem.study.pipeline.case_models import family_of_case, load_cases
 from bladefem.study.pipeline.coriolis import has_coriolis, with_coriolis
 from bladefem.study.pipeline.damped_motion import damped_motion
 from bladefem.study.pipeline.flow import scene_flow
+from bladefem.study.pipeline.seated_loads import seat_at_loads
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.solve import solve_wheel
@@ -122,6 +124,43 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
     assert tables["response/flutter"]["limit_cycle"][0] == held.amplitude
     assert list(tables["response/flutter"]["nodal_diameter"]) == found.fed
     assert len(flow_headlines(shown)) == len(flow_drawing(shown)) == 1
+
+
+def test_flutter_is_told_under_the_best_load_that_a_search_found(reduced, monkeypatch):
+    """By a factor on what is known; where friction does not hold it, by a message."""
+    clock = StageClock({}, [])
+    keep = StageRunner(None, None, clock)
+    (case,) = load_cases(reduced.scene, reduced.mesh, reduced.contact)
+    best = 1.5 * case.load
+    contact = seat_at_loads(reduced.scene, reduced.contact, [case.load, best], clock)
+    curve = SimpleNamespace(load=best, mass=None)
+    response = SimpleNamespace(curves=[curve], best_curve=0)
+    run = SimpleNamespace(
+        scene=reduced.scene,
+        mesh=reduced.mesh,
+        contact=contact,
+        reduced=reduced.reduced,
+        settings=reduced.settings,
+        response=response,
+    )
+    held = subject.HeldFlutter(case.load, None, -10, 2e-6, 380.0, 3e-3, 0.01)
+    net = np.array([1e-3, -1e-3])
+    found = subject.FlutterResult(0 * net, net - 1e-3, net, (held,))
+    both = subject.with_best_load(found, run, None, [], keep).held
+    assert both[0] == held
+    assert both[1].load == best and both[1].amplitude == pytest.approx(3e-6, rel=1e-6)
+    # nothing to add where it was asked for
+    curve.load = case.load
+    assert subject.with_best_load(found, run, None, [], keep) is found
+    curve.load = best
+
+    def refused(*_):
+        raise InputError("waves: flutter, no limit cycle")
+
+    monkeypatch.setattr(subject, "_by_scale", lambda *_: None)
+    monkeypatch.setattr(subject, "_held_anew", refused)
+    assert subject.with_best_load(found, run, None, [], keep) is found
+    assert "best load" in clock.messages[-1] and "no limit cycle" in clock.messages[-1]
 
 
 def test_limit_cycles_of_other_loads_are_scaled(reduced):

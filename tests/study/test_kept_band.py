@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models import rebounding
+from models import bouncing, rebounding
 
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.ring_march import PERIODS_AT_ONCE, never_enough
@@ -445,3 +446,18 @@ def test_stability_is_asked_of_all_contact_points_and_of_the_fewest_that_tell(mo
     monkeypatch.setattr(finer_contacts, "_judged", lambda *_: None)
     assert unstable_with_more_points(models, settings, point, STABLE) is None
     assert unstable_with_more_points(models, replace(settings, points=None), point, STABLE) is None
+
+
+def test_a_march_that_is_too_long_is_told_in_seconds_and_what_shortens_it():
+    """No count of operations, and no power of ten, which nobody can act on."""
+    band = module.band_by_steps(bouncing(), solve(bouncing(), 1.3, 7, 256), counted=1e3)
+    assert band.too_long
+    assert re.search(r"takes (less than|about) \d+ (s|min) of one core", band.reason)
+    assert "contact.points" in band.reason and not re.search(r"\de\+\d|operations", band.reason)
+
+
+def test_steps_of_an_exact_march_that_is_too_long_are_told_alike(monkeypatch):
+    monkeypatch.setattr(module, "MAX_STEPS", 1e4)
+    model = rebounding(10.0, 0.1, 0.04)
+    reason = module.exact_band(model, solve(model, 3.0, 15, 1024)).reason
+    assert "of one core" in reason and not re.search(r"\de\+\d|steps", reason)

@@ -58,10 +58,17 @@ def test_command_finds_the_contact_of_the_readings(measured, tmp_path, capsys):
     assert factors == pytest.approx([TRUE["mu"] / scene.contact.mu, TRUE["stiffness"]], rel=0.03)
     assert (table["factor_low"] < factors).all() and (factors < table["factor_high"]).all()
     assert list(table["determined"]) == ["yes", "yes"]
+    # the intervals hold both what readings and what the model leave open
+    both = table["log_half_by_readings"] + table["log_half_by_model"]
+    assert (table["log_half_by_model"] > 0).all()
+    half = np.log(table["factor_high"].to_numpy() / factors)
+    assert half == pytest.approx(both.to_numpy(), rel=1e-4)
     readings = pd.read_csv(tmp_path / "fit_readings.csv")
     assert abs(readings["off"]).max() < 0.05
     said = capsys.readouterr().out
     assert "for the scene, under [contact]: mu = 0.3" in said
+    # 16 mm are far too large for frequencies to be those of a measured blade
+    assert "estimated error of the mesh of blade and damper would move mu by" in said
     assert (tmp_path / "fit.png").is_file() and (tmp_path / "report_fit.html").is_file()
 
 

@@ -86,7 +86,13 @@ def response(*amplitudes):
     """As study.pipeline.Response, of given resonance amplitudes under 20, 40, ... N."""
     limits = [
         SimpleNamespace(
-            load=load, peak_frequency=800.0, peak_amplitude=1e-4, frequency=np.arange(3.0)
+            load=load,
+            peak_frequency=800.0,
+            peak_amplitude=1e-4,
+            frequency=np.arange(3.0),
+            error=0.002,
+            halved=np.nan,
+            body_mesh=0.001,
         )
         for load in (0.0, np.inf)
     ]

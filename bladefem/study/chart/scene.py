@@ -12,6 +12,7 @@ from ...hbm.reference_blade import reference_model
 from ...io.stage_cache import cached_stage, on_root
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
+from ...scene.units import newtons
 from ...util.communicator import Communicator
 from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted_settings, scene_line
@@ -75,7 +76,7 @@ def scene_chart(
             },
         ),
     )
-    made.remarks.insert(0, f"normal load {case.load:g} N on each seat")
+    made.remarks.insert(0, f"normal load {newtons(case.load)} on each seat")
     made.remarks.append(f"take this, at the beginning of the scene: {scene_line(made.settings)}")
     if sizes is None:
         return made

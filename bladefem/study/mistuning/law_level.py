@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...scene.units import newtons
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ...wheel.damper_law import DamperLaw, damper_law, law_harmonics, scaled_elements
@@ -132,7 +133,7 @@ def with_checks(
     solved = [TUNED_PATTERN, *(patterns[i] for i in chosen)]
     heights = np.zeros((3, len(solved)))
     mine = range(rank, len(solved), ranks)
-    for i in progress(list(mine), f"checks under {found.loads[0]:g} N", len(mine)):
+    for i in progress(list(mine), f"checks under {newtons(found.loads[0])}", len(mine)):
         heights[:, i] = peak_heights(whole_peak(solved[i]))
     if comm is not None:
         heights = comm.allreduce(heights)

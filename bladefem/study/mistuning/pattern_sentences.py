@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...scene.units import newtons
 from ...util.message import warning
 from .deciding_blades import DecidingBlade
 from .other_blades import other_blade_sentences
@@ -27,7 +28,9 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
         sentences.append(_peak_sentence(r))
         if not r.compared.agrees:
             words = comparison_words(r.compared)
-            sentences.append(warning(f"{r.load:g} N: {words}; the highest blade is as uncertain"))
+            sentences.append(
+                warning(f"{newtons(r.load)}: {words}; the highest blade is as uncertain")
+            )
         sentences.extend(_shape_sentences(r))
     if found[0].others is not None:
         sentences.extend(other_blade_sentences(found[0].others))
@@ -39,7 +42,7 @@ def _peak_sentence(r: PatternResponse) -> str:
     """The highest blade, and its stress."""
     error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
     text = (
-        f"whole wheel under {r.load:g} N: blade {r.peak.blade + 1} moves "
+        f"whole wheel under {newtons(r.load)}: blade {r.peak.blade + 1} moves "
         f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
         f"{r.free_factor:.3g} times); estimated error by harmonics and samples {error}; "
         f"{r.peak.unsolved} of {len(r.peak.omegas)} frequencies not solved; its alternating "

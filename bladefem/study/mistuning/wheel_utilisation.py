@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from geometry.mesh import Mesh
 
 from ...errors import InputError
+from ...scene.units import newtons
 from ...util.message import warning
 from ..fatigue import Utilisation, fatigue_utilisation, haigh_diagram
 from ..pipeline.run_records import SolvedRun
@@ -74,7 +75,7 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
     number = run.response.best_curve
     response, (first, *others) = run.wheel[0], found[0]
     said = (
-        f"utilisation of the mistuned wheel under {response.load:.4g} N, blade "
+        f"utilisation of the mistuned wheel under {newtons(response.load, 4)}, blade "
         f"{first.blade.blade + 1}: {worst_place(first.used)}, against "
         f"{tuned[number].used.max():.3g} of the tuned wheel; "
         f"{highest_use(run, number, first.used, first.blade.worst.mesh_error):.3g} with the upper "

@@ -20,8 +20,9 @@ from ...hbm.model import ReducedModel
 from ...hbm.nonlinear_modes import NonlinearMode, modal_damping, nonlinear_mode
 from ...reduction.assemble import folded_diameter, pair_model
 from ...reduction.truncate import truncate_modes
-from ...scene.units import show
+from ...scene.units import newtons, show
 from ...util.arrays import IntegerArray, RealArray
+from ...util.message import warning
 from ...wheel.aerodynamics import limit_cycles, with_flow
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase, joint_model
@@ -31,7 +32,7 @@ from .coriolis import with_coriolis
 from .flow import Flow, family_numbers, port_shapes, scene_flow
 from .joined_contacts import joined_member
 from .reduced_sector import Reduced, reduce_sector, with_damper_mass
-from .run_records import ReducedRun
+from .run_records import ReducedRun, SolvedRun
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
 
@@ -135,15 +136,7 @@ def find_flutter(
     found = FlutterResult(flow.influence.real, fed, fed + scene.operation.damping, ())
     if not found.fed:
         return found
-    # of the sector: backward waves are those of the forward ones, mirrored
-    wanted = sorted({0, flow.own, *(abs(wave) for wave in found.fed)})
-    modes = run.settings.modes
-    sector = keep(
-        "flutter_sector",
-        stage_key("reduction", scene, "flutter", np.array(wanted), modes),
-        lambda: reduce_sector(bodies, patches, wanted, modes),
-    )
-    sector = with_coriolis(scene, sector)
+    sector = _flutter_sector(found, flow, run, bodies, patches, keep)
     cases = load_cases(scene, run.mesh, run.contact)
 
     def compute() -> tuple[HeldFlutter, ...]:
@@ -157,6 +150,81 @@ def find_flutter(
 
     key = stage_key("response", scene, "flutter", found.fed, [(c.load, c.mass) for c in cases])
     return replace(found, held=keep("flutter", key, compute))
+
+
+def with_best_load(
+    found: FlutterResult,
+    run: SolvedRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: StageRunner,
+) -> FlutterResult:
+    """With the limit cycles under the best load of the forced response, where a search has found it
+    and none was asked for: at no cost where they follow by a factor.
+
+    A best load under which friction holds some wave at no amplitude is told in a message.
+    """
+    curve = run.response.curves[run.response.best_curve]
+    best = (curve.load, curve.mass)
+    known = {(one.load, one.mass) for one in found.held}
+    if not known or best in known:
+        return found
+    solved: list[tuple[LoadCase, list[HeldFlutter]]] = []
+    for case in load_cases(run.scene, run.mesh, run.contact):
+        here = (case.load, case.mass)
+        if here in known:
+            solved.append((case, [one for one in found.held if (one.load, one.mass) == here]))
+        if here == best:
+            wanted = case
+    try:
+        held = _by_scale(wanted, solved) or _held_anew(found, run, bodies, patches, wanted, keep)
+    except InputError as error:
+        keep.clock.messages.append(
+            warning(f"flutter under the best load, {newtons(curve.load)}, is not told: {error}")
+        )
+        return found
+    ordered = sorted([*solved, (wanted, held)], key=lambda one: (one[0].mass or 0, one[0].load))
+    return replace(found, held=tuple(one for _, held in ordered for one in held))
+
+
+def _held_anew(
+    found: FlutterResult,
+    run: ReducedRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    case: LoadCase,
+    keep: StageRunner,
+) -> list[HeldFlutter]:
+    """The limit cycles of all fed waves under a load, solved."""
+    flow = scene_flow(run.scene, run.reduced.sectors)
+    assert flow is not None
+    key = stage_key("response", run.scene, "flutter", found.fed, case.load, case.mass)
+
+    def compute() -> list[HeldFlutter]:
+        sector = _flutter_sector(found, flow, run, bodies, patches, keep)
+        return [_held(run, sector, patches, case, flow, wave) for wave in found.fed]
+
+    return keep("flutter_best", key, compute)
+
+
+def _flutter_sector(
+    found: FlutterResult,
+    flow: Flow,
+    run: ReducedRun,
+    bodies: Bodies,
+    patches: list[Patch],
+    keep: StageRunner,
+) -> Reduced:
+    """The sector in the nodal diameters of all fed waves and of the engine order."""
+    # of the sector: backward waves are those of the forward ones, mirrored
+    wanted = sorted({0, flow.own, *(abs(wave) for wave in found.fed)})
+    modes = run.settings.modes
+    sector = keep(
+        "flutter_sector",
+        stage_key("reduction", run.scene, "flutter", np.array(wanted), modes),
+        lambda: reduce_sector(bodies, patches, wanted, modes),
+    )
+    return with_coriolis(run.scene, sector)
 
 
 def _by_scale(
@@ -230,13 +298,13 @@ def _held(
         cycles = limit_cycles(points, damping)
     except InputError as error:
         raise InputError(
-            f"aerodynamics: waves of {wave} nodal diameters under {case.load:g} N: {error}"
+            f"aerodynamics: waves of {wave} nodal diameters under {newtons(case.load)}: {error}"
         ) from None
     stable = next((c for c in cycles if c.stable), None)
     if stable is None:
         raise InputError(
-            f"aerodynamics: waves of {wave} nodal diameters under {case.load:g} N: flutter, no "
-            "limit cycle between sticking and free dampers, expected less negative damping"
+            f"aerodynamics: waves of {wave} nodal diameters under {newtons(case.load)}: flutter, "
+            "no limit cycle between sticking and free dampers, expected less negative damping"
         )
     beyond = [float(c.probe[0]) for c in cycles if not c.stable and c.amplitude > stable.amplitude]
     return HeldFlutter(
@@ -338,7 +406,7 @@ def flutter_sentences(found: FlutterResult) -> list[str]:
             beyond = f"; motions above {growing_words(one.largest)} grow"
         others = "" if most.wave == one.wave else f"; {_cycle(most)} in {wave_words(most.wave)}"
         sentences.append(
-            f"flutter under {one.load:g} N: friction holds it in a limit cycle of "
+            f"flutter under {newtons(one.load)}: friction holds it in a limit cycle of "
             f"{_cycle(one)}{beyond}{others} (one harmonic; forced responses leave it out)"
         )
     if len(found.fed) > 1:

@@ -24,6 +24,7 @@ from ...data import Patch
 from ...errors import InputError
 from ...scene.material_table import operating_materials
 from ...scene.tables import Scene
+from ...scene.units import newtons
 from .bodies import Bodies
 from .damper_contact import seat_clearance
 
@@ -119,7 +120,7 @@ def damper_masses(
 def history_sentence(masses: Sequence[DamperMass]) -> str:
     """What friction does to the load of the seats."""
     parts = [
-        f"{one.load:.4g} N by {1e3 * one.mass:.3g} g ({1e3 * one.lightest:.3g} to "
+        f"{newtons(one.load, 4)} by {1e3 * one.mass:.3g} g ({1e3 * one.lightest:.3g} to "
         f"{1e3 * one.heaviest:.3g} g over all friction forces that could be left, "
         f"{1e3 * one.frictionless:.3g} g without friction)"
         for one in masses
@@ -137,7 +138,7 @@ def history_sentence(masses: Sequence[DamperMass]) -> str:
 def coarse_history(seated: dict[float, FrictionalSeating]) -> list[str]:
     """What to say of loads whose friction forces still change with the load steps."""
     return [
-        f"seating with friction at {load:.4g} N: the friction forces still change by "
+        f"seating with friction at {newtons(load, 4)}: the friction forces still change by "
         f"{100 * found.change:.2g} % of the largest friction limit between {found.steps // 2} and "
         f"{found.steps} load steps"
         for load, found in seated.items()

@@ -26,6 +26,7 @@ from ...hbm.ring_march import (
 from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
 from ...time.event_integrator import State, integrate_periods
+from ...util.durations import core_time
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution
 from ..adaptive.settings import Settings
@@ -40,6 +41,7 @@ KEPT_PERIODS = 100
 SAMPLES_PER_PERIOD = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
+SECONDS_PER_STEP = 5e-6
 # the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
 # 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N
 MAX_MARCH = 1e11
@@ -47,6 +49,7 @@ MAX_MARCH = 1e11
 # contact points are left to march with: the shipped wedge with ground faces needs 1e11 to 1.4e11
 # under 1100 N, and keeps 486 um of 531
 MAX_COUNTED = 6e10
+SECONDS_PER_OPERATION = 10.0 / MAX_COUNTED
 MAX_COUNTED_LAST = 2e11
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
@@ -230,7 +233,7 @@ def exact_band(model: ReducedModel, point: Solution) -> KeptBand | None:
     periods = LEFT_PERIODS + KEPT_PERIODS
     steps = periods * max(SAMPLES_PER_PERIOD, 2 * np.pi * system.fastest / point.omega)
     if steps > MAX_STEPS:
-        return _unknown_band(point, f"a march takes {steps:.1g} steps, at most {MAX_STEPS:.0e}")
+        return _unknown_band(point, _too_long(steps * SECONDS_PER_STEP))
     start = state_of(point, system)
     state = State((1 + DISTURBANCE_SHARE) * start.q, start.v, start.z)
     left = integrate_periods(system, point.omega, state, SAMPLES_PER_PERIOD, LEFT_PERIODS)
@@ -277,6 +280,14 @@ def band_by_steps(
     return band if before.reason or not left else _both(before, band)
 
 
+def _too_long(seconds: float) -> str:
+    """Why a march was not made, in what a user can judge and change."""
+    return (
+        f"a march takes {core_time(seconds)} of one core, longer than is spent on it; fewer "
+        "contact.points or model.modes shorten it"
+    )
+
+
 def _both(one: KeptBand, other: KeptBand) -> KeptBand:
     """The band that contains two."""
     lowest, highest = min(one.lowest, other.lowest), max(one.highest, other.highest)
@@ -306,7 +317,7 @@ def _band_with(
     start = state_of_solution(model, point, DISTURBANCE_SHARE)
     march = march_ring(model, start, left + kept, instants, enough, counted)
     if march.operations > counted:
-        reason = f"a march takes {march.operations:.2g} operations, at most {counted:.2g}"
+        reason = _too_long(march.operations * SECONDS_PER_OPERATION)
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
     motion = march.motion
     usual = LEFT_BY_STEPS + KEPT_BY_STEPS

@@ -12,6 +12,7 @@ from ...hbm.history_interval import MONOTONE, POINT, HistoryInterval, history_in
 from ...hbm.model import ReducedModel
 from ...hbm.peak import find_peak
 from ...hbm.solution import Solution, size
+from ...scene.units import newtons
 from ..adaptive.settings import Settings
 
 # tolerance of heights, over the accuracy wanted
@@ -88,7 +89,7 @@ def interval_sentence(loads: Sequence[float], found: Sequence[LoadInterval]) -> 
     points = [load for load, one in zip(loads, found, strict=True) if one.certificate == POINT]
     parts = []
     if points:
-        named = ", ".join(f"{load:.4g} N" for load in points)
+        named = ", ".join(f"{newtons(load, 4)}" for load in points)
         parts.append(
             f"at {named} the resonance does not depend on the loading history: the interval is a "
             "point"
@@ -97,11 +98,11 @@ def interval_sentence(loads: Sequence[float], found: Sequence[LoadInterval]) -> 
         if one.certificate == POINT:
             continue
         if one.certificate == UNKNOWN:
-            parts.append(f"at {load:.4g} N the interval was not found: {one.reason}")
+            parts.append(f"at {newtons(load, 4)} the interval was not found: {one.reason}")
             continue
         how = "certified monotone" if one.certificate == MONOTONE else "sampled, it may be wider"
         parts.append(
-            f"at {load:.4g} N {one.sticking} contact points never slip, and what the loading "
+            f"at {newtons(load, 4)} {one.sticking} contact points never slip, and what the loading "
             f"history left in them puts the resonance between {1e6 * one.lowest:.4g} and "
             f"{1e6 * one.highest:.4g} um ({how})"
         )

@@ -25,7 +25,7 @@ from ..modes.stress import mode_strength
 from .bodies import Bodies, on_one_rank
 from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
-from .flutter import find_flutter, flutter_sentences
+from .flutter import find_flutter, flutter_sentences, with_best_load
 from .history import refuse_jamming
 from .normal_modes import excited_modes, find_modes
 from .response_stage import run_response
@@ -135,13 +135,18 @@ def run(
     reduced = _run_reduction(seated, bodies, patches, keep)
     if until == "reduction":
         return reduced
-    if has_flow(scene):
-        with keep.clock("flutter"):
-            flutter = find_flutter(reduced, bodies, patches, keep)
-        if flutter is not None:
-            keep.clock.messages.extend(flutter_sentences(flutter))
-        reduced = replace(reduced, flutter=flutter)
-    return run_response(reduced, bodies, patches, keep)
+    if not has_flow(scene):
+        return run_response(reduced, bodies, patches, keep)
+    with keep.clock("flutter"):
+        # what friction does not hold is refused before the responses
+        flutter = find_flutter(reduced, bodies, patches, keep)
+    solved = run_response(reduced, bodies, patches, keep)
+    if flutter is None:
+        return solved
+    with keep.clock("flutter"):
+        flutter = with_best_load(flutter, solved, bodies, patches, keep)
+    keep.clock.messages.extend(flutter_sentences(flutter))
+    return replace(solved, flutter=flutter)
 
 
 def _run_mesh(scene: Scene, keep: StageRunner) -> Run:

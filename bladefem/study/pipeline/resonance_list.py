@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...hbm.slow_sweep import DOWN, ISOLATED, UP, Visit, reached_by, visited_pieces
+from ...scene.units import newtons
 from .loads import Curve
 
 # distance of the first harmonics of two ends over the largest one, up to which pieces are joined
@@ -139,13 +140,13 @@ def reach_sentence(curve: Curve) -> str:
     keeps = f"{1e6 * max(other):.4g} um and less" if other else "lower motions"
     if reached == ISOLATED:
         return (
-            f"load {curve.load:g} N: the resonance is reached by no slow sweep, only from motions "
-            f"that start near it; sweeps keep to {keeps}"
+            f"load {newtons(curve.load)}: the resonance is reached by no slow sweep, only from "
+            f"motions that start near it; sweeps keep to {keeps}"
         )
     way = UP if reached == DOWN else DOWN
     return (
-        f"load {curve.load:g} N: the resonance is reached by a slow sweep {reached}; a sweep {way} "
-        f"keeps to {keeps}"
+        f"load {newtons(curve.load)}: the resonance is reached by a slow sweep {reached}; a sweep "
+        f"{way} keeps to {keeps}"
     )
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ...scene.tables import Scene
-from ...scene.units import show
+from ...scene.units import newton_range, newtons, show
 from ...util.message import method, warning
 from ..adaptive.settings import Settings
 from .best_load import BestLoad, studied_load
@@ -160,7 +160,9 @@ def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
 
 def load_of(curve: Curve) -> str:
     """ "80 N", with the damper's mass where several are studied."""
-    return f"{curve.load:g} N" + ("" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g")
+    return f"{newtons(curve.load)}" + (
+        "" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g"
+    )
 
 
 def beyond_tolerance(curves: list[Curve]) -> str:
@@ -258,11 +260,11 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         tolerated = ""
         if np.isfinite([start, end]).all():
             share = f"{100 * scene.accuracy:.3g} %"
-            tolerated = f", and from {start:.4g} to {end:.4g} N they keep within {share} of it"
+            tolerated = f", and from {newton_range(start, end)} they keep within {share} of it"
         yield (
-            f"best load{damper}: {b.load:.4g} N by exact search between {lowest} and {highest}, "
-            f"{len(b.tried)} loads and {b.points} points; no load near it lowers the amplitude of "
-            f"these balances by more than {100 * b.tolerance:.2g} %{tolerated}; "
+            f"best load{damper}: {newtons(b.load, 4)} by exact search between {lowest} and "
+            f"{highest}, {len(b.tried)} loads and {b.points} points; no load near it lowers the "
+            f"amplitude of these balances by more than {100 * b.tolerance:.2g} %{tolerated}; "
             f"{b.settings.sentence()}"
         )
 
@@ -285,8 +287,8 @@ def lower_studied_remarks(
             height, load = min(heights, default=(np.inf, 0.0))
             if (1 + scene.accuracy) * height < found:
                 yield warning(
-                    f"best load: {1e6 * found:.4g} um under {b.load:.4g} N is more than the "
-                    f"{1e6 * height:.4g} um under {load:.4g} N studied: {why}"
+                    f"best load: {1e6 * found:.4g} um under {newtons(b.load, 4)} is more than the "
+                    f"{1e6 * height:.4g} um under {newtons(load, 4)} studied: {why}"
                 )
                 break
 
@@ -300,7 +302,7 @@ def stress_message(found: DampedStress, over_balance: float = 1.0) -> str:
     largest = 1e-6 * over_balance * found.largest
     place = ", ".join(f"{1e3 * x:.1f}" for x in found.place)
     text = (
-        f"alternating stress at the best load, {found.load:.4g} N: {largest:.4g} MPa "
+        f"alternating stress at the best load, {newtons(found.load, 4)}: {largest:.4g} MPa "
         f"at ({place}) mm, of all modes, harmonics and damper forces; estimated error of the mesh "
         f"there {100 * found.mesh_error:.2g} %"
     )

@@ -17,7 +17,7 @@ from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate_contact import is_frictionless
 from ...util.message import method
-from ..adaptive.family import Family, family_member
+from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
 from .assemble_model import LoadCase, rigid_body
@@ -28,7 +28,7 @@ from .case_models import family_of_case, load_cases, softer_body
 from .changed_cases import cases_of, changed_cases
 from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
-from .linear_limits import linear_limits
+from .linear_limits import judged_limits
 from .loads import Curve, Search, best_curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
@@ -187,8 +187,14 @@ def _load_responses(
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         models = family(cases[-1])
-        rich = family_member(models, settings).model
-        limits = linear_limits(rich, scene.excitation.mode, band)
+        limits = judged_limits(
+            models,
+            settings,
+            None if softer is None else softer.family(cases[-1]),
+            scene.excitation.mode,
+            band,
+            not scene.contact.points,
+        )
     best = (*best, *found)
     clock.messages.extend(best_load_remarks(scene, best))
     nodes = -(-len(cases[0].elements.kt) // 2)

@@ -18,6 +18,7 @@ from ...contact.seating import ContactProblem
 from ...data import ModeSet, PressureMap
 from ...errors import InputError, StageMissingError
 from ...scene.tables import Scene
+from ...scene.units import newtons
 from ..adaptive.settings import Settings
 from ..influences import Influence
 from ..modes.stress import Strength
@@ -104,7 +105,7 @@ class Response:
         best = min(self.curves, key=lambda curve: curve.peak_amplitude)
         return (
             f"<bladefem response: {len(self.curves)} loads, smallest resonance "
-            f"{1e6 * best.peak_amplitude:.4g} µm under {best.load:g} N>"
+            f"{1e6 * best.peak_amplitude:.4g} µm under {newtons(best.load)}>"
         )
 
 

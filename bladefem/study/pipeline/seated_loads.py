@@ -13,7 +13,7 @@ from ...contact.seating import solve_seating as seat
 from ...data import Patch
 from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
-from ...scene.units import show
+from ...scene.units import newtons, show
 from ...util.message import warning
 from .bodies import Bodies, on_one_rank
 from .damper_contact import condense_contact, on_layer
@@ -131,8 +131,8 @@ def _own_load(
         return None
     own = float(np.mean([m.force.sum() for m in maps]))
     messages.append(
-        f"own load: the damper's {1e3 * problem.mass:.3g} g press each seat with {own:.4g} N at "
-        f"{show(scene.operation.speed, 'rad/s')}"
+        f"own load: the damper's {1e3 * problem.mass:.3g} g press each seat with {newtons(own, 4)} "
+        f"at {show(scene.operation.speed, 'rad/s')}"
     )
     return own
 

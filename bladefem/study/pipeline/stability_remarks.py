@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import Solution, size
 from ...hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
+from ...scene.units import newtons
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from .stability import model_in_time
@@ -129,7 +130,7 @@ def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
     ]
     if not moved:
         return ""
-    loads = ", ".join(f"{c.load:g} N" for c in curves if _rippled(c, accuracy))
+    loads = ", ".join(f"{newtons(c.load)}" for c in curves if _rippled(c, accuracy))
     return (
         f"under {loads} the motion at the resonance is unstable to a ripple; marched in time from "
         f"there the amplitude stays within {100 * max(moved):.1f} % of the one given"
@@ -145,7 +146,7 @@ def _rippled(curve: Curve, accuracy: float) -> bool:
 
 def folded_sentence(curves: Sequence[Curve]) -> str:
     """The curves with several motions at one frequency, or ""."""
-    pieces = {f"{c.load:g} N": int(c.branch.max(initial=0)) for c in curves}
+    pieces = {f"{newtons(c.load)}": int(c.branch.max(initial=0)) for c in curves}
     each = ", ".join(f"{load} ({count} pieces)" for load, count in pieces.items() if count > 1)
     return f"several motions at one frequency, pieces between folds: {each}" if each else ""
 
@@ -160,7 +161,7 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
     at = _place(curve, top)
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
     lost = (
-        f"load {curve.load:g} N: the highest motion, {1e6 * size(top):.4g} um at "
+        f"load {newtons(curve.load)}: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
     if curve.marched_instead and not curve.keeps_unstable:
@@ -190,7 +191,7 @@ def _from_a_flank(curve: Curve) -> str:
     driven = curve.kept is not None and curve.kept.drive > 1
     why = "a strong drive leads to a higher one" if driven else "motions beside it do not last"
     return (
-        f"load {curve.load:g} N: the highest motion, {1e6 * curve.amplitude[top]:.4g} um at "
+        f"load {newtons(curve.load)}: the highest motion, {1e6 * curve.amplitude[top]:.4g} um at "
         f"{curve.frequency[top]:.5g} Hz, {judged}, and {why}; {_marched_from_flank(curve)}"
     )
 
@@ -209,7 +210,7 @@ def _marched_from_flank(curve: Curve) -> str:
 
 def unmarched_sentence(curves: Sequence[Curve]) -> str:
     """The resonances beside which marches from unstable motions are not known, or ""."""
-    each = ", ".join(f"{c.load:g} N ({c.unmarched})" for c in curves if c.unmarched)
+    each = ", ".join(f"{newtons(c.load)} ({c.unmarched})" for c in curves if c.unmarched)
     if not each:
         return ""
     return (
@@ -220,7 +221,7 @@ def unmarched_sentence(curves: Sequence[Curve]) -> str:
 
 def undriven_sentence(curves: Sequence[Curve]) -> str:
     """The resonances beside which no motion was sought that only a strong drive leads to, or ""."""
-    loads = ", ".join(f"{c.load:g} N" for c in curves if c.undriven)
+    loads = ", ".join(f"{newtons(c.load)}" for c in curves if c.undriven)
     if not loads:
         return ""
     return (
@@ -235,7 +236,7 @@ def unjudged_sentence(curves: Sequence[Curve]) -> str:
     unknown = [c for c in asked if c.stability[_place(c, c.peak)] == UNKNOWN]
     if not unknown:
         return ""
-    loads = ", ".join(f"{c.load:g} N" for c in unknown)
+    loads = ", ".join(f"{newtons(c.load)}" for c in unknown)
     return (
         f"under {loads} the motion at the resonance was not judged: it may be unstable, and the "
         "blade leave it for another"

@@ -15,6 +15,7 @@ from ...contact.seating import ContactProblem, solve_seating
 from ...contact.state_table import interpolate_states, state_table
 from ...errors import NotSolvedError
 from ...scene.tables import Scene
+from ...scene.units import newton_range
 
 # of each axis
 STATES_PER_AXIS = 5
@@ -127,9 +128,10 @@ def state_sentence(
         return f"a table of contact states could not be made: {error}"
     verdict = "is enough" if check.enough else "is NOT enough"
     return (
-        f"a table of {check.states} contact states over {min(loads):.4g} to {max(loads):.4g} N and "
-        f"±{1e6 * travel:.3g} µm of tilt at the seats' ends {verdict}: interpolation misses nodal "
-        f"forces by up to {100 * check.error:.2g} % of the largest (its indicator says "
+        f"a table of {check.states} contact states over "
+        f"{newton_range(min(loads), max(loads))} and ±{1e6 * travel:.3g} µm of tilt at the seats' "
+        f"ends {verdict}: interpolation misses nodal forces by up to {100 * check.error:.2g} % of "
+        "the largest (its indicator says "
         f"{100 * check.indicator:.2g} %); the direct solve, used here, takes "
         f"{1e3 * check.direct:.2g} ms a state"
     )

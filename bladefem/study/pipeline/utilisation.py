@@ -7,6 +7,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...errors import InputError
+from ...scene.units import newtons
 from ...util.message import warning
 from ..fatigue import Utilisation, fatigue_utilisation, haigh_diagram
 from .run_records import SolvedRun
@@ -51,7 +52,7 @@ def utilisation_message(run: SolvedRun) -> str:
     number = run.response.best_curve
     used = found[number]
     return (
-        f"utilisation at the best load, {run.response.curves[number].load:.4g} N: "
+        f"utilisation at the best load, {newtons(run.response.curves[number].load, 4)}: "
         f"{worst_place(used)}; {highest_use(run, number, used):.3g} "
         "with the upper ends of the error of the mesh and of the loading history"
     )
