@@ -92,7 +92,7 @@ def judged_limits(
         judged.append(
             replace(
                 limit,
-                estimated=np.sum([one[i][0] for one in changes], axis=0),
+                estimated=sum((one[i][0] for one in changes), np.zeros(len(limit.first))),
                 balance=float(sum(one[i][1] for one in changes)),
             )
         )
