@@ -180,7 +180,7 @@ def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
         return
     fields = {"mean stress [Pa]": run.strength.mean}
     for number, used in found.items():
-        load = f"{newtons(run.response.curves[number].load)}"
+        load = newtons(run.response.curves[number].load)
         fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run.mesh, used.alternating)
         fields[f"utilisation, {load} [1]"] = _on_mesh(run.mesh, used.used)
     for response, (worst, *_) in known_wheel_use(run):

@@ -342,7 +342,7 @@ def _draw_loops(data: xr.Dataset, file: str | Path | None = None) -> object:
     cases = {}
     for load in data["load"].to_numpy():
         part = data.sel(load=load)
-        cases[f"{newtons(load, 4)}"] = {
+        cases[newtons(load, 4)] = {
             f"{seat} seat": (
                 part["displacement"].sel(seat=seat).to_numpy(),
                 part["force"].sel(seat=seat).to_numpy(),

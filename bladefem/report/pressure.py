@@ -126,7 +126,7 @@ def _report(
         numbers.append(
             Headline(
                 "load of a seat by the damper's own mass",
-                f"{newtons(own, 4)}",
+                newtons(own, 4),
                 "by equilibrium, no model error",
                 f"{1e3 * result.contact.problem.mass:.3g} g",
             )

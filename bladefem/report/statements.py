@@ -89,7 +89,7 @@ def _optimum_numbers(
 ) -> list[tuple[str, str, str]]:
     """The best load, under a title, and the resonance there: what, value, remark."""
     numbers = [
-        (title, f"{newtons(best['load'], 4)}", remark),
+        (title, newtons(best["load"], 4), remark),
         (
             "resonance amplitude there",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
@@ -178,7 +178,7 @@ def own_mass(
     return [
         (
             "load of a seat by the damper's own mass",
-            f"{newtons(load, 4)}",
+            newtons(load, 4),
             f"{1e3 * mass:.3g} g at {speed * 30 / np.pi:.5g} rpm; {there}",
         ),
         ("mass that makes the optimum load", *best_mass(best, mass / load, masses)),
@@ -310,7 +310,7 @@ def cautions(
         )
     cut = cut_peaks(finite, points)
     if cut:
-        named = ", ".join(f"{newtons(load, 4)}" for load in cut)
+        named = ", ".join(newtons(load, 4) for load in cut)
         found.append(
             f"For {len(cut)} of {len(finite)} loads ({named}) the highest point lies at the end of "
             "the frequency band, so that no resonance was seen; widen study.band."

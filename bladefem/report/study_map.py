@@ -81,7 +81,7 @@ def write_scatter(
     numbers = [
         Headline(
             "most robust load",
-            f"{newtons(robust['load'], 4)}",
+            newtons(robust["load"], 4),
             f"of {len(band)} loads under which all {len(variants)} samples were studied"
             f"{end_words(robust['load'], band)}",
             "smallest amplitude that 90 % of the samples stay below",

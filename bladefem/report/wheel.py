@@ -298,14 +298,14 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
     return [
         Headline(
             ROBUST_OPTIMUM,
-            f"{newtons(robust.load.value, 4)}",
+            newtons(robust.load.value, 4),
             f"95 % interval {newton_range(robust.load.low, robust.load.high)}",
             f"lowest amplitude that {words} stay below, by the bootstrap over the wheels",
         ),
         Headline(
             "optimum of the tuned wheel",
-            f"{newtons(load, 4)}",
-            _bracket(found, load),
+            newtons(load, 4),
+            loads_on_both_sides(found, load),
             f"{1e6 * height:.4g} µm where all blades are alike",
         ),
         Headline(
@@ -317,13 +317,14 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
     ]
 
 
-def _bracket(found: Amplification, load: float) -> str:
+def loads_on_both_sides(found: Amplification, load: float) -> str:
     """The loads studied on both sides."""
     lower = found.loads[found.loads < load]
     upper = found.loads[found.loads > load]
     if not len(lower) or not len(upper):
         return "an end of the loads studied"
-    return f"between {lower.max():.4g} and {newtons(upper.min(), 4)} studied"
+    ends = newton_range(lower.max(), upper.min()).replace(" to ", " and ")
+    return f"between {ends} studied"
 
 
 def _upper(value: float) -> str:
@@ -473,7 +474,7 @@ def _optimum_sentences(found: Amplification) -> list[str]:
         f"{newton_range(robust.load.low, robust.load.high)}), {1e6 * robust.height.value:.4g} um "
         f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
         "between the loads studied both optima are those of a parabola, whose error the intervals "
-        f"leave out: robust optimum {_bracket(found, robust.load.value)}",
+        f"leave out: robust optimum {loads_on_both_sides(found, robust.load.value)}",
     ]
     unknown = found.loads[~found.is_known]
     if len(unknown):
@@ -506,7 +507,7 @@ def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]
     if i is not None:
         marks = {f"{100 * s:g} %": found.quantile(i, s).value for s in SCATTER_QUANTILES[:2]}
         drawings["wheel/scatter_histogram"] = partial(
-            view.draw_histogram, found.factor[i], marks, f"{newtons(found.loads[i])}"
+            view.draw_histogram, found.factor[i], marks, newtons(found.loads[i])
         )
     if len(found.loads) > 1:
         optima = marked_optima(found) if optimum_is_known(found) else []

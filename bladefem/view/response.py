@@ -93,7 +93,7 @@ def load_colours(loads: np.ndarray) -> dict[float, Any]:
 
 def load_name(load: float) -> str:
     """ "250 N", or the name of the limit."""
-    return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, f"{newtons(load, 4)}")
+    return {0.0: "0 (no damper)", np.inf: "∞ (full stick)"}.get(load, newtons(load, 4))
 
 
 def draw_curve(

@@ -27,6 +27,7 @@ from bladefem.report.statements import (
     wrong_speed,
 )
 from bladefem.report.tables import readable_texts, to_latex, to_markdown, write_tables
+from bladefem.report.wheel import loads_on_both_sides
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import vary
@@ -450,6 +451,12 @@ def test_an_own_load_that_was_studied_has_its_own_amplitude():
     )
     assert "resonance amplitude 37.04 µm there" in remark
     assert "between the loads studied" not in remark
+
+
+def test_loads_on_both_sides_share_a_unit():
+    found = SimpleNamespace(loads=np.array([900.0, 9000.0, 2e4]))
+    assert loads_on_both_sides(found, 1e4) == "between 9 and 20 kN studied"
+    assert loads_on_both_sides(found, 3e4) == "an end of the loads studied"
 
 
 def test_what_is_not_determined_has_no_bracket():

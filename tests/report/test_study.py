@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from limit_stubs import linear_limits
 
 from bladefem.report.study import Variant, study_tables, write_study
 from bladefem.report.study_map import write_map
@@ -35,20 +36,8 @@ def curve(load, amplitude):
 
 
 def response(*amplitudes):
-    limits = [
-        SimpleNamespace(
-            load=load,
-            peak_frequency=800.0,
-            peak_amplitude=1e-4,
-            frequency=np.arange(3.0),
-            error=0.002,
-            halved=np.nan,
-            body_mesh=0.001,
-        )
-        for load in (0.0, np.inf)
-    ]
     return SimpleNamespace(
-        limits=limits, curves=[curve(20.0 * (i + 1), a) for i, a in enumerate(amplitudes)]
+        limits=linear_limits(), curves=[curve(20.0 * (i + 1), a) for i, a in enumerate(amplitudes)]
     )
 
 

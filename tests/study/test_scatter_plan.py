@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
+from limit_stubs import linear_limits
 
 from bladefem.cli.main import main
 from bladefem.cli.study import WITHOUT_INFLUENCES, _make_plan, _run_options
@@ -84,18 +85,6 @@ def test_folders_are_named_by_their_values(tmp_path):
 
 def response(*amplitudes):
     """As study.pipeline.Response, of given resonance amplitudes under 20, 40, ... N."""
-    limits = [
-        SimpleNamespace(
-            load=load,
-            peak_frequency=800.0,
-            peak_amplitude=1e-4,
-            frequency=np.arange(3.0),
-            error=0.002,
-            halved=np.nan,
-            body_mesh=0.001,
-        )
-        for load in (0.0, np.inf)
-    ]
     curves = [
         SimpleNamespace(
             load=20.0 * (i + 1),
@@ -116,7 +105,7 @@ def response(*amplitudes):
         )
         for i, amplitude in enumerate(amplitudes)
     ]
-    return SimpleNamespace(limits=limits, curves=curves)
+    return SimpleNamespace(limits=linear_limits(), curves=curves)
 
 
 def variants(names, rows, amplitudes):

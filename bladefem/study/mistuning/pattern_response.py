@@ -212,7 +212,6 @@ def pattern_response(
         free=free,
     )
     found, tuned = _with_tuned(wheel, free, found, curve, options, harmonic)
-    one_order = len(wheel.excitation) == 1
     searched = SearchedWheel(wheel, free, pattern, harmonic, options)
     blades, lost = deciding_blades(searched, found, others, stress)
     return PatternResponse(
@@ -225,7 +224,7 @@ def pattern_response(
         found.solution,
         free_factor(wheel, pattern, grid, harmonic),
         found.truncation,
-        tuned.height / curve.balance_amplitude - 1 if one_order else float("nan"),
+        _over_sector(wheel, tuned, curve),
         blades,
         compared_with_sector(wheel, curve, tuned.height, accuracy),
         None if free is None else _free_means(found),
@@ -256,6 +255,13 @@ def _with_tuned(
     simply = replace(options, fallbacks=False)
     tuned = local_peak(LocalBalances(free, Pattern(), H, samples, simply), held, harmonic)
     return (replace(found, free=None), held) if tuned is None else (found, tuned.peak)
+
+
+def _over_sector(wheel: Wheel, tuned: WheelPeak, curve: Curve) -> float:
+    """Relative rise of the tuned wheel's peak above the sector's balance; NaN where several engine
+    orders excite it.
+    """
+    return tuned.height / curve.balance_amplitude - 1 if len(wheel.excitation) == 1 else np.nan
 
 
 def _free_means(found: ChosenPeak) -> FreeMeans:

@@ -89,7 +89,7 @@ def interval_sentence(loads: Sequence[float], found: Sequence[LoadInterval]) -> 
     points = [load for load, one in zip(loads, found, strict=True) if one.certificate == POINT]
     parts = []
     if points:
-        named = ", ".join(f"{newtons(load, 4)}" for load in points)
+        named = ", ".join(newtons(load, 4) for load in points)
         parts.append(
             f"at {named} the resonance does not depend on the loading history: the interval is a "
             "point"

@@ -160,9 +160,7 @@ def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
 
 def load_of(curve: Curve) -> str:
     """ "80 N", with the damper's mass where several are studied."""
-    return f"{newtons(curve.load)}" + (
-        "" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g"
-    )
+    return newtons(curve.load) + ("" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g")
 
 
 def beyond_tolerance(curves: list[Curve]) -> str:

@@ -187,14 +187,9 @@ def _load_responses(
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         models = family(cases[-1])
-        limits = judged_limits(
-            models,
-            settings,
-            None if softer is None else softer.family(cases[-1]),
-            scene.excitation.mode,
-            band,
-            not scene.contact.points,
-        )
+        soft = None if softer is None else softer.family(cases[-1])
+        mode, open_points = scene.excitation.mode, not scene.contact.points
+        limits = judged_limits(models, settings, soft, mode, band, open_points)
     best = (*best, *found)
     clock.messages.extend(best_load_remarks(scene, best))
     nodes = -(-len(cases[0].elements.kt) // 2)

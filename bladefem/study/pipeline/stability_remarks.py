@@ -130,7 +130,7 @@ def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
     ]
     if not moved:
         return ""
-    loads = ", ".join(f"{newtons(c.load)}" for c in curves if _rippled(c, accuracy))
+    loads = ", ".join(newtons(c.load) for c in curves if _rippled(c, accuracy))
     return (
         f"under {loads} the motion at the resonance is unstable to a ripple; marched in time from "
         f"there the amplitude stays within {100 * max(moved):.1f} % of the one given"
@@ -146,7 +146,7 @@ def _rippled(curve: Curve, accuracy: float) -> bool:
 
 def folded_sentence(curves: Sequence[Curve]) -> str:
     """The curves with several motions at one frequency, or ""."""
-    pieces = {f"{newtons(c.load)}": int(c.branch.max(initial=0)) for c in curves}
+    pieces = {newtons(c.load): int(c.branch.max(initial=0)) for c in curves}
     each = ", ".join(f"{load} ({count} pieces)" for load, count in pieces.items() if count > 1)
     return f"several motions at one frequency, pieces between folds: {each}" if each else ""
 
@@ -221,7 +221,7 @@ def unmarched_sentence(curves: Sequence[Curve]) -> str:
 
 def undriven_sentence(curves: Sequence[Curve]) -> str:
     """The resonances beside which no motion was sought that only a strong drive leads to, or ""."""
-    loads = ", ".join(f"{newtons(c.load)}" for c in curves if c.undriven)
+    loads = ", ".join(newtons(c.load) for c in curves if c.undriven)
     if not loads:
         return ""
     return (
@@ -236,7 +236,7 @@ def unjudged_sentence(curves: Sequence[Curve]) -> str:
     unknown = [c for c in asked if c.stability[_place(c, c.peak)] == UNKNOWN]
     if not unknown:
         return ""
-    loads = ", ".join(f"{newtons(c.load)}" for c in unknown)
+    loads = ", ".join(newtons(c.load) for c in unknown)
     return (
         f"under {loads} the motion at the resonance was not judged: it may be unstable, and the "
         "blade leave it for another"
