@@ -88,8 +88,8 @@ def test_what_cannot_be_marched_says_why(monkeypatch):
 
 
 def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(monkeypatch):
-    """8.8e10 operations on the shipped wedge; fewer points there end on another motion."""
-    monkeypatch.setattr(module, "march_operations", lambda model, periods: 8.8e10)
+    """1.1e11 operations on ground faces; fewer points there end on another motion."""
+    monkeypatch.setattr(module, "march_operations", lambda model, periods: 1.1e11)
     assert module.affordable_march(None)
     monkeypatch.setattr(module, "march_operations", lambda model, periods: 3.5e11)
     assert not module.affordable_march(None)
@@ -107,12 +107,14 @@ def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, 
     assert Curve.marched.fget(elsewhere) == pytest.approx(share)
     assert Curve.marched.fget(SimpleNamespace(kept=None, curve_amplitude=1.0)) == 0.0
     here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True})
-    beside = 0.0 if reason else max(abs(lowest - 1), abs(highest - 1))
+    # an unstable resonance without a known march has no error that holds
+    beside = np.inf if reason else max(abs(lowest - 1), abs(highest - 1))
     assert Curve.marched.fget(here) == pytest.approx(beside)
     judged = SimpleNamespace(**vars(here) | {"in_time": band})
     assert Curve.marched.fget(judged) == 0.0
-    instead = SimpleNamespace(**vars(here) | {"marched_instead": True})
-    assert Curve.marched.fget(instead) == pytest.approx(0.0 if reason else 1 - lowest / highest)
+    if not reason:
+        instead = SimpleNamespace(**vars(here) | {"marched_instead": True})
+        assert Curve.marched.fget(instead) == pytest.approx(1 - lowest / highest)
 
 
 @pytest.mark.parametrize(
@@ -310,10 +312,90 @@ def test_steps_too_long_for_the_bodies_are_halved(monkeypatch, ends, lowest, hig
         return SimpleNamespace(**vars(found) | {"resolved": False})
 
     monkeypatch.setattr(module, "march_ring", march)
+    monkeypatch.setattr(module, "steps_are_resolved", lambda *_: False)
     found = module.band_by_steps(model, point)
     assert seen == asked
     assert found.lowest == pytest.approx(lowest * size(point), rel=1e-6)
     assert found.highest == pytest.approx(highest * size(point), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("enough", "failing", "asked"),
+    [
+        # begun where steps are short enough, for as many steps in all
+        (512, (), [(512, 100)]),
+        # the forces of a step were not found: with more instants they are
+        (256, (256,), [(256, 200), (512, 100)]),
+        (512, (512, 1024), [(512, 100), (1024, 100)]),
+    ],
+)
+def test_a_march_begins_with_steps_short_enough_and_goes_on_to_shorter_ones(
+    monkeypatch, enough, failing, asked
+):
+    """With ground faces under 1100 N the march of four points a seat fails with 512 instants."""
+    model = rebounding(10.0, 0.1, 0.04)
+    point = solve(model, 3.0, 15, 1024)
+    seen = []
+
+    def march(model, start, periods, instants, ended, most):
+        seen.append((instants, periods))
+        found = marched(np.full(periods, size(point)), instants, ended)
+        return SimpleNamespace(**vars(found) | {"settled": instants not in failing})
+
+    monkeypatch.setattr(module, "march_ring", march)
+    monkeypatch.setattr(
+        module, "steps_are_resolved", lambda _model, _omega, instants: instants >= enough
+    )
+    found = module.band_by_steps(model, point)
+    assert seen == asked
+    assert bool(found.reason) == (asked[-1][0] in failing)
+
+
+def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkeypatch):
+    """301 um of ground faces under 580 N, three harmonics: a march ends on 287 um."""
+    marks = Stability(np.array(["stable"]), np.ones(1), bifurcation=np.full(1, "", dtype="<U15"))
+    for name in ("unstable_with_more_points", "model_in_time"):
+        monkeypatch.setattr(judged_resonance, name, lambda *_: None)
+    monkeypatch.setattr(judged_resonance, "richer_models", lambda *_: [])
+    monkeypatch.setattr(judged_resonance, "judged_above", lambda *args: args[3])
+    marches = SimpleNamespace(models=None, band=lambda *_: module.KeptBand(1.0, 0.8, 0.8, 100))
+
+    def given(lift, harmonics):
+        point = SimpleNamespace(
+            omega=1.0,
+            frequency=1.0,
+            probe=np.array([[0.0], [1.0]]),
+            converged=True,
+            states={"lift": lift},
+            harmonics=harmonics,
+        )
+        curve = SimpleNamespace(points=[point], settings=None)
+        scene = SimpleNamespace(accuracy=0.05)
+        return judged_resonance._at_the_highest(marches, curve, scene, marks, 0)
+
+    found = given(lift=3, harmonics=3)
+    assert found.contradicted and found.amplitude == 0.8
+    assert found.marks.verdict[0] == UNSTABLE
+    # nothing lifts off, or a verdict has harmonics enough
+    assert given(lift=0, harmonics=3).amplitude == given(lift=3, harmonics=15).amplitude == 1.0
+
+
+def test_a_march_with_fewer_points_far_from_the_balance_is_in_doubt():
+    """Ground faces, 1100 N: eight points a seat keep 457 um of 536 with 16, which keep 517."""
+
+    def error(points):
+        band = module.KeptBand(446.7, 457e-6, 457e-6, 100, points=points)
+        return Curve.marched.fget(
+            SimpleNamespace(
+                kept=band,
+                marched_instead=True,
+                settings=SimpleNamespace(points=16),
+                balance_amplitude=536e-6,
+            )
+        )
+
+    assert error(None) == error(32) == 0.0
+    assert error(8) > 0.5 * (517 / 457 - 1)
 
 
 @pytest.fixture

@@ -22,6 +22,7 @@ from ...hbm.ring_march import (
     march_operations,
     march_ring,
     state_of_solution,
+    steps_are_resolved,
 )
 from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
@@ -43,14 +44,15 @@ SAMPLES_PER_PERIOD = 256
 MAX_STEPS = 4e6
 SECONDS_PER_STEP = 5e-6
 # the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
-# 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N
-MAX_MARCH = 1e11
-# and of those that its first periods show to be needed, some 10 s; more of it where no fewer
-# contact points are left to march with: the shipped wedge with ground faces needs 1e11 to 1.4e11
-# under 1100 N, and keeps 486 um of 531
-MAX_COUNTED = 6e10
-SECONDS_PER_OPERATION = 10.0 / MAX_COUNTED
-MAX_COUNTED_LAST = 2e11
+# 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N; 1.1e11 with ground faces, 10 modes and an
+# elastic damper. Fewer points may lead elsewhere: under 1100 N there 16 points a seat keep 517 um
+# of the 536 that they are solved for, eight 453 of 531, four 472 of 530
+MAX_MARCH = 1.5e11
+# and of those that its first period shows to be needed, some 30 s: the march above takes 22 s; more
+# of it where no fewer contact points are left to march with
+MAX_COUNTED = 3e11
+SECONDS_PER_OPERATION = 30.0 / MAX_COUNTED
+MAX_COUNTED_LAST = 6e11
 # periods of these before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
@@ -65,8 +67,8 @@ REFINED_PERIODS = (75, 25)
 GROWN_RATIO = 1.2
 # of the motion at the start: a band beyond it that was marched by steps too long for forces that
 # are linear in them is marched again with more instants, until two agree by AGREEING_SHARE. Under
-# 1100 N on the shipped wedge with ground faces, 505 um with four points a seat, 256 instants end on
-# 471, 512 and 1024 on 493, 2048 on 485 um; with 16 points 256 end between 362 and 398 um of 525
+# 1100 N on the shipped wedge with ground faces, 530 um with four points a seat, 256 instants end on
+# 446, 1024 on 472 um; with eight points, 531 um, on 508 and 457
 HELD_SHARE = 0.03
 AGREEING_SHARE = 0.02
 # relative change of the ends of a band, from one PERIODS_AT_ONCE to the next, that is none: an
@@ -257,27 +259,48 @@ def band_by_steps(
 ) -> KeptBand:
     """The same with two tangents, and for travelling waves.
 
-    Marched again with more instants where the blade seems to leave the motion at the start, and
-    steps were too long: for impacts, or for the bodies on their contacts.
+    Begun with the fewest instants whose steps are short enough for the bodies on their contacts.
+    Marched again with more of them where the blade seems to leave the motion at the start and
+    steps were too long, for that or for impacts, and where the forces of a step were not found.
     """
-    periods = (LEFT_BY_STEPS, KEPT_BY_STEPS)
-    band = _unknown_band(point, "nothing was marched")
-    for instants in INSTANTS_BY_STEPS:
+    band = before = _unknown_band(point, "nothing was marched")
+    left = False
+    try:
+        tried = _instants_to_try(model, point.omega)
+    except InputError as error:
+        return _unknown_band(point, str(error))
+    for instants in tried:
+        usual = instants == INSTANTS_BY_STEPS[0]
+        periods = (LEFT_BY_STEPS, KEPT_BY_STEPS) if usual else REFINED_PERIODS
         try:
             found, resolved = _band_with(model, point, instants, *periods, counted)
         except (InputError, NotSolvedError) as error:
             return _unknown_band(point, str(error))
-        if found.reason:
-            return found
-        agrees = _agree(band, found, size(point))
         before, band = band, found
-        periods = REFINED_PERIODS
+        if found.too_long:
+            return found
+        if found.reason:
+            continue
         grown = band.highest > GROWN_RATIO * size(point) and bool(point.states["lift"])
         left = not resolved and not band.holds(size(point), HELD_SHARE)
-        if not grown and (agrees or not left):
+        if not grown and (not left or _agree(before, band, size(point))):
             return band
+    if band.reason or before.reason or not left:
+        return band
     # how far more instants would still lead is not known
-    return band if before.reason or not left else _both(before, band)
+    return _both(before, band)
+
+
+def _instants_to_try(model: ReducedModel, omega: float) -> tuple[int, ...]:
+    """From the fewest instants on with steps short enough for forces that are linear in them; all
+    where none are. Longer steps take more iterations each: on the shipped wedge with ground faces,
+    1100 N and 16 points a seat, 100 periods of 256 instants took 30 s of CPU, and of 512, whose
+    steps are short enough, 22 s, for the same 517 um.
+    """
+    for k, instants in enumerate(INSTANTS_BY_STEPS):
+        if steps_are_resolved(model, omega, instants):
+            return INSTANTS_BY_STEPS[k:]
+    return INSTANTS_BY_STEPS
 
 
 def _too_long(seconds: float) -> str:
