@@ -127,7 +127,7 @@ def error_words(row: pd.Series) -> str:
     if np.isnan(error):
         return "not estimated"
     if np.isinf(error):
-        return "error unknown: richer models were not solved"
+        return "error unknown: neither richer models nor a march tell it"
     parts = "model and mesh" if np.isfinite(row.get("body_mesh", np.nan)) else "model; mesh apart"
     return f"± {max(100 * error, 0.01):.2g} % ({parts})"
 
@@ -223,7 +223,7 @@ def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     if limits.empty or np.isnan(error):
         return []
     if np.isinf(error):
-        return ["the error of its amplitude is unknown, since richer models were not solved"]
+        return ["the error of its amplitude is unknown: neither richer models nor a march tell it"]
     gain = 1 - best["peak_amplitude"] / limits["peak_amplitude"].min()
     if gain > error:
         return []

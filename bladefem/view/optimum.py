@@ -177,7 +177,7 @@ def _draw_history_range(ax: Axes, finite: pd.DataFrame, colour: str) -> None:
 
 
 def draw_unknown(ax: Axes, finite: pd.DataFrame) -> None:
-    """Hollow marks on peaks whose error is not known, because richer models were not solved."""
+    """Hollow marks on peaks whose error is not known."""
     unknown = finite[np.isinf(finite["error"])] if "error" in finite else finite.iloc[:0]
     _draw_hollow(ax, unknown, "peak_amplitude", MICRO, 7, 5, "error unknown")
 

@@ -25,6 +25,7 @@ from bladefem.study.pipeline.flank_motions import FlankMotions
 from bladefem.study.pipeline.kept_band import kept_band
 from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import Stability, in_one_body
+from bladefem.study.pipeline.stability_remarks import doubtful_sentence
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
 
 STEPS = 1000
@@ -102,11 +103,16 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
     band = module.KeptBand(380.0, lowest, highest, 200, reason)
     elsewhere = SimpleNamespace(
-        kept=band, curve_amplitude=1.0, in_time=None, keeps_unstable=False, marched_instead=False
+        kept=band,
+        curve_amplitude=1.0,
+        in_time=None,
+        keeps_unstable=False,
+        is_marched_from=False,
+        marched_instead=False,
     )
     assert Curve.marched.fget(elsewhere) == pytest.approx(share)
     assert Curve.marched.fget(SimpleNamespace(kept=None, curve_amplitude=1.0)) == 0.0
-    here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True})
+    here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True, "is_marched_from": True})
     # an unstable resonance without a known march has no error that holds
     beside = np.inf if reason else max(abs(lowest - 1), abs(highest - 1))
     assert Curve.marched.fget(here) == pytest.approx(beside)
@@ -378,6 +384,26 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     assert found.marks.verdict[0] == UNSTABLE
     # nothing lifts off, or a verdict has harmonics enough
     assert given(lift=0, harmonics=3).amplitude == given(lift=3, harmonics=15).amplitude == 1.0
+    # what keeps within the accuracy is an error of the balance, to either side
+    marches.band = lambda *_: module.KeptBand(1.0, 0.96, 0.97, 100)
+    held = given(lift=3, harmonics=3)
+    assert held.amplitude == 1.0 and held.marks.verdict[0] == STABLE
+    shown = SimpleNamespace(
+        kept=held.kept,
+        unstable_peak=None,
+        keeps_unstable=False,
+        marched_instead=False,
+        curve_amplitude=1.0,
+        in_time=None,
+    )
+    shown.is_marched_from = Curve.is_marched_from.fget(shown)
+    assert Curve.marched.fget(shown) == pytest.approx(0.04)
+    # what could not be marched is said
+    marches.band = lambda *_: module.KeptBand(1.0, np.nan, np.nan, 0, "no march")
+    unknown = given(lift=3, harmonics=3)
+    shown = SimpleNamespace(load=580.0, kept=unknown.kept, unstable_peak=None)
+    assert "580 N (no march)" in doubtful_sentence([shown])
+    assert doubtful_sentence([SimpleNamespace(kept=held.kept, unstable_peak=None, load=1.0)]) == ""
 
 
 def test_a_march_with_fewer_points_far_from_the_balance_is_in_doubt():

@@ -115,6 +115,11 @@ def test_tables_and_pictures_show_it():
     assert len(marks) == 1 and list(marks[0].get_xdata()) == [101.0]
 
 
+def test_a_motion_that_a_march_alone_leaves_has_no_multiplier():
+    said = stability_sentence([(np.array(["unstable", "stable"]), np.full(2, np.nan))])
+    assert "1 unstable," in said and "nan" not in said
+
+
 def rippling(kept):
     """A curve of one unstable point of 1 mm."""
     top = SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1)

@@ -201,16 +201,8 @@ def pattern_response(
     """
     grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
     free = None if held_means else with_free_means(wheel)
-    found = chosen_peak(
-        wheel,
-        pattern,
-        grid,
-        first_balance(wheel, curve, harmonic),
-        harmonic,
-        options,
-        wanted,
-        free=free,
-    )
+    begin = first_balance(wheel, curve, harmonic)
+    found = chosen_peak(wheel, pattern, grid, begin, harmonic, options, wanted, free=free)
     found, tuned = _with_tuned(wheel, free, found, curve, options, harmonic)
     searched = SearchedWheel(wheel, free, pattern, harmonic, options)
     blades, lost = deciding_blades(searched, found, others, stress)

@@ -34,7 +34,7 @@ class JudgedResonance:
     point: Solution
     # of all points of the curve
     marks: Stability
-    # what the blade does at the highest point where that is unstable
+    # what the blade does at the highest point where that is unstable, or its verdict in doubt
     kept: KeptBand | None = None
     # the amplitude given is the highest that the blade keeps to after the point
     contradicted: bool = False
@@ -158,8 +158,8 @@ def _left_for(
     place: int,
     accuracy: float,
 ) -> tuple[Stability, KeptBand] | None:
-    """What the blade keeps to after the highest point of a curve, where it is unstable or marched
-    away from, with the verdicts on the curve; None where nothing is known against it.
+    """What the blade keeps to after the highest point of a curve, where that is unstable or its
+    verdict in doubt, with the verdicts on the curve; None where it is neither.
     """
     verdict = marks.verdict[place]
     if verdict == UNSTABLE:
@@ -172,7 +172,7 @@ def _left_for(
         return None
     kept = _marched(marches, settings, highest)
     if kept.reason or kept.holds(size(highest), accuracy):
-        return None
+        return marks, kept
     return _with_verdict(marks, place, Verdict(UNSTABLE, np.nan)), kept
 
 

@@ -106,7 +106,7 @@ class Curve:
     # the highest converged point where that one is unstable, else None
     unstable_peak: Solution | None = None
     # what the blade does in time at that one, or at the resonance where that is another unstable
-    # point; None where both are stable
+    # point, or one whose verdict is in doubt; None where both are stable
     kept: KeptBand | None = None
     # the resonance given is unstable, and a march from it keeps to amplitudes farther off than the
     # accuracy, or higher than at the resonance: the highest of these is given in place of that of
@@ -158,7 +158,7 @@ class Curve:
         if self.settings.error is None:
             return None
         balance = self.settings.error
-        same = self.keeps_unstable and not self.marched_instead
+        same = self.is_marched_from and not self.marched_instead
         balance = max(balance, self.marched) if same else balance + self.marched
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
         if self.sought is not None:
@@ -170,10 +170,10 @@ class Curve:
     @property
     def marched(self) -> float:
         """How far from the resonance given the blade was marched where the highest motion is
-        unstable, relative to that resonance: to either side of it where it is that motion, above
-        it where it is another. Nothing where a march from there is its error anyway; the
-        relative width of the band where its upper end is given, and a share of how far it is from
-        the balance where the march had fewer contact points. Without a known march from an
+        unstable or in doubt, relative to that resonance: to either side of it where it is that
+        motion, above it where it is another. Nothing where a march from there is its error anyway;
+        the relative width of the band where its upper end is given, and a share of how far it is
+        from the balance where the march had fewer contact points. Without a known march from an
         unstable resonance, infinite.
         """
         if self.kept is None:
@@ -182,11 +182,16 @@ class Curve:
             return np.inf if self.keeps_unstable and self.in_time is None else 0.0
         if self.marched_instead:
             return 1 - self.kept.lowest / self.kept.highest + _doubt_of_march(self, self.kept)
-        if self.keeps_unstable:
+        if self.is_marched_from:
             ends = (self.kept.lowest, self.kept.highest)
             beside = max(abs(end / self.curve_amplitude - 1) for end in ends)
             return 0.0 if self.in_time is not None else beside
         return max(0.0, self.kept.highest / self.curve_amplitude - 1)
+
+    @property
+    def is_marched_from(self) -> bool:
+        """The march, if there is one, begins at the resonance given, unstable or in doubt."""
+        return self.keeps_unstable or self.unstable_peak is None
 
     @property
     def keeps_unstable(self) -> bool:

@@ -17,6 +17,7 @@ from .loads import Curve
 from .resonance_list import reach_sentence
 from .stability_remarks import (
     Disturbances,
+    doubtful_sentence,
     folded_sentence,
     ripple_sentence,
     stability_sentence,
@@ -72,7 +73,7 @@ def response_remarks(
     remarks.extend(
         warning(f"load {load_of(c)}: {c.sought.sentence}") for c in curves if c.sought is not None
     )
-    unknown = unjudged_sentence(curves), unmarched_sentence(curves)
+    unknown = unjudged_sentence(curves), unmarched_sentence(curves), doubtful_sentence(curves)
     remarks.extend(map(warning, filter(None, unknown)))
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:
@@ -196,8 +197,8 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
     unknown = [load_of(c) for c in curves if c.error == np.inf]
     if unknown:
         yield (
-            f"under {', '.join(unknown)} the error of the resonance amplitude is unknown, since "
-            "richer models of it were not solved; nothing was refined because of that"
+            f"under {', '.join(unknown)} the error of the resonance amplitude is unknown: "
+            "neither richer models of it nor a march tell it; nothing was refined because of that"
         )
     # as it is told, with two digits: no estimate is known better
     above = [

@@ -102,7 +102,10 @@ def stability_sentence(
             "repeats after few blades, no more of them than model.harmonics where that is given, "
             "and not too many contact nodes that slip"
         )
-    worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})" if counts[UNSTABLE] else ""
+    worst = ""
+    # a motion that a march alone shows to be unstable has no multiplier
+    if counts[UNSTABLE] and np.isfinite(largest).any():
+        worst = f" (largest Floquet multiplier {np.nanmax(largest):.4g})"
     left_out = ""
     if counts[UNKNOWN]:
         left_out = (
@@ -240,6 +243,23 @@ def unjudged_sentence(curves: Sequence[Curve]) -> str:
     return (
         f"under {loads} the motion at the resonance was not judged: it may be unstable, and the "
         "blade leave it for another"
+    )
+
+
+def doubtful_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances that lift off, are not known to be unstable by few harmonics, and could not be
+    marched from, or "".
+    """
+    each = ", ".join(
+        f"{newtons(c.load)} ({c.kept.reason})"
+        for c in curves
+        if c.unstable_peak is None and c.kept is not None and c.kept.reason
+    )
+    if not each:
+        return ""
+    return (
+        "contacts lift off at the resonance, too few harmonics judge it, and whether the blade "
+        f"keeps to it is not known: {each}"
     )
 
 
