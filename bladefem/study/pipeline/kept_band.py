@@ -46,7 +46,7 @@ SECONDS_PER_STEP = 5e-6
 # the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
 # 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N; 1.1e11 with ground faces, 10 modes and an
 # elastic damper. Fewer points may lead elsewhere: under 1100 N there 16 points a seat keep 517 um
-# of the 536 that they are solved for, eight 453 of 531, four 472 of 530
+# of the 536 that they are solved for, eight some 460 of 531, four some 475 of 530
 MAX_MARCH = 1.5e11
 # and of those that its first period shows to be needed, some 30 s: the march above takes 22 s; more
 # of it where no fewer contact points are left to march with
@@ -68,7 +68,8 @@ GROWN_RATIO = 1.2
 # of the motion at the start: a band beyond it that was marched by steps too long for forces that
 # are linear in them is marched again with more instants, until two agree by AGREEING_SHARE. Under
 # 1100 N on the shipped wedge with ground faces, 530 um with four points a seat, 256 instants end on
-# 446, 1024 on 472 um; with eight points, 531 um, on 508 and 457
+# 446, 1024 on 472, 4096 on 475 um; with eight points, 531 um, 256 on 508, 1024 and 2048 on 455 and
+# 460
 HELD_SHARE = 0.03
 AGREEING_SHARE = 0.02
 # relative change of the ends of a band, from one PERIODS_AT_ONCE to the next, that is none: an
