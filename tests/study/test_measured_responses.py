@@ -38,7 +38,7 @@ def measured(tmp_path_factory):
     for curve in curves:
         high = curve.converged & (curve.amplitude > 0.4 * curve.peak_amplitude)
         chosen = np.flatnonzero(high)
-        chosen = chosen[np.linspace(0, len(chosen) - 1, 7).round().astype(int)]
+        chosen = chosen[np.linspace(0, len(chosen) - 1, 5).round().astype(int)]
         for i in np.unique(chosen):
             rows.append(f"{curve.load}, {curve.frequency[i]}, {1e6 * curve.amplitude[i]}")
     file = tmp_path_factory.mktemp("measured") / "readings.csv"
