@@ -27,6 +27,7 @@ small = [
     "study.loads=90 N, 200 N",
     "study.own_load=false",
     "study.stability=false",
+    "study.influences=false",
     "model.nodal_diameters=0, 9",
     "model.modes=10",
     "model.harmonics=1",

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 from bladefem.contact.interface_elements import scaled_contact, stiffnesses
 from bladefem.hbm.reference_blade import reference_model
@@ -53,13 +54,31 @@ def family(case):
 
 
 @pytest.fixture(scope="module")
-def found():
-    scene = load_scene(PLANE, ["accuracy=0.2 %", "contact.mu=1", "excitation.force=0.05 N"])
-    scene = replace(scene, study=replace(scene.study, band=(1150.0, 1450.0)))
+def scene():
+    given = load_scene(PLANE, ["accuracy=0.2 %", "contact.mu=1", "excitation.force=0.05 N"])
+    return replace(given, study=replace(given.study, band=(1150.0, 1450.0)))
+
+
+@pytest.fixture(scope="module")
+def found(scene):
     best = find_best_load(scene, changed("kt", 1.0), family, SETTINGS, None)
     names = ("kt", "mu", "damping", "seat friction")
     parameters = [Parameter(name, 1 / SMALL, SMALL, "a test") for name in names]
     return best, influences(scene, best, family, changed, parameters)
+
+
+@pytest.mark.mpi
+@pytest.mark.several_ranks
+@pytest.mark.two_ranks
+def test_ranks_share_the_parameters(scene, found):
+    """In the order and with the numbers of one rank."""
+    best, alone = found
+    parameters = [one.parameter for one in reversed(alone)]
+    shared = influences(scene, best, family, changed, parameters, MPI.COMM_WORLD)
+    assert [one.parameter for one in shared] == [one.parameter for one in alone]
+    for one, same in zip(shared, alone, strict=True):
+        for name in ("load", "amplitude", "frequency", "predicted", "solved"):
+            np.testing.assert_allclose(getattr(one, name), getattr(same, name), rtol=1e-9)
 
 
 def test_derivatives_are_those_of_repeated_searches(found):
@@ -91,12 +110,10 @@ def test_loads_at_the_ends_are_searched_and_not_kept(found):
     assert (one.solved[:, 0] != one.predicted[:, 0]).all()
 
 
-def test_derivatives_of_sampled_friction_are_those_of_exact_friction(found):
+def test_derivatives_of_sampled_friction_are_those_of_exact_friction(scene, found):
     """With few samples slopes ripple: changes are found with many, whatever was chosen."""
     best, exact = found
     sampled = replace(SETTINGS, samples=64, chosen=("samples", "harmonics", "points"))
-    scene = load_scene(PLANE, ["accuracy=0.2 %", "contact.mu=1", "excitation.force=0.05 N"])
-    scene = replace(scene, study=replace(scene.study, band=(1150.0, 1450.0)))
     parameters = [one.parameter for one in exact]
     again = influences(scene, replace(best, settings=sampled), family, changed, parameters)
     loads = {one.parameter.name: one.load for one in again}
