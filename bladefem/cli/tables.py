@@ -165,25 +165,35 @@ def pressure_table(maps: Mapping[float, Sequence[PressureMap]]) -> str:
 
 def response_tables(response: Response) -> str:
     """Resonance against load, and what damping is gained over no damper; in the units of the
-    report.
+    report. No best load is named where the report names none.
     """
     import pandas as pd
 
     from ..study.pipeline.loads import design_table
 
-    undamped = response.free_peak[1]
     curves = response.curves
     rows = pd.DataFrame(design_table(curves, response.limits))
     rows = rows[[name for name in SUMMARY_COLUMNS if name in rows]]
     rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
+    return f"{report_table(rows)}\n{_best_load_line(response)}"
+
+
+def _best_load_line(response: Response) -> str:
+    from ..report.best_load import lowest_of_response
+
+    curves = response.curves
     lowest = min(curves, key=lambda c: c.peak_amplitude)
+    against = lowest_of_response(response).against
+    if against:
+        return (
+            f"best load: not determined: {against[0]}; {_case_label(lowest)} has the lowest of "
+            "these amplitudes"
+        )
     best = lowest if response.best_found is None else curves[response.best_curve]
     words = "best of these loads" if response.best_found is None else "best load, by search"
+    gain = response.free_peak[1] / best.peak_amplitude
     beside = "" if best is lowest else f"; {_case_label(lowest)} has the lowest of these amplitudes"
-    return (
-        f"{report_table(rows)}\n{words}: {_case_label(best)}, amplitude divided by "
-        f"{undamped / best.peak_amplitude:.3g}{beside}"
-    )
+    return f"{words}: {_case_label(best)}, amplitude divided by {gain:.3g}{beside}"
 
 
 SUMMARY_COLUMNS = (

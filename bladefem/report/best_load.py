@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 
 from ..scene.units import newtons
 from ..study.pipeline.best_load import BestLoad, studied_load
-from ..study.pipeline.loads import Curve, lower_studied
+from ..study.pipeline.loads import Curve, design_table, lower_studied
+from ..study.pipeline.run_records import Response
+from .response_points import points_of
 
 # share of the excitation's work that friction takes at an optimum that is one of damping; below it
 # the amplitude is low for another reason, such as a stiffer blade
@@ -22,6 +25,44 @@ STUDIED_LOAD = 1e-6
 # parts of the error of a load that the balances of the search do not show: they are those of the
 # nearest load that was studied
 UNSEEN_PARTS = ("halved", "body_mesh", "layer_law")
+
+
+class LowestResonance(NamedTuple):
+    """The load with the lowest resonance amplitude, and whether it may be called the optimum."""
+
+    # of the design table
+    row: pd.Series
+    # by the exact search; else among the loads studied
+    searched: bool
+    # why it must not be called the optimum; empty where it may
+    against: list[str]
+
+
+def lowest_resonance(
+    summary: pd.DataFrame,
+    points: pd.DataFrame | None = None,
+    searched: pd.DataFrame | None = None,
+) -> LowestResonance:
+    """What the search found, or the best of the loads studied where it found nothing.
+
+    Args:
+        summary: the design table, with the linear limits and at least one load between them.
+        points: response table.
+        searched: ``best_load_table``.
+    """
+    found = None if searched is None else found_best(searched, summary)
+    finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
+    row = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
+    return LowestResonance(row, found is not None, reasons_against(row, summary, points, searched))
+
+
+def lowest_of_response(response: Response) -> LowestResonance:
+    """The same of responses that are not tables yet."""
+    return lowest_resonance(
+        pd.DataFrame(design_table(response.curves, response.limits)),
+        pd.concat([points_of(curve) for curve in response.curves], ignore_index=True),
+        best_load_table(response.best, response.curves) if response.best else None,
+    )
 
 
 def best_load_table(found: Sequence[BestLoad], curves: Sequence[Curve] = ()) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
 from ..scene.units import newtons
-from .best_load import certainty, flat_range, found_best, reasons_against
+from .best_load import certainty, flat_range, lowest_resonance
 
 # of the resonance frequency: farther off, an engine order does not drive it
 OFF_RESONANCE = 0.1
@@ -57,11 +57,9 @@ def response_answer(
     finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
     if finite.empty:
         return ResponseAnswer([], ["No damper load was studied."])
-    found = None if searched is None else found_best(searched, summary)
-    best = finite.loc[finite["peak_amplitude"].idxmin()] if found is None else found
-    against = reasons_against(best, summary, points, searched)
-    remark = mass_of(best) or (best_of_studied(finite) if found is None else flat_range(best))
-    doubts = cautions(finite, best, points, found is not None)
+    best, by_search, against = lowest_resonance(summary, points, searched)
+    remark = mass_of(best) or (flat_range(best) if by_search else best_of_studied(finite))
+    doubts = cautions(finite, best, points, by_search)
     if against:
         lowest = (
             "lowest resonance amplitude found",
@@ -72,7 +70,7 @@ def response_answer(
         unknown = ("optimum normal load per seat", "not determined", against[0])
         return ResponseAnswer([unknown, lowest], [*said, *doubts])
     # one load alone has no optimum
-    alone = found is None and len(finite) == 1
+    alone = not by_search and len(finite) == 1
     title = "normal load per seat" if alone else "optimum normal load per seat"
     numbers = _optimum_numbers(summary, best, title, remark)
     return ResponseAnswer(

@@ -28,6 +28,13 @@ SCENES = Path(__file__).parents[2] / "scenes"
 WEDGE = "scenes/wedge.toml"
 
 
+# of each point of a curve, and of no weight for what a command prints
+POINT_COLUMNS = (
+    *("first", "method", "route", "residual", "iterations", "slipping", "drift", "dissipated"),
+    *("imbalance", "estimated", "tolerated", "checked", "branch", "stability"),
+)
+
+
 def fake_curve(load, amplitude):
     peak = SimpleNamespace(
         work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0}, drift=0.0
@@ -45,7 +52,11 @@ def fake_curve(load, amplitude):
         peak_frequency=830.0,
         peak_amplitude=amplitude,
         frequency=np.arange(5.0),
-        converged=np.array([True, True, False, True, True]),
+        # the one that is not solved is not next to the highest
+        converged=np.array([True, True, True, False, True]),
+        amplitude=amplitude * np.array([0.5, 1.0, 0.5, 0.4, 0.3]),
+        balance_amplitude=amplitude,
+        **dict.fromkeys(POINT_COLUMNS, np.zeros(5)),
     )
 
 
@@ -86,6 +97,7 @@ def fake_run(folder):
     response = SimpleNamespace(
         limits=limits,
         free_peak=(812.4, 8e-5),
+        best=(),
         best_found=None,
         curves=[fake_curve(20.0, 4e-5), fake_curve(50.0, 2e-5)],
     )
@@ -682,6 +694,16 @@ def test_the_best_load_of_the_table_is_that_of_the_search(tmp_path):
     )
     response.best_curve = 1
     assert response_tables(response).endswith("best load, by search: 50 N, amplitude divided by 4")
+
+
+def test_no_best_load_is_named_where_the_report_names_none(tmp_path):
+    response = fake_run(tmp_path).response
+    # next to the highest of the best load
+    response.curves[1].converged[2] = False
+    assert response_tables(response).splitlines()[-1] == (
+        "best load: not determined: a point next to its highest one was not solved, so that the "
+        "resonance may be higher; 50 N has the lowest of these amplitudes"
+    )
 
 
 OWN_BLADE = "scenes/own_blade.toml"
