@@ -99,8 +99,9 @@ def blades_of_wave(model: ReducedModel) -> int:
     found = [_period(bodies) for bodies in (model.sides, _damper_bodies(model)) if bodies]
     if 0 in found:
         raise InputError(
-            f"the travelling wave does not repeat within {len(model.sides)} harmonics, expected an "
-            "engine order that shares a larger divisor with the number of blades"
+            f"the travelling wave does not repeat within {len(model.sides)} harmonics, expected "
+            "more of them (model.harmonics), or an engine order that shares a larger divisor with "
+            "the number of blades"
         )
     if len({r for r in found if r > 1}) > 1:
         raise InputError("blades and dampers repeat after different numbers of harmonics")

@@ -403,6 +403,7 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     unknown = given(lift=3, harmonics=3)
     shown = SimpleNamespace(load=580.0, kept=unknown.kept, unstable_peak=None)
     assert "580 N (no march)" in doubtful_sentence([shown])
+    assert "580 N (a flow)" in doubtful_sentence([shown], "a flow")
     assert doubtful_sentence([SimpleNamespace(kept=held.kept, unstable_peak=None, load=1.0)]) == ""
 
 

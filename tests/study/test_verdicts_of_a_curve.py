@@ -74,6 +74,7 @@ def test_the_sentence_says_why_nothing_could_be_judged():
     nothing = [(np.array([UNKNOWN]), np.array([np.nan]))]
     said = stability_sentence(nothing, judged_disturbances(short, first_for(3)))
     assert "since the travelling wave does not repeat within 3 harmonics" in said
+    assert "expected more of them (model.harmonics)" in said
     said = stability_sentence(nothing, judged_disturbances(short, first_for(3), 9, 36, True))
     assert "no point could be judged, since the flow's forces differ" in said
 

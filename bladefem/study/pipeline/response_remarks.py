@@ -73,7 +73,8 @@ def response_remarks(
     remarks.extend(
         warning(f"load {load_of(c)}: {c.sought.sentence}") for c in curves if c.sought is not None
     )
-    unknown = unjudged_sentence(curves), unmarched_sentence(curves), doubtful_sentence(curves)
+    doubtful = doubtful_sentence(curves, judged.reason)
+    unknown = unjudged_sentence(curves), unmarched_sentence(curves), doubtful
     remarks.extend(map(warning, filter(None, unknown)))
     intervals = [c.interval for c in curves if c.interval is not None]
     if intervals:

@@ -246,20 +246,24 @@ def unjudged_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
-def doubtful_sentence(curves: Sequence[Curve]) -> str:
+def doubtful_sentence(curves: Sequence[Curve], unjudged: str = "") -> str:
     """The resonances that lift off, are not known to be unstable by few harmonics, and could not be
     marched from, or "".
+
+    Args:
+        unjudged: why no motion of any curve could be judged or marched; "" where some could.
     """
     each = ", ".join(
-        f"{newtons(c.load)} ({c.kept.reason})"
+        f"{newtons(c.load)} ({unjudged or c.kept.reason})"
         for c in curves
         if c.unstable_peak is None and c.kept is not None and c.kept.reason
     )
     if not each:
         return ""
+    judged = "" if unjudged else "too few harmonics judge it, "
     return (
-        "contacts lift off at the resonance, too few harmonics judge it, and whether the blade "
-        f"keeps to it is not known: {each}"
+        f"contacts lift off at the resonance, {judged}and whether the blade keeps to it is not "
+        f"known: {each}"
     )
 
 
