@@ -123,7 +123,8 @@ CAPTIONS = {
     "lines are dashed next to them.",
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
     "The star marks the best load, by exact search where that was made, with the band of loads "
-    "that keep within the accuracy of it; dashed lines the blade without damper and in full stick.",
+    "that keep within the accuracy of it; there is none where the answer names no optimum. Bars "
+    "are estimated errors, dashed lines the blade without damper and in full stick.",
     "response/damped_motion": "Motion of blade and damper at the resonance under the best load, "
     "with all modes, harmonics and damper forces, about the mean position; the damper moves as a "
     "rigid body. Colours: amplitude of each node.",
@@ -139,7 +140,8 @@ CAPTIONS = {
     "zero flutter unless friction holds them.",
     "response/summary": "Resonance for each normal load. The error is that estimated for the "
     "resonance amplitude: of the balance, of contact points, of the body's mesh and of the layer; "
-    "without damper and in full stick (load ∞) there is no balance, and none was estimated. "
+    "without damper and in full stick (load ∞) the response is linear, and it is that of modes, "
+    "contact points and meshes. "
     "Stresses with an error by the mesh are those of the whole motion; the others are of the "
     "excited mode alone, which leaves out other modes, higher harmonics and damper forces.",
     "accuracy/loads_with_doubtful_points": "Loads with points that did not converge or needed a "

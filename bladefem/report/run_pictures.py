@@ -21,6 +21,7 @@ from ..view.live_curves import live_diameters, live_loops, live_optimum, live_re
 from ..view.live_shapes import live_motion, live_shapes
 from ..view.live_wheel import live_wheel
 from ..view.motion import draw_motion
+from .best_load import lowest_resonance
 from .fatigue import utilisation_drawing
 from .flow import flow_drawing
 from .nodes import draw_hysteresis, draw_wear, seat_loops
@@ -71,6 +72,7 @@ def live_figures(
             tables["response/summary"],
             result.contact.own,
             searched=tables.get("response/best_load"),
+            named=_names_optimum(tables),
         ),
         "response/hysteresis": live_loops(seat_loops(cycles)),
         "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
@@ -78,6 +80,12 @@ def live_figures(
         **({} if motions is None else {MOTION_FIGURE: motions}),
         **_live_wheel(result),
     }
+
+
+def _names_optimum(tables: dict[str, pd.DataFrame]) -> bool:
+    """The answer names an optimum."""
+    summary, points = tables["response/summary"], tables["response/points"]
+    return not lowest_resonance(summary, points, tables.get("response/best_load")).against
 
 
 def _live_wheel(result: SolvedRun) -> dict[str, dict[str, Any]]:
@@ -155,6 +163,7 @@ def _drawings(
             points=tables["response/points"],
             own=result.contact.own,
             searched=tables.get("response/best_load"),
+            named=_names_optimum(tables),
         ),
     }
     for title, motion in list(_motions(result).items())[:1]:

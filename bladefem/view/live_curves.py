@@ -135,6 +135,7 @@ def live_optimum(
     own: float | None = None,
     title: str = "optimum load",
     searched: pd.DataFrame | None = None,
+    named: bool = True,
 ) -> dict[str, Any]:
     """Resonance amplitude and frequency over load, a curve a damper mass; a star at the best load.
 
@@ -144,6 +145,7 @@ def live_optimum(
         title: headline.
         searched: table of best loads by exact search, a row a mass; the star is then there, in
             the band of loads whose amplitudes keep within the accuracy of it.
+        named: the data can carry an optimum; else none is marked.
     """
     data: list[dict[str, Any]] = []
     shapes = _level_lines(summary)
@@ -152,8 +154,12 @@ def live_optimum(
         finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
         name = "resonance" if mass is None else f"damper of {1e3 * mass:.4g} g"
         colour = COLOURS[number % len(COLOURS)]
+        data += _optimum_curve(finite, name, colour)
+        if not named:
+            continue
         exact = exact_optimum(searched, mass)
-        data += _optimum_curve(finite, name, colour, exact)
+        best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
+        data += _optimum_stars(best, name, colour)
         if exact is not None:
             shapes += _tolerated_band(exact, colour)
     if own is not None:
@@ -187,10 +193,9 @@ def _optimum_curve(
     finite: pd.DataFrame,
     name: str,
     colour: str,
-    exact: pd.Series | None,
 ) -> list[dict[str, Any]]:
-    """Amplitude with its estimated error above, frequency below, in both the best load as a star;
-    hollow where the error is not known.
+    """Amplitude with its estimated error above, frequency below; hollow where the error is not
+    known.
     """
     amplitude = MICRO * finite["peak_amplitude"].to_numpy(float)
     error = finite["error"].to_numpy(float) if "error" in finite else np.full(len(finite), np.nan)
@@ -223,8 +228,7 @@ def _optimum_curve(
         "showlegend": False,
         "hovertemplate": "%{x:.4~r} N, %{y:.6g} Hz<extra></extra>",
     }
-    best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
-    return [upper, lower, *_optimum_stars(best, name, colour)]
+    return [upper, lower]
 
 
 def _optimum_stars(best: pd.Series, name: str, colour: str) -> list[dict[str, Any]]:

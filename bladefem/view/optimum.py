@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MICRO = 1e6
+# downwards, of the amplitude
+LONGEST_BAR = 0.9
 
 
 def draw_optimum(
@@ -31,6 +33,7 @@ def draw_optimum(
     points: pd.DataFrame | None = None,
     own: float | None = None,
     searched: pd.DataFrame | None = None,
+    named: bool = True,
     ax: Axes | None = None,
     title: str = "",
 ) -> object:
@@ -47,6 +50,7 @@ def draw_optimum(
         own: load that the damper's mass gives at the operating speed [N].
         searched: table of best loads by exact search, a row a mass; the star is then there,
             in the band of loads whose amplitudes keep within the accuracy of it.
+        named: the data can carry an optimum; else none is marked.
         ax: two axes to draw into, amplitude and frequency.
         title: headline.
     """
@@ -54,7 +58,12 @@ def draw_optimum(
         groups = summary.groupby("mass") if "mass" in summary else [(None, summary)]
         for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
             label = None if mass is None else f"damper of {1e3 * mass:.4g} g"
-            draw_optimum_curve(axes, table, colour, label, exact_optimum(searched, mass))
+            exact = exact_optimum(searched, mass)
+            _draw_curve(axes, table, colour, label)
+            if named:
+                _draw_star(axes, table, colour, exact)
+        if not named:
+            axes[0].plot([], [], " ", label="no optimum is named: see the answer")
         draw_limits(axes, summary)
         draw_cut(axes, summary, points)
         if own is not None:
@@ -74,18 +83,17 @@ def draw_optimum(
         return axes[0].figure
 
 
-def draw_optimum_curve(
+def _draw_curve(
     axes: Any,
     table: pd.DataFrame,
     colour: str,
     label: str | None,
-    exact: pd.Series | None = None,
 ) -> None:
-    """One damper: two curves, its best load as a star with its numbers, the exact one where that
-    was searched.
-    """
-    finite = table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
+    """One damper: two curves, the amplitude with its estimated error."""
+    finite = _finite_loads(table)
     amplitude = MICRO * finite["peak_amplitude"]
+    if "error" in finite:
+        _draw_errors(axes[0], finite, colour)
     axes[0].plot(finite["load"], amplitude, "o-", color=colour, label=label)
     if "lowest" in finite and finite["lowest"].notna().any():
         _draw_history_range(axes[0], finite, colour)
@@ -106,6 +114,26 @@ def draw_optimum_curve(
             label="curve with unconverged points",
         )
     draw_unknown(axes[0], finite)
+
+
+def _finite_loads(table: pd.DataFrame) -> pd.DataFrame:
+    return table[(table["load"] > 0) & np.isfinite(table["load"])].sort_values("load")
+
+
+def _draw_errors(ax: Axes, finite: pd.DataFrame, colour: str) -> None:
+    """Bars of the estimated errors that are known."""
+    amplitude = MICRO * finite["peak_amplitude"].to_numpy(float)
+    error = finite["error"].to_numpy(float)
+    error = np.where(np.isfinite(error), error, 0.0)
+    # a logarithmic axis has no zero
+    below = np.minimum(error, LONGEST_BAR)
+    bars = np.stack([below, error]) * amplitude
+    ax.errorbar(finite["load"], amplitude, bars, fmt="none", ecolor=colour, elinewidth=1)
+
+
+def _draw_star(axes: Any, table: pd.DataFrame, colour: str, exact: pd.Series | None = None) -> None:
+    """The best load of one damper with its numbers, the exact one where that was searched."""
+    finite = _finite_loads(table)
     best = finite.loc[finite["peak_amplitude"].idxmin()] if exact is None else exact
     if exact is not None:
         _draw_tolerated_loads(axes, exact, colour)

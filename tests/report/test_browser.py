@@ -396,6 +396,9 @@ def test_the_star_of_the_optimum_is_where_the_search_found_it():
     assert [load for load, symbol in symbols.items() if symbol == "circle-open"] == [800.0]
     top = 10 ** spec["layout"]["yaxis"]["range"][1]
     assert top > 1e6 * summary["peak_amplitude"].max()
+    unnamed = live_optimum(summary, searched=searched, named=False)
+    assert not _stars(unnamed)
+    assert not [s for s in unnamed["layout"]["shapes"] if s["type"] == "rect"]
 
 
 def test_loops_and_responses_share_the_colours_of_the_loads():

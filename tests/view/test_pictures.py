@@ -354,6 +354,10 @@ def test_response_charts(folder):
     figure = draw_optimum(synthetic.summary(), folder / "exact.png", searched=searched)
     text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
     assert "optimum 170 N: 40 µm" in text and "140 to 210 N: within accuracy of the optimum" in text
+    figure = draw_optimum(synthetic.summary(), searched=searched, named=False)
+    text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
+    assert "no optimum is named" in text and "µm" not in text and "within accuracy" not in text
+    assert not any(line.get_marker() == "*" for line in figure.axes[0].lines)
     draw_accuracy(synthetic.accuracy(), folder / "accuracy.png", tolerance=0.02)
     draw_loops(synthetic.loops(), folder / "loops.png")
     draw_seat_loops({f"{n} N": synthetic.loops() for n in range(5)}, folder / "seats.png")
@@ -361,6 +365,18 @@ def test_response_charts(folder):
         min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats"))
         > 0.02
     )
+
+
+def test_an_optimum_chart_shows_the_estimated_errors():
+    summary = synthetic.summary().assign(error=0.02)
+    summary.loc[summary["load"] == 200, "error"] = 3.0
+    summary.loc[summary["load"] == 400, "error"] = np.inf
+    bars = draw_optimum(summary).axes[0].containers[0].lines[2][0].get_segments()
+    for (load, low), (_, high) in bars:
+        amplitude = 1e6 * summary.set_index("load")["peak_amplitude"][load]
+        below, above = {200: (0.9, 3.0), 400: (0.0, 0.0)}.get(load, (0.02, 0.02))
+        assert (low, high) == pytest.approx((amplitude * (1 - below), amplitude * (1 + above)))
+    assert len(bars) == (np.isfinite(summary["load"]) & (summary["load"] > 0)).sum()
 
 
 def test_a_curve_between_its_points_stays_between_them():
