@@ -24,6 +24,7 @@ from scipy import linalg
 
 from ..friction.fourier import to_real
 from ..util.newton import halve_step, iterate_newton
+from ..util.percent import percent
 from .mode_detour import led_motions
 from .mode_equations import (
     ModeFrame,
@@ -263,7 +264,7 @@ def _met_there(frame: ModeFrame, spot: PathSpot) -> str:
     if own is None:
         return ""
     harmonic, mode, off = own
-    return f"; {harmonic} times its frequency is {100 * abs(off):.2g} % off mode {mode + 1} there"
+    return f"; {harmonic} times its frequency is {percent(abs(off))} off mode {mode + 1} there"
 
 
 def _shorter_steps(
@@ -522,9 +523,7 @@ def _solve(
     end = run.state
     feeds = run.converged and end.state.zeta < SMALLEST_DAMPING
     converged = run.converged and not feeds
-    reason = (
-        f"friction would feed the motion, {100 * end.state.zeta:.2g} %" if feeds else run.reason
-    )
+    reason = f"friction would feed the motion, {percent(end.state.zeta)}" if feeds else run.reason
     return PathSpot(end.q, end.s, end.state, converged, reason, run.iterations, run.error)
 
 

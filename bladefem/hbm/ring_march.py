@@ -73,6 +73,8 @@ class RingMarch:
 
     # (periods, r, instants) [m], those that were marched since the last leap
     motion: np.ndarray
+    # (periods,) of each of these, mean of the blades [J]
+    friction_work: np.ndarray
     # that were marched in all
     periods: int
     # the forces of each step were found
@@ -132,6 +134,7 @@ def march_ring(
     y, forces = start.modal.copy(), forces_in_places(start.forces, r)
     resolved, prepared = _prepared(model, start, S)
     motion = np.empty((periods, S, r))
+    friction_work = np.zeros(periods)
     work = np.zeros(1)
     m, M = _system(model).contact.shape
     of_bodies = 8.0 * periods * S * M * (M + m)
@@ -142,7 +145,8 @@ def march_ring(
     while settled and done < periods:
         # the first period tells what the others take
         following = min(done - done % at_once + at_once, periods) if done else 1
-        settled = _marched(y, forces, prepared, motion[done:following], work)
+        part = slice(done, following)
+        settled = _marched(y, forces, prepared, motion[part], friction_work[part], work)
         done = following
         operations = of_bodies + work[0] * periods / done
         if operations > most:
@@ -152,15 +156,16 @@ def march_ring(
             break
         # what follows a leap has to tell where it led
         if whole and leaps and periods - done >= 3 * at_once:
-            part = first_amplitudes(motion[done - at_once : done].transpose(0, 2, 1))
-            envelope.append(part.mean())
-            leap = leap_from_end(envelope, scatter(part))
+            amplitudes = first_amplitudes(motion[done - at_once : done].transpose(0, 2, 1))
+            envelope.append(amplitudes.mean())
+            leap = leap_from_end(envelope, scatter(amplitudes))
             if leap:
                 _leap(_system(model), start.drive.omega, leap, y, prepared)
                 envelope, leapt = [], done
     marched = motion[leapt:done].transpose(0, 2, 1)
     end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
-    return RingMarch(marched, done, settled, resolved, operations, end)
+    spent = friction_work[leapt:done] / r
+    return RingMarch(marched, spent, done, settled, resolved, operations, end)
 
 
 def _marched(
@@ -168,13 +173,14 @@ def _marched(
     forces: np.ndarray,
     prepared: tuple[Any, ...],
     motion: np.ndarray,
+    friction_work: np.ndarray,
     work: np.ndarray,
 ) -> bool:
-    """Fill motion (periods, S, r), and move state and forces along; False where the forces of a
-    step were not found, or are no numbers.
+    """Fill motion (periods, S, r) and friction_work (periods,), and move state and forces along;
+    False where the forces of a step were not found, or are no numbers.
     """
     try:
-        found = bool(_march(y, forces, *prepared, motion, work))
+        found = bool(_march(y, forces, *prepared, motion, friction_work, work))
     except np.linalg.LinAlgError:
         # of a Newton step that is not determined
         motion[:] = np.nan
@@ -396,8 +402,11 @@ def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
 
 
 @njit(**KERNEL)
-def _march(y, f, w, steps, readings, contacts, kept, load, free, probe, motion, work):
-    """Fill motion (periods, S, r); False where the forces of a step were not found.
+def _march(
+    y, f, w, steps, readings, contacts, kept, load, free, probe, motion, friction_work, work
+):
+    """Fill motion (periods, S, r), and friction_work (periods,) of all blades; False where the
+    forces of a step were not found.
 
     Args:
         y: (2M,) modal displacements and velocities, changed.
@@ -422,6 +431,7 @@ def _march(y, f, w, steps, readings, contacts, kept, load, free, probe, motion, 
     moved = np.empty(2 * M)
     change = np.zeros((2, *f.shape))
     pushed = extra.reshape(w.size)
+    f_before, w_before = f.copy(), w.copy()
     for k in range(periods * S):
         seen, given = np.dot(reading, y[:M]), np.dot(flexible, pushed)
         for b in range(len(seen)):
@@ -434,14 +444,32 @@ def _march(y, f, w, steps, readings, contacts, kept, load, free, probe, motion, 
         for b in range(len(c)):
             for place in range(c.shape[1]):
                 c[b, place] += free[j, b, place]
+        copy_vector(f.reshape(f.size), f_before.reshape(f.size))
+        copy_vector(w.reshape(w.size), w_before.reshape(w.size))
         if not contact_forces(c, contacts, kept, w, f, change, extra, load[k % S], load[j], work):
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False
+        friction_work[k // S] += _work_of_step(f_before, w_before, f, w)
         modal = modal_forces(readings, extra)
         _add_product(after, modal, moved)
         copy_vector(moved, y)
     return True
+
+
+@njit(**INNER_KERNEL)
+def _work_of_step(f_before, w_before, f, w):
+    """Work of the tangential forces (r, 3, width) on displacements (r, 3 width) in a step, by the
+    trapezoidal rule [J].
+    """
+    total = 0.0
+    width = f.shape[2]
+    for b in range(len(f)):
+        for d in range(1, 3):
+            for k in range(width):
+                moved = w[b, d * width + k] - w_before[b, d * width + k]
+                total += 0.5 * (f_before[b, d, k] + f[b, d, k]) * moved
+    return total
 
 
 @njit(**INNER_KERNEL)

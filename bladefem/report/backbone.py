@@ -13,6 +13,7 @@ from ..scene.units import newtons
 from ..study.backbone import Backbone
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..util.message import warning
+from ..util.percent import percent
 from ..view.backbone import draw_design_map
 from .headlines import Headline
 from .tables import write_tables
@@ -28,8 +29,8 @@ def prediction_table(found: Sequence[Backbone]) -> pd.DataFrame:
                 **({} if one.mass is None else {"mass": one.mass}),
                 "mode_frequency": one.predicted[1],
                 "mode_amplitude": one.predicted[0],
-                "peak_frequency": one.balance[1],
-                "peak_amplitude": one.balance[0],
+                "balance_frequency": one.balance[1],
+                "balance_amplitude": one.balance[0],
                 "off": one.error,
                 "most_friction": one.friction[one.converged].max(initial=0.0),
                 "unconverged": int((~one.converged).sum()),
@@ -75,7 +76,7 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
         worst = max(reached, key=lambda one: abs(one.error))
         sentences.append(
             "resonances predicted by the nonlinear mode alone are off by "
-            f"{100 * abs(worst.error):.2g} % of the balance's amplitude at most, under "
+            f"{percent(abs(worst.error))} of the balance's amplitude at most, under "
             f"{newtons(worst.load, 4)}"
         )
     for one in found:

@@ -13,6 +13,7 @@ from ..scene.units import newtons
 from ..study.pipeline.best_load import BestLoad, studied_load
 from ..study.pipeline.loads import Curve, design_table, lower_studied
 from ..study.pipeline.run_records import Response
+from ..util.percent import percent
 from .response_points import points_of
 
 # share of the excitation's work that friction takes at an optimum that is one of damping; below it
@@ -109,8 +110,8 @@ def _judged(curve: Curve, searched: float) -> dict[str, float]:
         "load": curve.load,
         "frequency": curve.peak_frequency,
         "amplitude": curve.peak_amplitude,
-        "dissipated": curve.peak.work.dissipated,
-        "input_work": curve.peak.work.input,
+        "dissipated": curve.friction_work,
+        "input_work": curve.input_work,
         "error": np.inf if np.isinf(searched) else error,
     }
 
@@ -170,7 +171,7 @@ def error_words(row: pd.Series) -> str:
     if np.isinf(error):
         return "error unknown: neither richer models nor a march tell it"
     parts = "model and mesh" if np.isfinite(row.get("body_mesh", np.nan)) else "model; mesh apart"
-    return f"± {max(100 * error, 0.01):.2g} % ({parts})"
+    return f"± {percent(max(error, 1e-4))} ({parts})"
 
 
 def stress_error_words(row: pd.Series) -> str:
@@ -180,11 +181,11 @@ def stress_error_words(row: pd.Series) -> str:
     mesh = row.get("stress_error", np.nan)
     if not np.isfinite(mesh):
         return f"{error_words(row)}, error by the mesh there apart"
-    by_mesh = f"{100 * mesh:.2g} % by the mesh there"
+    by_mesh = f"{percent(mesh)} by the mesh there"
     error = row.get("error", np.nan)
     if not np.isfinite(error):
         return f"{error_words(row)}; {by_mesh}"
-    return f"± {100 * (error + mesh):.2g} % ({by_mesh})"
+    return f"± {percent(error + mesh)} ({by_mesh})"
 
 
 def flat_range(best: pd.Series) -> str:
@@ -200,8 +201,7 @@ def certainty(best: pd.Series) -> str:
     if "tolerance" not in best:
         return ""
     return (
-        f"estimated error {100 * best['error']:.2g} %, search closed to "
-        f"{100 * best['tolerance']:.2g} %"
+        f"estimated error {percent(best['error'])}, search closed to {percent(best['tolerance'])}"
     )
 
 
@@ -253,7 +253,7 @@ def _without_friction(best: pd.Series) -> list[str]:
     if not work > 0 or best["dissipated"] >= MIN_FRICTION_REDUCTION * work:
         return []
     return [
-        f"friction takes only {100 * best['dissipated'] / work:.2g} % of the excitation's work "
+        f"friction takes only {percent(best['dissipated'] / work)} of the excitation's work "
         "there: the amplitude is not lowered by friction"
     ]
 
@@ -269,8 +269,8 @@ def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     if gain > error:
         return []
     return [
-        f"it lies {100 * gain:.2g} % below the better of the free and the stuck blade, which is no "
-        f"more than its estimated error of {100 * error:.2g} %"
+        f"it lies {percent(gain)} below the better of the free and the stuck blade, which is no "
+        f"more than its estimated error of {percent(error)}"
     ]
 
 

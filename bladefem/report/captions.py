@@ -15,7 +15,8 @@ CAPTIONS = {
     "modes/mode_on_the_wheel": "The excited mode on the whole wheel: displacement along its main "
     "direction, with nodal lines in black.",
     "modes/frequencies_by_nodal_diameter": "Natural frequencies over nodal diameter, without "
-    "damper; lines join modes of one family in neighbouring nodal diameters.",
+    "damper; modes of one family have one sign, and are joined where neighbouring nodal diameters "
+    "were computed.",
     "modes/modes": "Modes in the excited nodal diameter, named after those of the clamped blade. "
     "On the screen: choose a mode, drag to rotate, move the phase through one period.",
     "modes/excited_modes": "Modes in the excited nodal diameter, named after those of the clamped "
@@ -119,8 +120,9 @@ CAPTIONS = {
     "contact/wear": "Wear in an hour of steady vibration at each resonance.",
     "response/forced_response": "Amplitude over frequency for each normal load per seat, without "
     "damper (black, dashed) and in full stick (grey, dotted). Dots are solved points, large dots "
-    "the highest of each curve that is not unstable; squares are unstable motions, and coloured "
-    "lines are dashed next to them.",
+    "the highest of each curve that is not unstable, diamonds the resonances that a march in time "
+    "gives, or the stiff layer that a softer one stands for, in place of it; squares are unstable "
+    "motions, and coloured lines are dashed next to them.",
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
     "The star marks the best load, by exact search where that was made, with the band of loads "
     "that keep within the accuracy of it; there is none where the answer names no optimum. Bars "
@@ -130,7 +132,9 @@ CAPTIONS = {
     "rigid body. Colours: amplitude of each node.",
     "response/hysteresis": "Friction force over relative displacement, summed over each seat, "
     "in one period at each resonance, along the direction in which the seat's mean motion is "
-    "largest; the enclosed area is the friction work of that motion.",
+    "largest; the enclosed area is the friction work of that motion. Where a march in time gives "
+    "the resonance the loops are those of its balance, and are called so; the friction work of the "
+    "march is in the design table.",
     "response/flow": "Waves of the wheel in the flow, without dampers; negative nodal diameters "
     "run backwards.",
     "response/flutter": "Limit cycle of each fed wave under each load; the start decides which "

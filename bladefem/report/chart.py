@@ -9,7 +9,8 @@ import pandas as pd
 from ..io.stage_cache import write_table, write_text
 from ..scene.tables import Scene
 from ..study.chart.chart import Chart
-from ..util.message import method
+from ..util.message import Message, method
+from ..util.percent import percent
 from ..view.chart import draw_chart, draw_errors
 from .headlines import Headline
 from .write import Page, write_report
@@ -58,8 +59,8 @@ def _report(
     numbers = [
         Headline(
             "automatic choice",
-            f"{100 * row['error']:.2g} % error",
-            f"wanted {100 * scene.accuracy:.2g} %",
+            f"{percent(row['error'])} error",
+            f"wanted {percent(scene.accuracy)}",
             f"{row['name']}, {row['time']:.3g} s",
         )
         for row in rows[:1]
@@ -70,7 +71,7 @@ def _report(
         scene,
         {f"accuracy/{name}": table for name, table in tables.items()},
         dict(zip(names, pictures, strict=True)),
-        map(method, chart.remarks),
+        (text if isinstance(text, Message) else method(text) for text in chart.remarks),
         page=Page(
             numbers=numbers,
             stem="report_chart",

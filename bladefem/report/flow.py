@@ -56,16 +56,13 @@ def flow_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
         return {}
     order = np.argsort(found.diameters)
     own = run.scene.excitation.engine_order % len(found.net)
-    # each wave has its own; that of the least damped one is the one to compare
-    worst = [one.friction for one in found.held if one.wave == found.worst]
-    friction = max(worst, default=None)
     return {
         "response/flow_damping": lambda file: draw_waves(
             found.diameters[order],
             found.net[order],
             float((found.net - found.flow)[0]),
             int(found.diameters[own]),
-            friction,
+            [one.friction for one in found.held],
             file,
         )
     }

@@ -27,6 +27,7 @@ from ..study.modes.survey import Survey, Wanted, excited_set, survey_modes
 from ..study.pipeline.run_records import folder_of
 from ..study.pipeline.stage_inputs import all_declared
 from ..util.communicator import Communicator
+from ..util.percent import percent
 from ..util.progress import Progress, without_progress
 from ..view import convergence, forced, mesh, modes, speed
 from ..view.live_curves import live_diameters
@@ -266,9 +267,7 @@ def _numbers(
         Headline(
             f"mode {i + 1}, {families[i]}",
             f"{excited.frequencies[i]:.5g} Hz",
-            f"± {100 * errors[i + 1]:.2g} % (mesh)"
-            if i + 1 in errors
-            else "mesh error not studied",
+            f"± {percent(errors[i + 1])} (mesh)" if i + 1 in errors else "mesh error not studied",
             f"{diameter}residual {excited.residuals[i]:.0e}",
         )
         for i in range(min(MAX_HEADLINES, len(excited.frequencies)))

@@ -8,6 +8,7 @@ import pandas as pd
 from bladefem.scene.tables import Scene
 
 from ..study.pipeline.response_remarks import TRUSTED_STRESS
+from ..util.percent import percent
 from .best_load import found_best
 from .statements import best_mass
 
@@ -80,7 +81,7 @@ def _stress_step(best: pd.Series) -> list[str]:
     if not error > TRUSTED_STRESS:
         return []
     return [
-        f"The mesh leaves {100 * error:.2g} % of error in the alternating stress, more than the "
+        f"The mesh leaves {percent(error)} of error in the alternating stress, more than the "
         f"{100 * TRUSTED_STRESS:g} % to rely on: take a finer mesh (mesh.size, mesh.scale), or a "
         "fillet where the place is a sharp edge, before the stress or a utilisation is signed."
     ]
@@ -89,7 +90,7 @@ def _stress_step(best: pd.Series) -> list[str]:
 def _mesh_step(best: pd.Series) -> list[str]:
     """How far the meshes move the resonance amplitude, and how to look closer."""
     parts = [
-        f"{words} by {100 * share:.2g} %"
+        f"{words} by {percent(share)}"
         for name, words in (
             ("body_mesh", "the estimated error of the body's mesh changes the amplitude"),
             ("halved", "half as many contact points change it"),

@@ -187,7 +187,9 @@ def seat_loops(
 ) -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     """Name of the load -> name of the seat -> (displacement [m], force [N]) of one period."""
     return {
-        newtons(c.load, 4) + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g"): {
+        newtons(c.load, 4)
+        + ("" if c.mass is None else f", {1e3 * c.mass:.4g} g")
+        + (", its balance" if c.is_march else ""): {
             f"{SEATS.get(name, name)} seat": (loop.displacement, loop.force)
             for name, loop in c.loops.items()
         }

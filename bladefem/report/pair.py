@@ -28,6 +28,7 @@ from geometry.mesh import Mesh
 from geometry.quality import quality_rows
 
 from ..util.communicator import Communicator
+from ..util.percent import percent
 from .datasets import resultants, table_dataset
 from .tables import write_tables
 from .write import write_report
@@ -106,7 +107,7 @@ def _messages(scene: Scene, states: list[PairState]) -> list[str]:
         "form, on the blocks' size"
     )
     return [
-        f"pressure within {100 * worst:.2g} % (L2{where}) of the closed form",
+        f"pressure within {percent(worst)} (L2{where}) of the closed form",
         f"approach: {known}" if solid else known,
     ]
 

@@ -10,7 +10,7 @@ import pandas as pd
 from ..hbm.stability import STABLE
 from ..study.pipeline.loads import Curve
 from ..study.pipeline.resonance_list import LocalResonance, local_resonances, motions_at
-from .response_points import MARCHED
+from ..view.response import MARCHED
 
 
 def resonance_table(curves: Sequence[Curve]) -> dict[str, pd.DataFrame]:

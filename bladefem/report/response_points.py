@@ -8,11 +8,9 @@ import pandas as pd
 from ..hbm.stability import STABLE
 from ..study.pipeline.linear_limits import Limit
 from ..study.pipeline.loads import Curve
+from ..view.response import FOLLOWED, MARCHED
 
-# methods of points that the balance of the curve does not give
-MARCHED = "march in time"
-FOLLOWED = "followed to the stiff layer"
-# and of those of a linear limit
+# method of the points of a linear limit
 LINEAR = "linear"
 
 
@@ -70,9 +68,9 @@ def _with_marched(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:
         route=method,
         residual=np.nan,
         iterations=0,
-        slipping=curve.peak.states["slip"] + curve.peak.states["lift"],
-        drift=np.nan,
-        dissipated=np.nan,
+        slipping=curve.slipping_at_peak,
+        drift=curve.drift_at_peak,
+        dissipated=curve.friction_work,
         imbalance=np.nan,
         estimated_error=curve.error,
         tolerated_error=np.nan,

@@ -13,6 +13,7 @@ from ..study.pipeline.response_remarks import load_of
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.state_check import state_sentence
 from ..util.message import method, warning
+from ..util.percent import percent
 from .influences import influence_sentence
 from .linear import linear_sentence
 from .nodes import wear_sentence
@@ -64,7 +65,7 @@ def coriolis_messages(result: SolvedRun) -> list[str]:
     if not shift > 0:
         return []
     share = (
-        f"Coriolis forces move the waves of mode {result.strength.mode} by {100 * shift:.2g} % of "
+        f"Coriolis forces move the waves of mode {result.strength.mode} by {percent(shift)} of "
         "its frequency"
     )
     if has_coriolis(result.reduced):

@@ -16,6 +16,7 @@ from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.scatter_use import SHARE, ScatteredUse
 from ..study.mistuning.sector_comparison import SectorComparison, comparison_words
 from ..util.message import warning
+from ..util.percent import percent
 from ..view import wheel as view
 from ..wheel.statistics import (
     Amplification,
@@ -95,7 +96,7 @@ def pattern_headlines(
         error = (
             "error unknown: more harmonics were not solved"
             if np.isnan(r.truncation)
-            else f"± {max(100 * r.truncation, 0.01):.2g} % (harmonics and samples; mesh and "
+            else f"± {percent(max(r.truncation, 1e-4))} (harmonics and samples; mesh and "
             "contact points apart, as of the tuned resonance)"
         )
         remark = (
@@ -352,7 +353,7 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
     sentences.extend(_mean_sentences(found, held_means))
     if len(found.harmonics):
         parts = [
-            f"{newtons(load)}: {H} ({'unknown' if np.isnan(error) else f'{100 * error:.2g} %'})"
+            f"{newtons(load)}: {H} ({'unknown' if np.isnan(error) else percent(error)})"
             for load, H, error in zip(found.loads, found.harmonics, found.truncation, strict=True)
         ]
         sentences.append(

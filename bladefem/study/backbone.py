@@ -122,7 +122,7 @@ def run_backbones(
     """
     scene = run.scene
     curves = run.response.curves
-    peaks = [curve.peak_amplitude for curve in curves]
+    peaks = [curve.balance_amplitude for curve in curves]
     ends = LOWEST_AMPLITUDE_RATIO * min(peaks), HIGHEST_AMPLITUDE_RATIO * max(peaks)
     patches = list(run.contact.problem.patches)
     cases = {(case.load, case.mass): case for case in load_cases(scene, run.mesh, run.contact)}
@@ -178,7 +178,7 @@ def curve_backbone(
         np.array([force_at_resonance(model, p) for p in points]) / modal_forces(model, points),
         np.array([p.converged for p in points]),
         np.array([p.fold for p in points]),
-        (curve.peak_amplitude, curve.peak_frequency),
+        (curve.balance_amplitude, curve.peak.frequency),
         seen * np.array([p.amplitude for p in points]),
         next((_ended(p.reason) for p in points if not p.converged), ""),
     )

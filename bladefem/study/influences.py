@@ -378,7 +378,8 @@ class _Study:
         by_load = np.log(sides[1].omega / sides[0].omega) / width
         moved = np.log(high.omega / low.omega) / width + by_load * moved_load
         rates = np.array([moved_load, amplitude, moved])
-        centre = np.log([load, base.height, base.solution.frequency])
+        # where a derivative is zero the ends are the best load itself, found again or not
+        centre = np.log([load, self.best.amplitude, self.best.frequency])
         ends = np.log([parameter.low, parameter.high])
         return Influence(
             parameter,

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..study.backbone import Backbone
+from ..util.percent import percent
 from .response import load_colours, load_name
 from .style import canvas, log_axis
 
@@ -148,6 +149,6 @@ def _draw_prediction(ax: Axes, found: Sequence[Backbone], colours: dict[float, A
         log_axis(ax, "y")
     ax.set(xlabel="normal load of a seat [N]", ylabel="resonance amplitude [µm]")
     far = max(abs(one.error) for one in found)
-    words = f"off by {100 * far:.2g} % at most" if np.isfinite(far) else "not all reached"
+    words = f"off by {percent(far)} at most" if np.isfinite(far) else "not all reached"
     ax.set_title(f"resonance: {words}")
     ax.legend()

@@ -10,8 +10,9 @@ import numpy as np
 import pandas as pd
 
 from ..scene.units import newtons
+from ..util.percent import percent
 from .optimum import exact_optimum
-from .response import load_colours, load_name, pieces_of, smooth_curve
+from .response import FOLLOWED, MARCHED, load_colours, load_name, pieces_of, smooth_curve
 from .style import COLOURS, FAILED_COLOUR
 
 MICRO = 1e6
@@ -41,6 +42,8 @@ def live_responses(
         for number, (piece, unstable) in enumerate(pieces_of(curve)):
             colour = matplotlib.colors.to_hex(colours[load])
             lines = _curve_traces(curve.iloc[piece], float(load), colour)
+            if curve["method"].iloc[piece].isin([MARCHED, FOLLOWED]).any():
+                lines[1]["marker"] = {**lines[1]["marker"], "symbol": "diamond", "size": 9}
             # one name a load, for all its pieces
             lines[0]["showlegend"] = number == 0
             if unstable:
@@ -124,7 +127,7 @@ def _hover_line(column: str, value: Any) -> str:
     if column == "load":
         return f"load {load_name(float(value))}"
     if column == "estimated_error":
-        return f"estimated error {100 * value:.2g} %" if np.isfinite(value) else "error unknown"
+        return f"estimated error {percent(value)}" if np.isfinite(value) else "error unknown"
     if column == "slipping":
         return f"{value:g} elements slip or lift off"
     return str(value)

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MICRO = 1e6
+# methods of a row that gives the resonance in place of the balances of its curve
+MARCHED = "march in time"
+FOLLOWED = "followed to the stiff layer"
 
 
 def draw_responses(
@@ -118,20 +121,34 @@ def draw_curve(
     if 0 < load < np.inf:
         ax.plot(frequency, amplitude, ".", color=colour, ms=2.5)
     if good.any():
-        lasting = amplitude.copy()
-        if "stability" in curve:
-            lasting[(curve["stability"] == "unstable").to_numpy()] = np.nan
-        top = np.nanargmax(lasting if np.isfinite(lasting).any() else amplitude)
+        top, apart = resonance_of(curve)
+        # above the squares of unstable motions
         ax.plot(
-            curve["frequency"].iloc[top],
+            frequency[top],
             amplitude[top],
-            "o",
+            "D" if apart else "o",
             color=colour,
-            ms=4.5,
+            ms=6 if apart else 4.5,
             mec="white",
             mew=0.6,
-            zorder=4,
+            zorder=6 if apart else 4,
         )
+
+
+def resonance_of(curve: pd.DataFrame) -> tuple[int, bool]:
+    """Row of the resonance that is given for a curve, and whether it is none of its balances: the
+    one that a march or a stiff layer gives, else the highest that is not unstable.
+    """
+    if "method" in curve:
+        given = np.flatnonzero(curve["method"].isin([MARCHED, FOLLOWED]))
+        if len(given):
+            return int(given[0]), True
+    good = curve["converged"].to_numpy(bool)
+    amplitude = np.where(good, curve["amplitude"], np.nan)
+    lasting = amplitude.copy()
+    if "stability" in curve:
+        lasting[(curve["stability"] == "unstable").to_numpy()] = np.nan
+    return int(np.nanargmax(lasting if np.isfinite(lasting).any() else amplitude)), False
 
 
 def pieces_of(curve: pd.DataFrame) -> list[tuple[np.ndarray, bool]]:

@@ -157,7 +157,7 @@ def draw_waves(
     net: np.ndarray,
     blade: float,
     excited: int,
-    friction: float | None,
+    friction: Sequence[float],
     file: str | Path,
 ) -> None:
     """Damping of the waves of a wheel in a flow.
@@ -167,7 +167,7 @@ def draw_waves(
         net: (N,) share of critical damping of blade and flow, without dampers.
         blade: the same of the blade alone.
         excited: nodal diameter of the engine order.
-        friction: largest damping by the dampers; None where they are not needed.
+        friction: largest damping by the dampers of each wave that is fed, under each load.
     """
     with canvas(file, size=(7.6, 3.9)) as ax:
         colours = [COLOURS[1] if value < 0 else COLOURS[0] for value in net]
@@ -180,8 +180,9 @@ def draw_waves(
         ax.plot([excited], [100 * height], "v", color="black", label="engine order")
         if (net < 0).any():
             label = "fed by the flow"
-            if friction is not None:
-                label += f": friction holds up to {100 * friction:.3g} %"
+            if friction:
+                ends = dict.fromkeys(f"{100 * end:.3g}" for end in (min(friction), max(friction)))
+                label += f"; friction damps a wave by up to {' to '.join(ends)} %"
             ax.plot([], [], "s", color=COLOURS[1], label=label)
         ax.set_xlabel("nodal diameter, negative: backward")
         ax.set_ylabel("damping without dampers [%]")

@@ -36,13 +36,13 @@ POINT_COLUMNS = (
 
 
 def fake_curve(load, amplitude):
-    peak = SimpleNamespace(
-        work=SimpleNamespace(dissipated=2e-3), states={"slip": 3, "lift": 0}, drift=0.0
-    )
     return SimpleNamespace(
         load=load,
         mass=None,
-        peak=peak,
+        peak=SimpleNamespace(),
+        friction_work=2e-3,
+        slipping_at_peak=3,
+        drift_at_peak=0.0,
         settings=SimpleNamespace(error=0.013, harmonics=3),
         halved=np.nan,
         body_mesh=np.nan,

@@ -37,6 +37,17 @@ def test_a_march_by_steps_is_the_plain_one(omega):
     assert own[1:kept] == pytest.approx(plain[1:kept], rel=0.02)
 
 
+@pytest.mark.parametrize("model", [bouncing(), bouncing_wave()])
+def test_a_march_does_the_friction_work_of_the_balance(model):
+    """The mean of the blades, in stick, slip and lift-off."""
+    point = solve(model, 1.3, 8, 1024)
+    assert point.converged and point.states["lift"] and point.work.dissipated > 0
+    found = march_ring(model, state_of_solution(model, point), 5, 512)
+    assert heights(found.motion) == pytest.approx(size(point), rel=0.01)
+    assert found.friction_work.shape == (5,)
+    assert found.friction_work[1:] == pytest.approx(point.work.dissipated, rel=0.01)
+
+
 @pytest.mark.parametrize(("omega", "phase"), [(1.3, 1.0), (1.6, 1.0), (1.6, 1.0j)])
 def test_a_normal_load_that_varies_is_marched_as_balanced(omega, phase):
     """In stick, slip and lift-off, where its variation changes the amplitude by a half and more."""

@@ -15,13 +15,12 @@ from bladefem.scene.toml import vary
 
 
 def curve(load, amplitude):
-    peak = SimpleNamespace(
-        work=SimpleNamespace(dissipated=1e-3), states={"slip": 2, "lift": 0}, drift=0.0
-    )
     return SimpleNamespace(
         load=load,
         mass=None,
-        peak=peak,
+        friction_work=1e-3,
+        slipping_at_peak=2,
+        drift_at_peak=0.0,
         peak_frequency=830.0,
         peak_amplitude=amplitude,
         settings=SimpleNamespace(error=0.01, harmonics=3),

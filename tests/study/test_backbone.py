@@ -28,8 +28,8 @@ def curve_of(height, frequency, harmonics, samples, load=1.0):
         load=load,
         mass=None,
         settings=SimpleNamespace(harmonics=harmonics, samples=samples),
-        peak_amplitude=height,
-        peak_frequency=frequency,
+        balance_amplitude=height,
+        peak=SimpleNamespace(frequency=frequency),
     )
 
 

@@ -78,6 +78,7 @@ def test_a_stable_motion_is_kept():
     found = kept_band(model, point)
     assert found.lowest == pytest.approx(size(point), rel=2e-3)
     assert found.highest == pytest.approx(size(point), rel=2e-3)
+    assert found.friction_work == pytest.approx(point.work.dissipated, rel=0.01)
     assert "ends on a motion" in found.sentence
 
 
@@ -227,7 +228,12 @@ def marched(heights, instants, enough=never_enough):
         if enough(motion[:done]):
             break
     return SimpleNamespace(
-        motion=motion[:done], settled=True, resolved=True, operations=1.0, end=None
+        motion=motion[:done],
+        friction_work=np.ones(done),
+        settled=True,
+        resolved=True,
+        operations=1.0,
+        end=None,
     )
 
 

@@ -13,13 +13,14 @@ from bladefem.hbm.branches import find_branches
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
-from bladefem.report.response_points import FOLLOWED, MARCHED, points_of
+from bladefem.report.response_points import points_of
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.pipeline import resonance_in_time as module
 from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.resonance_in_time import ResonanceInTime, resonance_in_time
+from bladefem.view.response import FOLLOWED, MARCHED
 
 BAND = (249.0, 431.0)
 SETTINGS = Settings(10, 15, 512, "rigid")
@@ -115,6 +116,8 @@ def one_point(**given):
         probe=np.array([[0.0], [1e-3]]),
         harmonics=1,
         states={"slip": 0, "lift": 3},
+        drift=1e-6,
+        work=SimpleNamespace(dissipated=4e-3, input=5e-3),
     )
     columns = {name: np.ones(1) for name in names.split()}
     marks = {"stability": np.array(["stable"]), "bifurcation": np.array([""])}
@@ -123,12 +126,16 @@ def one_point(**given):
 
 
 def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
-    sought = ResonanceInTime(101.0, 1.9e-3, 2e-3, 0.07, 8, 5, 900)
+    sought = ResonanceInTime(101.0, 1.9e-3, 2e-3, 0.07, 8, 5, 900, friction_work=6e-3)
     curve = one_point(settings=replace(SETTINGS, error=np.inf), sought=sought, halved=0.3)
     assert (curve.peak_frequency, curve.peak_amplitude) == (101.0, 2e-3)
     assert curve.balance_amplitude == 1e-3 and curve.error == pytest.approx(0.07)
     row = points_of(curve).iloc[-1]
     assert (row["method"], row["frequency"], row["amplitude"]) == (MARCHED, 101.0, 2e-3)
+    assert row["dissipated"] == curve.friction_work == 6e-3
+    assert curve.input_work == pytest.approx(10e-3)
+    # of the march neither is known
+    assert np.isnan([row["slipping"], row["drift"]]).all()
     assert points_of(replace(curve, sought=None))["method"].tolist() == [1.0]
     assert "at 101 Hz the blade keeps between 1900 and 2000 um" in sought.sentence
 
@@ -146,6 +153,7 @@ def test_the_resonance_of_a_stiff_layer_is_the_one_of_the_curve():
     assert reached.error == curve.error == pytest.approx(0.05)
     row = points_of(reached).iloc[-1]
     assert row["method"] == FOLLOWED and row["amplitude"] == pytest.approx(0.9e-3)
+    assert row["dissipated"] == pytest.approx(3.6e-3) and row["slipping"] == 3
     band = KeptBand(100.0, 0.8e-3, 1.1e-3, 200)
     # from the resonance itself, to both of its sides
     higher = replace(reached, kept=band)
@@ -153,5 +161,6 @@ def test_the_resonance_of_a_stiff_layer_is_the_one_of_the_curve():
     # from another motion, above the resonance alone
     elsewhere = SimpleNamespace(**(vars(curve.peak) | {"omega": 190 * np.pi}))
     assert replace(higher, unstable_peak=elsewhere).marched == pytest.approx(0.1)
-    instead = replace(higher, marched_instead=True)
+    instead = replace(higher, marched_instead=True, kept=replace(band, friction_work=3e-3))
     assert instead.peak_amplitude == pytest.approx(0.99e-3)
+    assert instead.friction_work == pytest.approx(2.7e-3)

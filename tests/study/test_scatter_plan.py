@@ -91,9 +91,9 @@ def response(*amplitudes):
             mass=None,
             peak_frequency=810.0,
             peak_amplitude=amplitude,
-            peak=SimpleNamespace(
-                work=SimpleNamespace(dissipated=1e-3), states={"slip": 1, "lift": 0}, drift=0.0
-            ),
+            friction_work=1e-3,
+            slipping_at_peak=1,
+            drift_at_peak=0.0,
             settings=SimpleNamespace(error=0.01, harmonics=3),
             halved=0.0,
             body_mesh=0.0,

@@ -31,14 +31,14 @@ def case(load: float, mass: float | None = None) -> LoadCase:
 
 
 def curve(load: float, amplitude: float, mass: float | None = None) -> SimpleNamespace:
-    work = SimpleNamespace(dissipated=5e-4, input=6e-4)
     return SimpleNamespace(
         load=load,
         mass=mass,
         peak_amplitude=amplitude,
         peak_frequency=386.9,
         error=0.04,
-        peak=SimpleNamespace(work=work),
+        friction_work=5e-4,
+        input_work=6e-4,
     )
 
 

@@ -279,12 +279,15 @@ def test_a_motion_that_was_not_judged_is_no_lasting_one():
     # a curve says so where that motion is its resonance
     curve = SimpleNamespace(
         load=7.0,
-        sought=None,
+        is_march=False,
         frequency=np.array([1.0, 1.0, 2.0]),
         amplitude=heights,
         stability=np.array([UNKNOWN, STABLE, STABLE]),
         peak=SimpleNamespace(frequency=1.0, probe=np.array([[0.0], [3.0]])),
     )
     assert "under 7 N the motion at the resonance was not judged" in unjudged_sentence([curve])
+    curve.is_march = True
+    assert unjudged_sentence([curve]) == ""
+    curve.is_march = False
     curve.peak.probe[1] = 2.0
     assert unjudged_sentence([curve]) == ""

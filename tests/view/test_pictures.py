@@ -41,7 +41,7 @@ from bladefem.view.modes import (
 )
 from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
 from bladefem.view.optimum import draw_optimum
-from bladefem.view.response import draw_responses, smooth_curve
+from bladefem.view.response import FOLLOWED, MARCHED, draw_responses, resonance_of, smooth_curve
 from bladefem.view.skin import row_keys, skin, wheel_skin
 from bladefem.view.style import SUPERSAMPLING, canvas, enlarged_lines, show_photograph
 from geometry.mesh import Mesh, Sector
@@ -364,6 +364,35 @@ def test_response_charts(folder):
     assert (
         min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats"))
         > 0.02
+    )
+
+
+@pytest.mark.parametrize(
+    ("heights", "verdicts", "methods", "row", "apart"),
+    [
+        ([1.0, 3.0, 2.0], None, ["newton"] * 3, 1, False),
+        ([1.0, 3.0, 2.0], ["", "unstable", ""], ["newton"] * 3, 2, False),
+        ([1.0, 3.0, 2.0], ["unstable"] * 3, ["newton"] * 3, 1, False),
+        ([1.0, 3.0, 2.0], ["", "", "stable"], ["newton", "newton", MARCHED], 2, True),
+        ([1.0, 3.0, 2.0], None, [FOLLOWED, "newton", "newton"], 0, True),
+    ],
+)
+def test_the_resonance_that_is_given_is_the_one_marked(heights, verdicts, methods, row, apart):
+    """Under 40 N the mistuned scene keeps 495 um of its 637 um balance."""
+    curve = pd.DataFrame(
+        {
+            "load": 40.0,
+            "frequency": [1.0, 2.0, 3.0],
+            "amplitude": 1e-6 * np.array(heights),
+            "converged": True,
+            "method": methods,
+            **({} if verdicts is None else {"stability": verdicts}),
+        }
+    )
+    assert resonance_of(curve) == (row, apart)
+    marks = [line for line in draw_responses(curve).axes[0].lines if len(line.get_xdata()) == 1]
+    assert [line.get_marker() for line in marks if line.get_xdata()[0] == row + 1][-1] == (
+        "D" if apart else "o"
     )
 
 

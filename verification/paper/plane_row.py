@@ -66,18 +66,24 @@ def row_of_blades(scene: Scene, modes: int = 8, folder: Any = None, comm: Any = 
 
 
 def paper_model(
-    scene: Scene, row: Row, load: float, mass: float | None = None, harmonics: int = 31
+    scene: Scene,
+    row: Row,
+    load: float,
+    mass: float | None = None,
+    harmonics: int = 31,
+    *,
+    layer: bool = False,
 ) -> ReducedModel:
-    """The paper's model: tangential degrees of freedom only, prescribed normal loads from rigid faces, a
-    damper that moves along the row.
+    """The paper's model: tangential degrees of freedom only, prescribed normal loads from rigid
+    faces, a damper that moves along the row.
 
     Args:
         load: normal load of a seat [N].
         mass: of the damper [kg]; the scene's own when left out.
+        layer: the faces are seated on the contact layer instead, as those of `whole_model`.
     """
-    model = _joint(
-        vary(scene, contact__normal="prescribed"), row.problem, row, load, "mass", harmonics
-    )
+    problem = on_layer(scene, row.problem) if layer else row.problem
+    model = _joint(vary(scene, contact__normal="prescribed"), problem, row, load, "mass", harmonics)
     nodes = len(model.elements.kt)
     tangents = np.kron(np.eye(nodes), [[0.0, 1.0]])
     sides = tuple(
@@ -94,12 +100,12 @@ def whole_model(
     scene: Scene, row: Row, load: float, damper: str = "rigid", harmonics: int = 31
 ) -> ReducedModel:
     """The same blades without the paper's simplifications: residual flexibility, and normal loads
-    that follow.
+    that follow, from faces seated on the layer whose springs they move on.
 
     Args:
         load: static normal load of a seat [N].
-        damper: "mass" (residual flexibility only), "rigid" (three degrees of freedom, normal springs) or
-            "elastic".
+        damper: "mass" (residual flexibility only), "rigid" (three degrees of freedom, normal
+            springs) or "elastic".
     """
     return _joint(scene, on_layer(scene, row.problem), row, load, damper, harmonics)
 

@@ -147,8 +147,10 @@ def advance_path(
         if found is not None:
             return found, share, found.sign != spot.sign
     value = parameter_value(task.name, spot.x)
-    unit = " rad/s" if task.name == "omega" else ""
-    raise NotSolvedError(f"the path stopped at {task.name} = {value:.6g}{unit}: {reason}")
+    place = f"{task.name} = {value:.6g}"
+    if task.name == "omega":
+        place = f"{value / (2 * np.pi):.6g} Hz"
+    raise NotSolvedError(f"the path stopped at {place}: {reason}")
 
 
 # unit direction in displacements over their size, and in the parameter over its width

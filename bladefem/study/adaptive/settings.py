@@ -7,6 +7,7 @@ from math import ceil, inf, log2, sqrt
 from typing import Any
 
 from ...scene.tables import Scene
+from ...util.percent import percent
 
 # from poor to rich
 DAMPER_MODELS = ("mass", "rigid", "elastic")
@@ -65,16 +66,23 @@ class Settings:
             "where it is as accurate"
         )
 
-    def sentence(self, nodes: int | None = None, unjudged: str = "not estimated") -> str:
+    @property
+    def error_words(self) -> str:
+        """What the choice knows of the error of these settings."""
+        if self.error is None:
+            return "not estimated"
+        if self.error == inf:
+            return "error unknown: richer models were not solved"
+        return f"estimated error {percent(self.error)}"
+
+    def sentence(self, nodes: int | None = None, told: str = "") -> str:
         """The settings in words.
 
         Args:
             nodes: those that a seat has, where known.
-            unjudged: what is known of their error where it was not estimated with the choice.
+            told: what is known of their errors, in place of that of the choice.
         """
-        error = unjudged if self.error is None else f"estimated error {100 * self.error:.2g} %"
-        if self.error == inf:
-            error = "error unknown: richer models were not solved"
+        error = told or self.error_words
         kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"
         points = (
             "all contact points"

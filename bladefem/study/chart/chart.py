@@ -19,7 +19,7 @@ import pandas as pd
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.solution import size
-from ..adaptive.choice import adapted_settings, covered_band
+from ..adaptive.choice import Checked, adapted_settings, covered_band
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import DAMPER_MODELS, Settings
 from .cpu_clock import Clock, running_clock
@@ -63,6 +63,8 @@ class Chart:
     settings: Settings
     # all with the settings of the automatic choice; time is that of everything
     meshes: pd.DataFrame | None = None
+    # of the automatic choice
+    curve: Checked | None = None
 
 
 def method_chart(
@@ -110,7 +112,8 @@ def method_chart(
             f"{clock.compiled:.2g} s were spent on compilation, once; they are not part of any "
             "time above"
         )
-    return Chart(table[len(models) :].reset_index(drop=True), table[: len(models)], remarks, chosen)
+    methods = table[len(models) :].reset_index(drop=True)
+    return Chart(methods, table[: len(models)], remarks, chosen, curve=curve)
 
 
 def check_budget(seconds: float) -> None:
@@ -214,8 +217,8 @@ def _bench(
     harmonics, samples = REFERENCE_SETTINGS[len(reached) - 1]
     course.remarks.append(
         f"reference of the {name}: H {harmonics}, {samples} samples, resonance "
-        f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt['error']:.1e} on "
-        "its last rung"
+        f"{truth.frequency:.6g} Hz, {1e6 * truth.amplitude:.6g} um, changed by "
+        f"{doubt['error']:.1e} on its last rung"
     )
     return Bench(omegas, truth, doubt)
 

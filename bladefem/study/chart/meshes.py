@@ -214,8 +214,8 @@ def mesh_table(
     doubt = abs(before.amplitude / truth.amplitude - 1) if before else np.nan
     remarks.append(
         f"reference of the meshes: {rich[-1]['name']} of second order, resonance "
-        f"{truth.frequency:.6g} Hz, {truth.amplitude:.6g} m, changed by {doubt:.1e} from the mesh "
-        "before, its frequency by "
+        f"{truth.frequency:.6g} Hz, {1e6 * truth.amplitude:.6g} um, changed by {doubt:.1e} "
+        "from the mesh before, its frequency by "
         f"{abs(before.frequency / truth.frequency - 1) if before else np.nan:.1e}"
     )
     remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows if row["reason"]]

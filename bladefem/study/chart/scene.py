@@ -9,15 +9,22 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...hbm.reference_blade import reference_model
+from ...hbm.solution import size
+from ...hbm.stability import UNKNOWN
 from ...io.stage_cache import cached_stage, on_root
 from ...reduction.assemble import folded_diameter
 from ...scene.tables import Scene
 from ...scene.units import newtons
 from ...util.communicator import Communicator
+from ...util.message import warning
+from ..adaptive.check_points import peak_of
+from ..adaptive.choice import Checked
 from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted_settings, scene_line
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
+from ..pipeline.error_in_time import Marches
+from ..pipeline.judged_resonance import judged_resonance
 from ..pipeline.pipeline import run
 from ..pipeline.reduced_sector import Reduced
 from .chart import Chart, check_budget, method_chart
@@ -77,6 +84,9 @@ def scene_chart(
         ),
     )
     made.remarks.insert(0, f"normal load {newtons(case.load)} on each seat")
+    if scene.study.stability and made.curve is not None:
+        curve, models = made.curve, family(reduced)
+        made.remarks.append(on_root(comm, lambda: _judged_sentence(scene, models, curve)))
     made.remarks.append(f"take this, at the beginning of the scene: {scene_line(made.settings)}")
     if sizes is None:
         return made
@@ -84,6 +94,28 @@ def scene_chart(
         made,
         meshes=mesh_table(scene, made.settings, case.load, variants, budget, made.remarks, comm),
     )
+
+
+def _judged_sentence(scene: Scene, models: Family, curve: Checked) -> str:
+    """Whether the blade keeps to the resonance of the automatic choice, in time: all that a chart
+    compares are balances.
+    """
+    top = peak_of(curve.points)
+    judged = judged_resonance(Marches(models), curve, scene)
+    balance = f"{1e6 * size(top):.4g} um at {top.frequency:.5g} Hz"
+    if judged.contradicted and judged.kept is not None:
+        return warning(
+            f"the errors above compare balances, {balance}, to which the blade does not keep at "
+            f"this load; at {judged.point.frequency:.5g} Hz {judged.kept.sentence}"
+        )
+    undriven = ""
+    if judged.undriven:
+        undriven = "; motions that only a strong drive leads to were not sought"
+    if judged.kept is not None:
+        return f"the resonance of the automatic choice, {balance}: {judged.kept.sentence}{undriven}"
+    verdict = judged.marks.verdict[[p is top for p in curve.points]][0]
+    words = "was not judged" if verdict == UNKNOWN else f"is {verdict}"
+    return f"the resonance of the automatic choice, {balance}, {words}{undriven}"
 
 
 def _fewer_diameters(reduced: Reduced, order: int) -> Iterator[tuple[str, Reduced]]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...scene.units import newtons
 from ...util.message import warning
+from ...util.percent import percent
 from .deciding_blades import DecidingBlade
 from .other_blades import other_blade_sentences
 from .pattern_response import PatternResponse
@@ -40,7 +41,7 @@ def pattern_sentences(found: Sequence[PatternResponse], held_means: bool) -> lis
 
 def _peak_sentence(r: PatternResponse) -> str:
     """The highest blade, and its stress."""
-    error = "unknown" if np.isnan(r.truncation) else f"{100 * r.truncation:.2g} %"
+    error = "unknown" if np.isnan(r.truncation) else f"{percent(r.truncation)}"
     text = (
         f"whole wheel under {newtons(r.load)}: blade {r.peak.blade + 1} moves "
         f"{1e6 * r.peak.height:.4g} um, {r.factor:.3g} times the tuned wheel (without dampers "
@@ -88,7 +89,7 @@ def _stress_words(one: DecidingBlade) -> str:
     place = ", ".join(f"{1e3 * x:.1f}" for x in one.worst.place)
     return (
         f"{1e-6 * one.worst.largest:.4g} MPa at ({place}) mm, estimated error of the mesh there "
-        f"{100 * one.worst.mesh_error:.2g} %"
+        f"{percent(one.worst.mesh_error)}"
     )
 
 
@@ -100,7 +101,7 @@ def _own_mesh_words(one: DecidingBlade) -> str:
         "; that blade has another shape, and its stress is that of its own mesh, where "
         f"{1e-6 * one.stress.largest:.4g} MPa is that of the same motion on the others'; "
         "wheel and blade disagree about its own motion by "
-        f"{100 * one.own_stress.mismatch:.2g} % of its inertia"
+        f"{percent(one.own_stress.mismatch)} of its inertia"
     )
 
 
@@ -129,6 +130,6 @@ def _mean_sentence(r: PatternResponse, held_means: bool) -> str:
     elif held_means:
         moved = "as the tuned curves do (model.static): what free ones change is not known"
     else:
-        moved = f"which moves the tuned resonance by {100 * abs(r.sector_difference):.2g} %"
+        moved = f"which moves the tuned resonance by {percent(abs(r.sector_difference))}"
     lost = "" if free is None else "; with free ones no balance was found at its resonance"
     return f"the whole wheel holds mean displacements in the preload state, {moved}{lost}"

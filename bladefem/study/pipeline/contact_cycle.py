@@ -66,7 +66,8 @@ class ContactCycle:
     shares: RealArray
     # (nodes,) SEPARATED, STICK, PARTIAL_SLIP or GROSS_SLIP of friction.aft
     state: IntegerArray
-    # (nodes,) friction work a period and area, the wear-work map [J/m^2]
+    # (nodes,) friction work a period and area, the wear-work map [J/m^2]; where the resonance given
+    # is not the balance, as large in all as that of the resonance
     work: RealArray
     # (nodes,) size up to which the static friction force of their element is free [N]
     spare: RealArray
@@ -80,6 +81,8 @@ class ContactCycle:
     elements: Elements
     # largest |work of the approximation - friction work| over the largest friction work [1]
     mismatch: float
+    # the resonance given is what a march keeps to; the period is that of a balance
+    is_march: bool = False
 
     def wear(self, coefficient: float) -> np.ndarray:
         """(nodes,) depth worn off in an hour of this resonance [m], both faces together.
@@ -97,7 +100,7 @@ def contact_cycle(
     patches: Sequence[Patch],
     points: int | None,
 ) -> ContactCycle:
-    """The period at the highest point of a response curve.
+    """The period at the highest point of a response curve, of its balance.
 
     Args:
         case: the load of the curve.
@@ -127,10 +130,10 @@ def contact_cycle(
     return ContactCycle(
         case.load,
         case.mass,
-        curve.peak.frequency,
+        curve.peak_frequency,
         forces.shares[groups],
         forces.state[groups],
-        part / area * forces.dissipated[groups],
+        part / area * _over_balance(curve) * forces.dissipated[groups],
         free_static_force(elements, w)[groups],
         {
             patch.name: _loop(elements, started, series, some)
@@ -140,7 +143,14 @@ def contact_cycle(
         _dealt(each, groups, part),
         _dealt_elements(layer, groups, part),
         mismatch,
+        curve.is_march,
     )
+
+
+def _over_balance(curve: Curve) -> float:
+    """Friction work at the resonance given over that of its balance; 1 where either is unknown."""
+    ratio = curve.friction_work / (curve.peak.work.dissipated or np.nan)
+    return float(ratio) if np.isfinite(ratio) else 1.0
 
 
 def _dealt_elements(

@@ -25,6 +25,7 @@ from ...errors import InputError
 from ...scene.material_table import operating_materials
 from ...scene.tables import Scene
 from ...scene.units import newtons
+from ...util.percent import percent
 from .bodies import Bodies
 from .damper_contact import seat_clearance
 
@@ -139,7 +140,7 @@ def coarse_history(seated: dict[float, FrictionalSeating]) -> list[str]:
     """What to say of loads whose friction forces still change with the load steps."""
     return [
         f"seating with friction at {newtons(load, 4)}: the friction forces still change by "
-        f"{100 * found.change:.2g} % of the largest friction limit between {found.steps // 2} and "
+        f"{percent(found.change)} of the largest friction limit between {found.steps // 2} and "
         f"{found.steps} load steps"
         for load, found in seated.items()
         if found.change > FORCE_CHANGE_TOLERANCE

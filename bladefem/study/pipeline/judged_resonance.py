@@ -19,7 +19,7 @@ from .error_in_time import Marches, error_in_time
 from .finer_contacts import FinerMotion, unstable_with_more_points
 from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
-from .kept_band import KeptBand, kept_of_family
+from .kept_band import KeptBand, kept_of_family, scaled_band
 from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
 from .strong_drive import strong_drives
 
@@ -197,7 +197,7 @@ def _scaled(kept: KeptBand, finer: FinerMotion, point: Solution) -> KeptBand:
     """A band marched with more contact points, over the amplitude with the fewer ones."""
     ratio = size(point) / size(finer.motion)
     points = finer.settings.points if kept.points is None else kept.points
-    return replace(kept, lowest=ratio * kept.lowest, highest=ratio * kept.highest, points=points)
+    return replace(scaled_band(kept, ratio), points=points)
 
 
 def _with_verdict(marks: Stability, place: int, told: Verdict) -> Stability:

@@ -26,7 +26,7 @@ from ...hbm.ring_march import (
 )
 from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
-from ...time.event_integrator import State, integrate_periods
+from ...time.event_integrator import Flow, State, integrate_periods
 from ...util.durations import core_time
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution
@@ -114,6 +114,8 @@ class KeptBand:
     # at most without that [m]
     drive: float = 1.0
     without_drive: float = np.nan
+    # of a blade's dampers in a period, mean of the periods whose amplitudes count [J]
+    friction_work: float = np.nan
 
     def holds(self, amplitude: float, accuracy: float) -> bool:
         """It is known, and within a relative accuracy of an amplitude."""
@@ -205,9 +207,7 @@ def _kept_with(
     if fewer == settings:
         return band
     ratio = size(point) / size(moved)
-    return replace(
-        band, lowest=ratio * band.lowest, highest=ratio * band.highest, points=fewer.points
-    )
+    return replace(scaled_band(band, ratio), points=fewer.points)
 
 
 def affordable_march(model: ReducedModel) -> bool:
@@ -250,7 +250,8 @@ def exact_band(model: ReducedModel, point: Solution) -> KeptBand | None:
         most = min(LONGER_WHILE_WIDENING * periods, MAX_STEPS / per_period)
         widens = _widens(motion[:, None], point)
         if not widens or marched + KEPT_PERIODS > most:
-            return replace(_band_of(point, motion, marched), widens=widens)
+            spent = float(_work_of_flow(kept) / KEPT_PERIODS)
+            return replace(_band_of(point, motion, marched, spent), widens=widens)
 
 
 def band_by_steps(
@@ -343,7 +344,7 @@ def _band_with(
     if march.operations > counted:
         reason = _too_long(march.operations * SECONDS_PER_OPERATION)
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
-    motion = march.motion
+    motion, spent = march.motion, march.friction_work
     usual = LEFT_BY_STEPS + KEPT_BY_STEPS
     most = min(LONGER_WHILE_WIDENING * usual, (left + kept) * counted / march.operations)
     ended = len(motion) < left + kept
@@ -353,12 +354,13 @@ def _band_with(
             break
         march = march_ring(model, march.end, kept, instants)
         motion = np.concatenate([motion, march.motion])
+        spent = np.concatenate([spent, march.friction_work])
         widens = _widens(motion, point)
     if not (march.settled and np.isfinite(motion).all()):
         reason = "the contact forces of a step of the march were not found"
         return _unknown_band(point, reason), march.resolved
     known = len(motion) - (PERIODS_AT_ONCE if ended else kept)
-    band = _band_of(point, motion[known:], len(motion))
+    band = _band_of(point, motion[known:], len(motion), float(spent[known:].mean()))
     return replace(band, widens=widens), march.resolved
 
 
@@ -406,10 +408,31 @@ def amplitudes_of_periods(motion: np.ndarray, harmonics: int) -> np.ndarray:
     return np.asarray(np.linalg.norm(lines, axis=-1))
 
 
-def _band_of(point: Solution, motion: np.ndarray, periods: int) -> KeptBand:
+def scaled_band(band: KeptBand, ratio: float) -> KeptBand:
+    """The band of a model whose amplitudes are larger by a ratio.
+
+    Friction work is in proportion to the amplitude, as is the work of the excitation at a
+    resonance.
+    """
+    return replace(
+        band,
+        lowest=ratio * band.lowest,
+        highest=ratio * band.highest,
+        friction_work=ratio * band.friction_work,
+    )
+
+
+def _band_of(point: Solution, motion: np.ndarray, periods: int, friction_work: float) -> KeptBand:
     """From motion (..., samples of a period) at the probe."""
     amplitudes = amplitudes_of_periods(motion, point.harmonics)
-    return KeptBand(point.frequency, float(amplitudes.min()), float(amplitudes.max()), periods)
+    ends = float(amplitudes.min()), float(amplitudes.max())
+    return KeptBand(point.frequency, *ends, periods, friction_work=friction_work)
+
+
+def _work_of_flow(flow: Flow) -> float:
+    """Of the friction forces between the samples of a flow, by the trapezoidal rule [J]."""
+    means = (flow.force[1:] + flow.force[:-1]) / 2
+    return float(np.sum(means * np.diff(flow.w, axis=0)))
 
 
 def _unknown_band(point: Solution, reason: str) -> KeptBand:

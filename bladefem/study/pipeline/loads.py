@@ -240,6 +240,36 @@ class Curve:
         """
         return self.peak_amplitude / self.balance_amplitude
 
+    @property
+    def is_march(self) -> bool:
+        """The resonance given is what a march in time keeps to, not a periodic motion."""
+        return self.sought is not None or (self.marched_instead and self.kept is not None)
+
+    @property
+    def friction_work(self) -> float:
+        """Of the motion that is given as the resonance, a period and blade [J]."""
+        work = self.peak.work.dissipated
+        if self.sought is not None:
+            work = self.sought.friction_work
+        elif self.marched_instead and self.kept is not None:
+            work = self.kept.friction_work
+        return (1 + self.layer_height if self.reaches_layer else 1.0) * float(work)
+
+    @property
+    def input_work(self) -> float:
+        """Of the excitation at the resonance given, in proportion to its amplitude [J]."""
+        return self.over_balance * float(self.peak.work.input)
+
+    @property
+    def slipping_at_peak(self) -> float:
+        """Elements that slip or lift off in a period of the resonance given; NaN for a march."""
+        return np.nan if self.is_march else self.peak.states["slip"] + self.peak.states["lift"]
+
+    @property
+    def drift_at_peak(self) -> float:
+        """How fast the damper walks at the resonance given [m/s]; NaN for a march."""
+        return np.nan if self.is_march else float(self.peak.drift)
+
 
 def _doubt_of_march(curve: Curve, kept: KeptBand) -> float:
     """Relative error of a march with fewer contact points than the curve has, from how far it is
@@ -488,9 +518,9 @@ def _row(c: Curve) -> dict[str, Any]:
         "peak_frequency": c.peak_frequency,
         "peak_amplitude": c.peak_amplitude,
         "reduction": 1.0,
-        "dissipated": c.peak.work.dissipated,
-        "slipping": c.peak.states["slip"] + c.peak.states["lift"],
-        "drift": c.peak.drift,
+        "dissipated": c.friction_work,
+        "slipping": c.slipping_at_peak,
+        "drift": c.drift_at_peak,
         "error": np.nan if c.error is None else c.error,
         "halved": c.halved,
         "body_mesh": c.body_mesh,

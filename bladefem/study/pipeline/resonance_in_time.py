@@ -104,6 +104,8 @@ class ResonanceInTime:
     # frequencies that were marched at, and periods at all of them
     frequencies: int
     periods: int
+    # of a blade's dampers in a period, mean of the periods whose amplitudes count [J]
+    friction_work: float = np.nan
 
     @property
     def sentence(self) -> str:
@@ -130,6 +132,8 @@ class _Settled:
     resolved: bool
     # relative way that the mean seems to have left
     left: float
+    # of a blade's dampers in a period, mean of these periods [J]
+    friction_work: float
 
     @property
     def expected(self) -> float:
@@ -232,6 +236,7 @@ def resonance_in_time(
         finer or _most_points(models, settings_here),
         len(work.frequencies),
         work.periods,
+        best.friction_work,
     )
 
 
@@ -447,10 +452,12 @@ def _settled(
 def _end_of(march: RingMarch) -> _Settled:
     """What the last periods of a march keep to."""
     heights = amplitudes_of_periods(march.motion, HARMONICS)
-    last = heights[-min(COUNTED_PERIODS, len(heights) // 2) :]
+    counted = min(COUNTED_PERIODS, len(heights) // 2)
+    last = heights[-counted:]
     ends = float(last.min()), float(last.mean()), float(last.max())
     left = _left_to_limit(march.motion)
-    return _Settled(march.end.drive.omega, *ends, march.end, march.resolved, left)
+    spent = float(march.friction_work[-counted:].mean())
+    return _Settled(march.end.drive.omega, *ends, march.end, march.resolved, left, spent)
 
 
 def _march(

@@ -9,6 +9,7 @@ import numpy as np
 from ...scene.tables import Scene
 from ...scene.units import newton_range, newtons, show
 from ...util.message import method, warning
+from ...util.percent import percent
 from ..adaptive.settings import Settings
 from .best_load import BestLoad, studied_load
 from .damped_motion import DampedStress
@@ -104,14 +105,11 @@ def response_remarks(
 
 
 def _of_settings(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
-    """The model and the method, and how sure the former is."""
-    # settings that a scene gives are judged by the curves alone
-    unjudged = (
-        "error estimated at each resonance"
-        if any(c.error is not None for c in curves)
-        else "not estimated"
-    )
-    remarks: list[str] = [method(settings.sentence(nodes, unjudged)), method(settings.method)]
+    """The model and the method, and how sure the resonances are."""
+    remarks: list[str] = [
+        method(settings.sentence(nodes, _errors_of_loads(settings, curves))),
+        method(settings.method),
+    ]
     if scene.model.static == "uncoupled":
         remarks.append(
             method(
@@ -119,6 +117,29 @@ def _of_settings(scene: Scene, settings: Settings, curves: list[Curve], nodes: i
             )
         )
     return remarks
+
+
+def _errors_of_loads(settings: Settings, curves: Sequence[Curve]) -> str:
+    """Range of the estimated errors that the design table has, and of the harmonics under its
+    loads.
+    """
+    counts = {c.settings.harmonics for c in curves}
+    more = ""
+    if counts != {settings.harmonics}:
+        ends = sorted({min(counts), max(counts)})
+        more = f"; {' to '.join(map(str, ends))} harmonics under the loads"
+    errors = [c.error for c in curves if c.error is not None]
+    if not errors:
+        return f"not estimated{more}"
+    known = [error for error in errors if np.isfinite(error)]
+    unknown = [load_of(c) for c in curves if c.error is not None and np.isinf(c.error)]
+    missing = f"unknown under {', '.join(unknown)}"
+    if not known:
+        return f"estimated errors of the resonances {missing}{more}"
+    low, high = percent(min(known)), percent(max(known))
+    span = low if low == high else f"{low.removesuffix(' %')} to {high}"
+    rest = f", {missing}" if unknown else ""
+    return f"estimated errors of the resonances with those of the meshes {span}{rest}{more}"
 
 
 def search_sentence(curve: Curve) -> str:
@@ -206,10 +227,10 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
         c for c in curves if c.error is not None and accuracy < float(f"{c.error:.2g}") < np.inf
     ]
     if above:
-        each = ", ".join(f"{load_of(c)} {100 * (c.error or 0):.2g} %" for c in above)
+        each = ", ".join(f"{load_of(c)} {percent(c.error or 0)}" for c in above)
         yield (
             "estimated error of the resonance amplitude above the wanted "
-            f"{100 * accuracy:.2g} %: {each}{_largest_parts(above)}"
+            f"{percent(accuracy)}: {each}{_largest_parts(above)}"
         )
 
 
@@ -233,7 +254,7 @@ def _largest_parts(curves: list[Curve]) -> str:
     text = ""
     for part, meaning in LARGEST_PARTS.items():
         sizes = [
-            f"{100 * getattr(c, part):.2g} % under {load_of(c)}"
+            f"{percent(getattr(c, part))} under {load_of(c)}"
             for c in curves
             if np.isfinite(getattr(c, part)) and getattr(c, part) >= (c.error or 0) / 2
         ]
@@ -264,8 +285,8 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         yield (
             f"best load{damper}: {newtons(b.load, 4)} by exact search between {lowest} and "
             f"{highest}, {len(b.tried)} loads and {b.points} points; no load near it lowers the "
-            f"amplitude of these balances by more than {100 * b.tolerance:.2g} %{tolerated}; "
-            f"{b.settings.sentence()}"
+            f"amplitude of these balances by more than {percent(b.tolerance)}{tolerated}; "
+            f"{b.settings.sentence(told=f'{b.settings.error_words} of the balance, meshes apart')}"
         )
 
 
@@ -304,7 +325,7 @@ def stress_message(found: DampedStress, over_balance: float = 1.0) -> str:
     text = (
         f"alternating stress at the best load, {newtons(found.load, 4)}: {largest:.4g} MPa "
         f"at ({place}) mm, of all modes, harmonics and damper forces; estimated error of the mesh "
-        f"there {100 * found.mesh_error:.2g} %"
+        f"there {percent(found.mesh_error)}"
     )
     if found.mesh_error <= TRUSTED_STRESS:
         return text

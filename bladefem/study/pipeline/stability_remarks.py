@@ -234,8 +234,10 @@ def undriven_sentence(curves: Sequence[Curve]) -> str:
 
 
 def unjudged_sentence(curves: Sequence[Curve]) -> str:
-    """The resonances whose motion could not be judged, among others that were, or ""."""
-    asked = [c for c in curves if c.sought is None and (c.stability != UNKNOWN).any()]
+    """The resonances whose motion could not be judged, among others that were, or "". One that a
+    march gives needs no verdict.
+    """
+    asked = [c for c in curves if not c.is_march and (c.stability != UNKNOWN).any()]
     unknown = [c for c in asked if c.stability[_place(c, c.peak)] == UNKNOWN]
     if not unknown:
         return ""

@@ -16,6 +16,7 @@ from ...contact.state_table import interpolate_states, state_table
 from ...errors import NotSolvedError
 from ...scene.tables import Scene
 from ...scene.units import newton_range
+from ...util.percent import percent
 
 # of each axis
 STATES_PER_AXIS = 5
@@ -130,8 +131,8 @@ def state_sentence(
     return (
         f"a table of {check.states} contact states over "
         f"{newton_range(min(loads), max(loads))} and ±{1e6 * travel:.3g} µm of tilt at the seats' "
-        f"ends {verdict}: interpolation misses nodal forces by up to {100 * check.error:.2g} % of "
+        f"ends {verdict}: interpolation misses nodal forces by up to {percent(check.error)} of "
         "the largest (its indicator says "
-        f"{100 * check.indicator:.2g} %); the direct solve, used here, takes "
+        f"{percent(check.indicator)}); the direct solve, used here, takes "
         f"{1e3 * check.direct:.2g} ms a state"
     )

@@ -171,6 +171,7 @@ def _kept_from(
     state = driven_anew(model, state, Drive(point.omega))
     ends: list[tuple[float, float]] = []
     means: list[float] = []
+    spent: list[float] = []
     for look in range(MOST_LOOKS):
         march = march_ring(model, state, PERIODS_OF_LOOK, INSTANTS_PER_PERIOD)
         if not march.settled:
@@ -179,11 +180,19 @@ def _kept_from(
         heights = amplitudes_of_periods(march.motion, point.harmonics)
         ends.append((float(heights.min()), float(heights.max())))
         means.append(float(heights.mean()))
+        spent.append(float(march.friction_work.mean()))
         if look + 1 >= FEWEST_LOOKS and ends[-1][1] <= known:
             return None
     lowest, highest = zip(*ends[-COUNTED_LOOKS:], strict=True)
     periods = MOST_LOOKS * PERIODS_OF_LOOK
-    band = KeptBand(point.frequency, min(lowest), max(highest), periods, drive=STRONG_DRIVE)
+    band = KeptBand(
+        point.frequency,
+        min(lowest),
+        max(highest),
+        periods,
+        drive=STRONG_DRIVE,
+        friction_work=float(np.mean(spent[-COUNTED_LOOKS:])),
+    )
     return KeptMotion(band, float(np.mean(means[-COUNTED_LOOKS:])), state)
 
 
