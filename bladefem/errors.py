@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
+from pathlib import Path
 
 
 class InputError(ValueError):
@@ -20,6 +21,11 @@ class NotSolvedError(RuntimeError):
     """The input was right and no acceptable solution was found. The message says which loop stopped
     and why.
     """
+
+
+def missing_file(path: str | Path) -> str:
+    """The tail of an error message for a path that is no file."""
+    return "a folder, expected a file" if Path(path).is_dir() else "there is no such file"
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:

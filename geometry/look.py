@@ -17,7 +17,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from bladefem.errors import InputError
+from bladefem.errors import InputError, missing_file
 from bladefem.util.arrays import RealArray
 
 from .imported_check import STEP_SUFFIXES
@@ -166,7 +166,7 @@ def _flat_words(raw: RawMesh) -> list[str]:
 def _check_kind(file: Path) -> None:
     """Refuse a file that is not there, or of which there is no reader."""
     if not file.is_file():
-        raise InputError(f"{file}: there is no such file")
+        raise InputError(f"{file}: {missing_file(file)}")
     known = sorted((*SUFFIX_READERS, *STEP_SUFFIXES))
     if file.suffix.lower() not in known:
         raise InputError(f"{file}: unknown kind of mesh; known are {', '.join(known)}")

@@ -16,7 +16,7 @@ from types import ModuleType
 
 import numpy as np
 
-from bladefem.errors import InputError
+from bladefem.errors import InputError, missing_file
 
 from .session import gmsh_session
 from .topology import CORNERS, DIMENSION, EDGES, FAMILY, GMSH_TYPES, NODES
@@ -70,7 +70,7 @@ def read_raw(file: Path) -> RawMesh:
         InputError: no such file, an unknown suffix, or a file that cannot be read.
     """
     if not file.is_file():
-        raise InputError(f"imported.file = '{file}': there is no such file")
+        raise InputError(f"imported.file = '{file}': {missing_file(file)}")
     suffix = file.suffix.lower()
     if suffix not in SUFFIX_READERS:
         raise InputError(

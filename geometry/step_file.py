@@ -19,7 +19,7 @@ from types import ModuleType
 
 import numpy as np
 
-from bladefem.errors import InputError
+from bladefem.errors import InputError, missing_file
 
 from .curving import second_order
 from .draw import boundary_centres, tie_meshes
@@ -134,7 +134,7 @@ def _drawn_entities(
     :func:`read_step`, with a unit vector as the axis.
     """
     if not path.is_file():
-        raise InputError(f"imported.file = '{path}': there is no such file")
+        raise InputError(f"imported.file = '{path}': {missing_file(path)}")
     text = path.read_text(errors="replace")
     with gmsh_step("imported.file", f"import '{path}'", STEP_REMEDY):
         _import_shapes(gmsh, path, 1.0 if scale == 1.0 else scale / file_unit(text))

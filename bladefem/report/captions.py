@@ -110,8 +110,16 @@ CAPTIONS = {
     "contact/pressure_on_both_seats": "Contact pressure on both seats under the load in the "
     "title, seen along their normals.",
     "contact/pressure": "Seats under each static load: normal force, pressed share and pressure.",
-    "contact/resultants": "Resultant contact force on the damper and its moment about the "
-    "engine's origin, under each load.",
+    "contact/resultants": "Resultant contact force on the damper and its moment about the origin "
+    "of the coordinates, under each load.",
+    "contact/pressure_on_the_footprint": "Contact pressure under the pressed mass, and the points "
+    "that carry its friction.",
+    "response/loops": "Friction force along x over the relative displacement, less its mean, in "
+    "one common period of foundation and load.",
+    "response/spectra": "Amplitudes of the mass's motion along x over frequency.",
+    "response/motion": "Steady motion of the mass under each frequency of the load: open loops of "
+    "its hysteresis next to the denominator of the ratio of the frequencies, mean speeds, and the "
+    "amplitude at the foundation's frequency.",
     "contact/friction_work": "Where one period at the best load's resonance wears the seats: "
     "friction work per area, and state of each contact point.",
     "contact/damper_mass": "Mass of the damper that makes each load at the operating speed: after "

@@ -4,7 +4,7 @@ ratio.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -29,8 +29,9 @@ from bladefem.view import contact, mesh, paper
 
 from ..util.communicator import Communicator
 from .datasets import resultants, table_dataset
+from .headlines import Headline
 from .tables import units_of, write_tables
-from .write import write_report
+from .write import Page, write_report
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def report_zmass(
     return result
 
 
-def motion_table(found: list[tuple[Drive, Steady]]) -> pd.DataFrame:
+def motion_table(found: Sequence[tuple[Drive, Steady]]) -> pd.DataFrame:
     """One row a frequency ratio: loops, drift [m/s], turning speed [rad/s], amplitude at the
     foundation's frequency.
     """
@@ -77,21 +78,49 @@ def motion_table(found: list[tuple[Drive, Steady]]) -> pd.DataFrame:
     for drive, result in found:
         frequency, lines = spectrum(result)
         main = lines[np.argmin(abs(frequency - drive.frequency)), 0]
+        drift = known_drift(result)
         rows.append(
             {
                 "ratio": str(drive.ratio),
                 "load frequency [Hz]": float(drive.ratio) * drive.frequency,
                 "loops": result.loops,
                 "denominator": drive.ratio.denominator,
-                "drift x [m/s]": result.drift[0],
-                "drift y [m/s]": result.drift[1],
-                "turning, mean [rad/s]": result.drift[2],
+                "drift x [m/s]": drift[0],
+                "drift y [m/s]": drift[1],
+                "turning, mean [rad/s]": drift[2],
                 "turning, largest [rad/s]": float(np.abs(result.motion.velocity[:, 2]).max()),
                 "amplitude": main,
                 "periodic": result.reason == "periodic",
             }
         )
     return pd.DataFrame(rows)
+
+
+def known_drift(result: Steady) -> np.ndarray:
+    """(3,) mean velocity [m/s, m/s, rad/s]; zero where it is less than the period closes to."""
+    speed = np.abs(result.motion.velocity).max(axis=0)
+    speed[:2] = speed[:2].max()
+    return np.where(abs(result.drift) > result.residual * speed, result.drift, 0.0)
+
+
+def motion_headlines(found: Sequence[tuple[Drive, Steady]]) -> list[Headline]:
+    """The amplitude under each frequency of the load, and how far the mass walks."""
+    numbers = []
+    for (drive, result), (_, row) in zip(found, motion_table(found).iterrows(), strict=True):
+        walk = float(np.hypot(row["drift x [m/s]"], row["drift y [m/s]"]))
+        walks = f"walks {1e3 * walk:.4g} mm/s" if walk else "does not walk"
+        loops = "1 loop" if result.loops == 1 else f"{result.loops} loops"
+        numbers.append(
+            Headline(
+                f"amplitude of the mass, load at {row['load frequency [Hz]']:g} Hz",
+                f"{1e6 * row['amplitude']:.4g} µm",
+                f"{result.reason}, to {result.residual:.0e} of velocities and forces"
+                if row["periodic"]
+                else result.reason,
+                f"at the foundation's {drive.frequency:g} Hz; {loops}, {walks}",
+            )
+        )
+    return numbers
 
 
 def draw_motions(
@@ -140,4 +169,5 @@ def _write(scene: Scene, result: MassRun) -> None:
     paper.draw_footprint(seat, result.body.footprint, figures["contact/pressure_on_the_footprint"])
     draw_motions(result.motions, figures["response/loops"], figures["response/spectra"])
     mesh.save_vtu(result.pressed.mesh, folder / "mesh.vtu")
-    write_report(folder, scene, tables, figures, result.messages, result.timings)
+    page = Page(numbers=motion_headlines(result.motions))
+    write_report(folder, scene, tables, figures, result.messages, result.timings, page=page)

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, missing_file
 from ..util.arrays import IntegerArray, RealArray
 from .units import parse
 
@@ -42,7 +42,7 @@ def read_temperatures(file: str) -> GivenTemperatures:
     """
     path = Path(file)
     if not path.is_file():
-        raise InputError(f"temperature.file = {file!r}: there is no such file")
+        raise InputError(f"temperature.file = {file!r}: {missing_file(path)}")
     # read again where it has changed
     return _read(file, path.stat().st_mtime)
 

@@ -98,14 +98,7 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
 def scene_of(tables: dict[str, Any], folder: str | Path = ".") -> Scene:
     """A checked scene from nested tables; relative file names in it start at ``folder``."""
     scene = _build_table(Scene, tables, "")
-    unused = [
-        t for t in tables if isinstance(tables[t], dict) and t not in kind_named(scene.kind).tables
-    ]
-    if unused:
-        raise InputError(
-            f"[{unused[0]}]: a scene of kind '{scene.kind}' does not use this table, expected only "
-            f"{', '.join(kind_named(scene.kind).tables)}"
-        )
+    _refuse_unread(scene, sorted(given_keys(tables)))
     scene = kind_named(scene.kind).whole_paths(scene, Path(folder))
     if scene.mistuning.pattern:
         whole = str((Path(folder) / scene.mistuning.pattern).resolve())
@@ -145,11 +138,27 @@ def vary(scene: Scene, *pair: Any, **changes: Any) -> Scene:
     named = {name.replace("__", "."): value for name, value in changes.items()}
     for name, value in [*zip(pair[::2], pair[1::2], strict=True), *named.items()]:
         scene = _replace_field(scene, name.split("."), value, name)
-    for name in (*pair[::2], *named):
-        if "." in name and name.split(".")[0] not in kind_named(scene.kind).tables:
-            raise InputError(f"{name}: a scene of kind '{scene.kind}' does not use this table")
+    _refuse_unread(scene, (*pair[::2], *named))
     validate(scene)
     return scene
+
+
+def _refuse_unread(scene: Scene, names: Iterable[str]) -> None:
+    """Refuse fields that a scene of this kind does not read.
+
+    Raises:
+        InputError: the first of them.
+    """
+    kind = kind_named(scene.kind)
+    for name in names:
+        if "." in name and not kind.reads(name):
+            table = name.split(".")[0]
+            read = [one for one in kind.tables if one.startswith(f"{table}.")]
+            where, what = (name, "field") if read else (f"[{table}]", "table")
+            raise InputError(
+                f"{where}: a scene of kind '{scene.kind}' does not use this {what}, expected only "
+                f"{', '.join(read or kind.tables)}"
+            )
 
 
 def given_keys(tables: dict[str, Any], path: str = "") -> set[str]:
@@ -269,8 +278,8 @@ def _replace_field(
 
 
 def _used_fields(scene: Scene) -> Iterable[Field]:
-    tables = kind_named(scene.kind).tables
-    return (f for f in each_field() if "." not in f.name or f.name.split(".")[0] in tables)
+    kind = kind_named(scene.kind)
+    return (f for f in each_field() if "." not in f.name or kind.reads(f.name))
 
 
 def _display_value(value: Any, field: Field) -> str:

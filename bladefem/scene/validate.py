@@ -41,9 +41,8 @@ def validate(scene: Scene) -> None:
         InputError: the first thing that is wrong, in one sentence.
     """
     kind = kind_named(scene.kind)
-    tables = kind.tables
     for field in each_field():
-        if "." not in field.name or field.name.split(".")[0] in tables:
+        if "." not in field.name or kind.reads(field.name):
             convert_value(value_at(scene, field.name), field)
     problems = [
         *_check_title(scene),
@@ -54,9 +53,9 @@ def validate(scene: Scene) -> None:
         *_check_numerics(scene),
         *contact_problems(scene),
     ]
-    if "study" in tables:
+    if kind.reads("study"):
         problems += _check_study(scene)
-    if "excitation" in tables:
+    if kind.reads("excitation"):
         problems += _check_excitation(scene)
         check_names(scene)
     if problems:

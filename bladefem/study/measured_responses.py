@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, missing_file
 from ..scene.tables import Scene
 from ..scene.toml import vary
 from ..scene.units import parse
@@ -92,7 +92,7 @@ def read_readings(path: str | Path, scene: Scene) -> Readings:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"--measured {path}: there is no such file")
+        raise InputError(f"--measured {path}: {missing_file(path)}")
     rows = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
     if len(cells) < 2:

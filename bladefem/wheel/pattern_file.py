@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..errors import InputError, close_word
+from ..errors import InputError, close_word, missing_file
 from ..util.arrays import RealArray
 
 # what a column deviates in, by a word of its name; the first where none is said
@@ -99,7 +99,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"mistuning.pattern = '{path}': there is no such file")
+        raise InputError(f"mistuning.pattern = '{path}': {missing_file(path)}")
     text = path.read_text(encoding="utf-8").splitlines()
     rows = [line.split("#")[0].strip() for line in text]
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]

@@ -87,9 +87,19 @@ def test_seats_and_units(tmp_path):
         (
             "hertz",
             ["contact.wear_coefficient=1e-14"],
-            "contact.wear_coefficient: a scene of kind 'hertz'",
+            r"\[contact\]: a scene of kind 'hertz' does not use this table",
         ),
-        ("punch", ["contact.stiffness=map"], "contact.stiffness = 'map': a scene of kind 'punch'"),
+        ("zmass", ["contact.stiffness=map"], "contact.stiffness = 'map': a scene of kind 'z mass'"),
+        (
+            "zmass",
+            ["study.masses=10 g"],
+            "study.masses: .* does not use this field, expected only study.loads",
+        ),
+        (
+            "hertz",
+            ["model.harmonics=3"],
+            r"\[model\]: .* does not use this table, expected only hertz, mesh, material",
+        ),
     ],
 )
 def test_wrong_values_are_refused(scene, given, words):

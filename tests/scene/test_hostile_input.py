@@ -126,6 +126,7 @@ COMMANDS = [
         "wedge.toml: unknown kind of mesh; known are .bdf, .cdb, .inp, .med, .msh, .nas, .step",
     ),
     (["look", "nowhere.inp"], "bladefem: nowhere.inp: there is no such file"),
+    (["look", "."], "bladefem: .: a folder, expected a file"),
 ]
 
 

@@ -143,13 +143,13 @@ def draw_sweeps(
                 left.plot(
                     frequency[kind], 1e6 * amplitude[kind], ls="none", color=colour, ms=4.5, **look
                 )
-        for word, look in zip(("stable", "unstable", "not closed in time"), looks, strict=True):
+        for word, look in zip(("stable", "unstable", "not judged"), looks, strict=True):
             left.plot([], [], ls="none", color="#888888", ms=4.5, label=word, **look)
         right.axhline(1.0, color="#888888", lw=0.8)
         left.set(
             xlabel="frequency [Hz]",
             ylabel="amplitude at the tip [µm]",
-            title="plane blades, 4 N a seat",
+            title="plane blades, 3 N a seat",
         )
         right.set(xlabel="frequency [Hz]", ylabel="largest Floquet multiplier", title="stability")
         left.legend()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import at_most, below_limit, one_of
-from .record import COMMON_TABLES, Kind, SceneCall
+from .record import PRESSED_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -32,7 +32,7 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 
 KIND = Kind(
     name="hertz",
-    tables=("hertz", *COMMON_TABLES),
+    tables=("hertz", *PRESSED_TABLES),
     builder="geometry.contact_pairs:hertz_pair",
     shape=("hertz", "mesh"),
     runner="bladefem.report.pair:report_pair",

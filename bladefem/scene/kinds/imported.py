@@ -8,6 +8,7 @@ from pathlib import Path
 
 from geometry.joined_files import split_entry
 
+from ...errors import missing_file
 from ..part_materials import part_materials
 from ..tables import Scene
 from .conditions import known_diameters
@@ -23,7 +24,7 @@ def conditions(scene: Scene) -> Iterator[str]:
             'mesh or STEP file"'
         )
     elif not Path(file).is_file():
-        yield f"imported.file = {file!r}: there is no such file"
+        yield f"imported.file = {file!r}: {missing_file(file)}"
     for entry in scene.imported.more or ():
         other = split_entry(entry)[1]
         if not Path(other).is_file():

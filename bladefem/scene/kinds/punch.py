@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import below_limit, one_of
-from .record import COMMON_TABLES, Kind, SceneCall
+from .record import PRESSED_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -27,7 +27,7 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 
 KIND = Kind(
     name="punch",
-    tables=("punch", *COMMON_TABLES),
+    tables=("punch", *PRESSED_TABLES),
     builder="geometry.contact_pairs:mesh_punch",
     shape=("punch", "mesh"),
     runner="bladefem.report.pair:report_pair",

@@ -11,8 +11,10 @@ from typing import Any
 from ..fields import value_at
 from ..tables import Scene
 
-# tables that every kind reads
+# tables that every kind with a blade reads
 COMMON_TABLES = ("mesh", "material", "contact", "study", "model")
+# what those read of these that press two bodies together, and no more
+PRESSED_TABLES = ("mesh", "material", "study.loads")
 # tables of the kinds that vibrate in an engine
 ENGINE_TABLES = (
     *COMMON_TABLES,
@@ -66,7 +68,8 @@ class Kind:
 
     # as scenes write it
     name: str
-    # tables of the scene that it reads; the others must not be given
+    # tables of the scene that it reads, or single fields of them ("study.loads"); the others must
+    # not be given
     tables: tuple[str, ...]
     # "module:function" that draws and meshes it
     builder: str
@@ -122,6 +125,12 @@ class Kind:
     thin_parts: Callable[[Scene], dict[str, float]] | None = None
     # radius of name [m] of what moves fastest, for a check of the speed
     radii: Callable[[Scene], dict[str, float]] | None = None
+
+    def reads(self, name: str) -> bool:
+        """Whether a field ("study.loads") or anything of a table matters to this kind."""
+        return any(name == one or name.startswith(f"{one}.") for one in self.tables) or any(
+            one.startswith(f"{name}.") for one in self.tables
+        )
 
 
 def load_function(reference: str) -> Callable[..., Any]:

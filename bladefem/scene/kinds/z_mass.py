@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import below_limit
-from .record import COMMON_TABLES, Kind, SceneCall
+from .record import PRESSED_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
@@ -25,7 +25,7 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 
 KIND = Kind(
     name="z mass",
-    tables=("z_mass", "foundation", *COMMON_TABLES),
+    tables=("z_mass", "foundation", "contact", *PRESSED_TABLES),
     builder="geometry.zmass:z_mass",
     shape=("z_mass", "mesh", "foundation.depth"),
     runner="bladefem.report.zmass:report_zmass",

@@ -31,6 +31,7 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
+from ...scene.units import show
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..pipeline.bodies import Bodies, blade_dofs
@@ -98,14 +99,15 @@ def mesh_convergence(
     if not kind_named(scene.kind).meshed_here(scene):
         if len(sizes):
             raise InputError(
-                f"converge = {', '.join(f'{size:g}' for size in sizes)} m: kind '{scene.kind}' has "
-                "a mesh of its own, expected --converge without sizes, which halves its elements"
+                f"--converge {', '.join(show(size, 'm') for size in sizes)}: kind '{scene.kind}' "
+                "has a mesh of its own, expected --converge without sizes, which halves its "
+                "elements"
             )
         return _halved_mesh_convergence(scene, diameters, count, comm, progress)
     if len(sizes) < 3 or not all(a > b > 0 for a, b in pairwise(sizes)):
         raise InputError(
-            f"converge = {list(sizes)} m: expected at least three element sizes, from coarse to "
-            "fine"
+            f"--converge {', '.join(show(size, 'm') for size in sizes)}: expected at least three "
+            "element sizes, from coarse to fine"
         )
     finest = None if tuple(sizes) == SIZE_RATIOS else sizes[-1]
     runs = []
@@ -324,5 +326,5 @@ def _order_doubt(order: float, mac: float, meshes: int) -> str:
         return "the frequencies do not fall into line"
     if not PLAUSIBLE_ORDERS[0] <= order <= PLAUSIBLE_ORDERS[1]:
         low, high = PLAUSIBLE_ORDERS
-        return f"order {order:.1f} is none of such elements, expected {low:g} to {high:g}"
+        return f"order {order:.1f} is not plausible for such elements, expected {low:g} to {high:g}"
     return ""
