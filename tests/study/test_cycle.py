@@ -16,6 +16,7 @@ from bladefem.report.nodes import (
     loop_table,
     node_table,
     save_cycles_vtu,
+    seat_loops,
     wear_sentence,
     wear_table,
 )
@@ -54,9 +55,30 @@ def orbits(radius: np.ndarray, directions: int) -> np.ndarray:
 def at_resonance(radius: np.ndarray, directions: int, joined: int | None):
     patches = [strip("this", 0.0), strip("next", 1.0)]
     elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
-    peak = SimpleNamespace(w=orbits(radius, directions), samples=64, frequency=250.0)
-    curve = SimpleNamespace(settings=SimpleNamespace(points=joined), peak=peak)
+    curve = curve_of(orbits(radius, directions), joined)
     return patches, contact_cycle(LoadCase(8 * N, elements, None), curve, patches, None)
+
+
+def curve_of(w, points=None, **given):
+    """A curve whose resonance is this motion of its balance, at 250 Hz."""
+    return SimpleNamespace(
+        settings=SimpleNamespace(points=points),
+        peak=SimpleNamespace(w=w, samples=64, frequency=250.0),
+        **{"peak_frequency": 250.0, "work_over_balance": 1.0, "is_march": False} | given,
+    )
+
+
+def test_wear_of_a_march_is_as_large_as_its_friction_work():
+    """The map is that of the balance; its loops are called so."""
+    radius = np.full(16, 3.0) * MU * N / KT
+    patches, balance = at_resonance(radius, 3, None)
+    elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
+    march = curve_of(orbits(radius, 3), peak_frequency=249.0, work_over_balance=0.7, is_march=True)
+    cycle = contact_cycle(LoadCase(8 * N, elements, None), march, patches, None)
+    np.testing.assert_allclose(cycle.work, 0.7 * balance.work, rtol=1e-12)
+    assert cycle.frequency == 249.0
+    assert cycle.wear(1e-14) == pytest.approx(0.7 * 249 / 250 * balance.wear(1e-14))
+    assert [name.endswith("its balance") for name in seat_loops([balance, cycle])] == [False, True]
 
 
 @pytest.mark.parametrize("directions", [2, 3])
@@ -157,9 +179,7 @@ def test_hysteresis_of_a_patch_is_the_loop_of_its_springs():
     elements = Elements(np.full(16, KT), np.full(16, KT), np.full(16, MU), np.full(16, N), 2)
     w = np.zeros((16, 3, 7))
     w[:8, 1, 1], w[:8, 2, 1], w[8:, 2, 2] = 1.8 * MU * N / KT, 2.4 * MU * N / KT, 0.5 * MU * N / KT
-    peak = SimpleNamespace(w=w, samples=64, frequency=250.0)
-    curve = SimpleNamespace(settings=SimpleNamespace(points=None), peak=peak)
-    loops = contact_cycle(LoadCase(8 * N, elements, None), curve, patches, None).loops
+    loops = contact_cycle(LoadCase(8 * N, elements, None), curve_of(w), patches, None).loops
     sliding, stuck = loops["this"], loops["next"]
     limit = 8 * MU * N
     assert loop_energy(sliding.displacement, sliding.force) == pytest.approx(

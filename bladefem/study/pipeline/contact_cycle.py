@@ -133,7 +133,7 @@ def contact_cycle(
         curve.peak_frequency,
         forces.shares[groups],
         forces.state[groups],
-        part / area * _over_balance(curve) * forces.dissipated[groups],
+        part / area * curve.work_over_balance * forces.dissipated[groups],
         free_static_force(elements, w)[groups],
         {
             patch.name: _loop(elements, started, series, some)
@@ -145,12 +145,6 @@ def contact_cycle(
         mismatch,
         curve.is_march,
     )
-
-
-def _over_balance(curve: Curve) -> float:
-    """Friction work at the resonance given over that of its balance; 1 where either is unknown."""
-    ratio = curve.friction_work / (curve.peak.work.dissipated or np.nan)
-    return float(ratio) if np.isfinite(ratio) else 1.0
 
 
 def _dealt_elements(

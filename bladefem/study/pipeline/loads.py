@@ -43,6 +43,8 @@ Search: TypeAlias = "Callable[[], tuple[BestLoad, Callable[[float], LoadCase]]]"
 # the shipped wedge with ground faces, 1100 N, 536 um with 16 points a seat, they keep 517 um, eight
 # keep some 460 and four some 480 of it
 DOUBT_OF_FEWER_POINTS = 0.5
+# friction work over that of the excitation below which it is rounding
+ROUNDED_WORK = 1e-9
 
 
 def compute_without_keeping(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
@@ -247,13 +249,23 @@ class Curve:
 
     @property
     def friction_work(self) -> float:
-        """Of the motion that is given as the resonance, a period and blade [J]."""
+        """Of the motion that is given as the resonance, a period and blade [J]; zero where rounding
+        alone leaves some.
+        """
         work = self.peak.work.dissipated
+        if abs(work) < ROUNDED_WORK * abs(self.peak.work.input):
+            work = 0.0
         if self.sought is not None:
             work = self.sought.friction_work
         elif self.marched_instead and self.kept is not None:
             work = self.kept.friction_work
         return (1 + self.layer_height if self.reaches_layer else 1.0) * float(work)
+
+    @property
+    def work_over_balance(self) -> float:
+        """Friction work at the resonance given over that of its balance; 1 where either is none."""
+        ratio = self.friction_work / (self.peak.work.dissipated or np.nan)
+        return float(ratio) if np.isfinite(ratio) else 1.0
 
     @property
     def input_work(self) -> float:
