@@ -139,7 +139,7 @@ def test_an_order_that_no_element_has_is_not_believed():
     )
     row = _convergence_summary(points).iloc[0]
     assert (
-        "order 6.1 is none" in row["reason"]
+        "order 6.1 is not plausible" in row["reason"]
         and np.isnan(row["limit"])
         and row["error"] == pytest.approx(0.09)
     )
