@@ -118,7 +118,7 @@ def find_branches(
     ]
     if not solved:
         return Branches((), (), ("no point of the band was solved",))
-    limit = int(np.clip(POINT_BUDGET / (model.springs.size * (2 * H + 1)), MIN_POINTS, MAX_POINTS))
+    limit = int(np.clip(POINT_BUDGET / (model.unknowns(H)), MIN_POINTS, MAX_POINTS))
     if limits.points is not None:
         limit = min(limit, limits.points)
     budget = limit

@@ -133,6 +133,10 @@ class ReducedModel:
             else np.column_stack([self.elements.kn, tangents])
         )
 
+    def unknowns(self, H: int) -> int:
+        """Real unknowns of the balance with harmonics 0..H."""
+        return int(self.springs.size) * (2 * H + 1)
+
     @cached_property
     def preload(self) -> np.ndarray:
         """(nodes directions,) contact forces in the preload state [N]."""

@@ -82,7 +82,7 @@ def nonlinear_mode(
     if not 0 <= mode < len(own) or not own[mode] > 0:
         raise InputError(f"mode {mode}: expected an elastic mode from 0 to {len(own) - 1}")
     check_point(model, float(own[mode]), max(H, *model.excitation, *model.normal), samples)
-    unknowns = model.springs.size * (2 * H + 1)
+    unknowns = model.unknowns(H)
     if unknowns > MAX_DENSE_UNKNOWNS:
         raise InputError(
             f"{unknowns} unknowns: expected at most {MAX_DENSE_UNKNOWNS}, fewer harmonics or nodes"

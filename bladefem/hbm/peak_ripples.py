@@ -13,7 +13,7 @@ import numpy as np
 
 from ..util.curve_extremum import parabola_at_middle
 from .model import ReducedModel
-from .solution import Solution, size
+from .solution import Solution, moving_contacts, size
 from .solve import solve
 from .solver.newton import Options
 
@@ -48,8 +48,7 @@ def may_be_ripple(model: ReducedModel, top: Solution, sharpness: float, probe: i
     Args:
         sharpness: second derivative of 1/height^2 with the circular frequency.
     """
-    moving = top.states["slip"] + top.states["lift"]
-    if top.samples == 0 or moving == 0:
+    if top.samples == 0 or moving_contacts(top) == 0:
         return False
     expected = bend_of_mode(model, top.omega, probe)
     return bool(expected > 0 and sharpness > SHARP_RATIO * expected)

@@ -97,6 +97,21 @@ def size(solution: Solution, probe: int = 0) -> float:
     return math.sqrt(np.vdot(moving, moving).real)
 
 
+def lifts_off(solution: Solution) -> bool:
+    """Contacts open and close within a period."""
+    return solution.states["lift"] > 0
+
+
+def mostly_lifts_off(solution: Solution) -> bool:
+    """At least half of the contacts open and close within a period."""
+    return 2 * solution.states["lift"] >= len(solution.w)
+
+
+def moving_contacts(solution: Solution) -> int:
+    """Number of contacts that slip or lift off within a period."""
+    return solution.states["slip"] + solution.states["lift"]
+
+
 def probe_motion(
     model: ReducedModel,
     omega: float,

@@ -19,7 +19,7 @@ from .model import ReducedModel
 from .next_frequency import Slope, first_look, next_frequency
 from .predictor import PREDICTOR_POINTS
 from .sensitivity import sensitivities
-from .solution import Solution, size
+from .solution import Solution, lifts_off, size
 from .solve import leading_stuck_solutions
 from .solver.newton import DEFAULT_OPTIONS, Options
 from .solver.point_compiled import solve_along
@@ -306,9 +306,9 @@ def _needs_continuation(
     good = [p for p in points if p.converged]
     if len(good) < 2:
         return False
-    if model.springs.size * (2 * H + 1) <= MAX_PATH_UNKNOWNS:
+    if model.unknowns(H) <= MAX_PATH_UNKNOWNS:
         opened = {p.states["open"] for p in good}
-        return len(opened) > 1 or any(p.states["lift"] for p in good)
+        return len(opened) > 1 or any(lifts_off(p) for p in good)
     if len(good) < len(points):
         return True
     heights = np.array([size(p, probe) for p in good])

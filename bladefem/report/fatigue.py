@@ -21,6 +21,7 @@ from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
     blade_nodes,
     highest_use,
+    highest_wheel_use,
     run_utilisation,
 )
 from ..view.fatigue import draw_utilisation
@@ -65,7 +66,7 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
     blades = []
     for response, uses in known_wheel_use(run):
         for use in uses:
-            bound = highest_use(run, number, use.used, use.blade.worst.mesh_error)
+            bound = highest_wheel_use(run, number, use.used, use.blade.worst.mesh_error)
             first = {"load": response.load, "blade": use.blade.blade + 1}
             if use is uses[0]:
                 rows += _worst_rows(run, first, use.used, bound)
@@ -143,7 +144,7 @@ def worst_utilisation(run: SolvedRun) -> list[WorstUse]:
         WorstUse(
             worst.blade.blade,
             worst.highest,
-            highest_use(run, number, worst.used, worst.blade.worst.mesh_error),
+            highest_wheel_use(run, number, worst.used, worst.blade.worst.mesh_error),
             beside,
         )
         for _, (worst, *_) in known_wheel_use(run)

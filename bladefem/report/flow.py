@@ -75,6 +75,7 @@ def flow_headlines(run: SolvedRun) -> list[Headline]:
         return []
     one = min(found.largest, key=lambda held: held.amplitude)
     grows = "" if np.isnan(one.largest) else f"; motions above {growing_words(one.largest)} grow"
+    wave = wave_words(one.wave, len(found.net))
     loads = {held.load for held in found.largest}
     among = f", of {len(loads)} loads the one that keeps it smallest" if len(loads) > 1 else ""
     return [
@@ -82,7 +83,6 @@ def flow_headlines(run: SolvedRun) -> list[Headline]:
             "flutter held by friction",
             f"{1e6 * one.amplitude:.4g} µm",
             "in one harmonic, by the nonlinear mode",
-            f"largest of fed waves: {wave_words(one.wave)}, under {newtons(one.load, 4)}"
-            f"{among}{grows}",
+            f"largest of fed waves: {wave}, under {newtons(one.load, 4)}{among}{grows}",
         )
     ]

@@ -49,7 +49,7 @@ def headlines(
     sure = {} if summary is None else _uncertainties(summary, points)
     best = None if searched is None or summary is None else found_best(searched, summary)
     if best is not None:
-        sure |= _of_search(best)
+        sure |= _of_search(best, points)
     found = []
     for what, value, remark in answer.numbers:
         quantity = _quantity(what)
@@ -103,13 +103,13 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
         "amplitude": error_words(best),
         "stress": stress_error_words(best),
         "frequency": _frequency_text(best, points),
-        "load": _between_text(low, high, "N"),
+        "load": _between_text(low, high),
         "own load": "by equilibrium, no model error",
         "mass": _mass_text(low, high, best["load"]),
     }
 
 
-def _of_search(best: pd.Series) -> dict[str, str]:
+def _of_search(best: pd.Series, points: pd.DataFrame | None) -> dict[str, str]:
     """How sure the exact search is; the load by where the amplitude stays within the accuracy."""
     total = best.copy()
     total["error"] += best["tolerance"]
@@ -121,6 +121,7 @@ def _of_search(best: pd.Series) -> dict[str, str]:
     return {
         "amplitude": error_words(total),
         "stress": stress_error_words(total),
+        "frequency": _frequency_text(best, points),
         "load": _flatness_text(low, high),
         "mass": _mass_text(low, high, best["load"]) if known else "as the optimum load",
     }
@@ -130,7 +131,7 @@ def _flatness_text(low: float | None, high: float | None) -> str:
     """Between which loads the amplitude keeps within the accuracy, as far as the search looked."""
     if low is not None and high is not None:
         # where the amplitude crosses the accuracy: three digits of a load that nobody sets
-        return _between_text(float(f"{low:.3g}"), float(f"{high:.3g}"), "N")
+        return _between_text(float(f"{low:.3g}"), float(f"{high:.3g}"))
     if low is not None:
         return f"above {newtons(low, 4)}; how far up was not found"
     if high is not None:
@@ -149,22 +150,13 @@ def _bracket(finite: pd.DataFrame, best: pd.Series) -> tuple[float | None, float
     return low, high
 
 
-def _between_text(
-    low: float | None,
-    high: float | None,
-    unit: str,
-    factor: float = 1.0,
-) -> str:
-    """Of loads [N] and of what is in proportion to them."""
+def _between_text(low: float | None, high: float | None) -> str:
+    """Two loads [N], where both are known, in words."""
     if low is not None and high is not None:
-        ends = newton_range(low, high).replace(" to ", " and ")
-        if unit != "N":
-            ends = f"{factor * low:.4g} and {factor * high:.4g} {unit}"
-        return f"between {ends}"
+        return f"between {newton_range(low, high).replace(' to ', ' and ')}"
     for side, end, other in (("above", low, "upper"), ("below", high, "lower")):
         if end is not None:
-            told = newtons(end, 4) if unit == "N" else f"{factor * end:.4g} {unit}"
-            return f"{side} {told}, no {other} bound studied"
+            return f"{side} {newtons(end, 4)}, no {other} bound studied"
     return "only one load studied"
 
 
@@ -188,6 +180,8 @@ def _frequency_text(best: pd.Series, points: pd.DataFrame | None) -> str:
     curve = points[points["load"] == best["load"]]
     if "mass" in curve and np.isfinite(best.get("mass", np.nan)):
         curve = curve[curve["mass"] == best["mass"]]
+    if curve.empty:
+        return "no estimate: no response under this load"
     frequency = np.sort(curve["frequency"].unique())
     here = int(np.argmin(abs(frequency - best["peak_frequency"])))
     if not 0 < here < len(frequency) - 1:

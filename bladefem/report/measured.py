@@ -18,7 +18,7 @@ from .headlines import Headline
 from .tables import write_tables
 from .write import Page, write_report
 
-# parameter to what it is called and the field of the scene that has it
+# parameter to what it is called
 NAMES = {
     "mu": "friction coefficient",
     "kt": "tangential contact stiffness",
@@ -26,15 +26,7 @@ NAMES = {
     "stiffness": "contact stiffness",
     "load": "normal load",
 }
-FIELDS = {
-    "mu": ("mu", "1"),
-    "kt": ("kt_area", "N/m^3"),
-    "kn": ("kn_area", "N/m^3"),
-    "stiffness": ("kt_area", "N/m^3"),
-}
-
-
-# smallest shift of a logarithm that is told
+# smallest shift of a logarithm that is reported
 COUNTED_SHIFT = 5e-4
 
 
@@ -90,10 +82,7 @@ def fit_sentences(found: FittedScene) -> list[str]:
         fit.sentence(),
     ]
     if found.scene_values:
-        rows = (
-            f"{FIELDS[name][0]} = {_value(name, value)}"
-            for name, value in found.scene_values.items()
-        )
+        rows = (f"{name} = {_value(name, value)}" for name, value in found.scene_values.items())
         sentences.append(f"for the scene, under [contact]: {', '.join(rows)}")
     sentences += left_out_sentences(fit)
     if fit.misfit > 2:
@@ -156,8 +145,9 @@ def _percent(off: np.ndarray) -> str:
 
 def _value(name: str, value: float) -> str:
     """As a scene writes it."""
-    unit = FIELDS[name][1]
-    return f"{value:.4g}" if unit == "1" else f'"{show(value, unit)}"'
+    if name.endswith("mu"):
+        return f"{value:.4g}"
+    return f'"{show(value, "N/m^3" if name.endswith("area") else "N/m")}"'
 
 
 def write_fit(found: FittedScene, folder: Path) -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 
 from ..study.pipeline.response_remarks import TRUSTED_STRESS
@@ -43,7 +44,7 @@ def next_steps(
     if best is None:
         best = finite.loc[finite["peak_amplitude"].idxmin()]
     if not cautions:
-        steps += _mass_step(best, own, masses, "mass" in finite)
+        steps += _mass_step(scene, best, own, masses, "mass" in finite)
     steps += _stress_step(best)
     steps += _mesh_step(best)
     if scene.contact.normal == "coupled" and not scene.study.stability:
@@ -55,6 +56,7 @@ def next_steps(
 
 
 def _mass_step(
+    scene: Scene,
     best: pd.Series,
     own: pd.DataFrame | None,
     masses: pd.DataFrame | None,
@@ -71,7 +73,7 @@ def _mass_step(
     wanted, _ = best_mass(best, mass / load, masses)
     return [
         f"Change the damper's mass from {1e3 * mass:.3g} g to {wanted}, and confirm with "
-        f"damper.mass = '{wanted}' and study.own_load = true."
+        f"{kind_named(scene.kind).damper_mass} = '{wanted}' and study.own_load = true."
     ]
 
 

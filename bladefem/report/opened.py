@@ -23,6 +23,7 @@ from ..io.stored_stage import stored_stage
 from ..scene.tables import Scene
 from ..scene.toml import load_scene
 from ..scene.units import newtons
+from ..study.pipeline.seated_loads import seating_stage
 from ..util.picture_files import PICTURES
 from ..view import contact, hysteresis, modes, response
 from .tables import COLUMNS
@@ -199,7 +200,7 @@ class RunFolder:
         loads = data["load"].to_numpy()
         chosen = loads[len(loads) // 2] if load is None else _nearest("load", loads, load)
         part = data.sel(load=[chosen]).isel(load=0)
-        stored = _patches(self.folder)
+        stored = _patches(self.scene, self.folder)
         maps, start = [], 0
         for patch in stored:
             rows = slice(start, start + len(patch.area))
@@ -279,9 +280,9 @@ def _folded(order: int, sectors: int) -> int:
     return min(rest, sectors - rest)
 
 
-def _patches(folder: Path) -> list[Patch]:
+def _patches(scene: Scene, folder: Path) -> list[Patch]:
     """Contact patches of the stored seating."""
-    return list(stored_stage(folder, "contact").patches)
+    return list(stored_stage(folder, seating_stage(scene)).patches)
 
 
 def _draw_response(data: xr.Dataset, file: str | Path | None = None, **options: Any) -> object:

@@ -133,7 +133,7 @@ def _for_each_mass(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> xr.Dataset:
-    """Harmonics of the motion at the probe at each resonance, over (load, harmonic).
+    """Harmonics of the balance's motion at the probe at each resonance, over (load, harmonic).
 
     Harmonics beyond those of a curve's own balance are NaN; the linear limits have the first one.
     """
@@ -148,11 +148,12 @@ def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> x
     masses = dict.fromkeys(curve.mass for curve in curves)
     for limit in limits:
         probe = np.full(most + 1, np.nan + 0j)
-        probe[1] = limit.first[np.argmax(abs(limit.first))]
+        # the highest point of all may be that of another mode
+        probe[1] = limit.first[np.argmin(abs(limit.frequency - limit.peak_frequency))]
         parts += [_one_resonance(limit.load, m, limit.peak_frequency, probe) for m in masses]
     data = xr.combine_by_coords(parts)
     data["motion"].attrs |= {"units": "m", "long_name": "complex amplitude at the probe"}
-    data["frequency"].attrs |= {"units": "Hz", "long_name": "frequency of the resonance"}
+    data["frequency"].attrs |= {"units": "Hz", "long_name": "frequency of the motion"}
     data["load"].attrs |= LOAD_ATTRIBUTES
     return _with_mass_units(data)
 

@@ -105,7 +105,9 @@ def _motions(result: SolvedRun) -> dict[str, ComplexArray]:
     order = sorted(result.damped, key=lambda number: curves[number].peak_amplitude)
     found = {
         f"{newtons(result.damped[number].load, 4)} per seat, "
-        f"{curves[number].peak_frequency:.5g} Hz": (result.damped[number].motion)
+        f"{curves[number].peak_frequency:.5g} Hz": (
+            curves[number].over_balance * result.damped[number].motion
+        )
         for number in order
     }
     if result.wheel is not None:

@@ -14,10 +14,16 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
 from ..scene.units import newtons
+from ..util.counted import counted
+from ..view.optimum import at_band_end
+from ..view.response import FOLLOWED, MARCHED
 from .best_load import certainty, flat_range, lowest_resonance
+from .response_points import LINEAR
 
 # of the resonance frequency: farther off, an engine order does not drive it
 OFF_RESONANCE = 0.1
+# methods of points that no balance was solved for
+NOT_BALANCED = (LINEAR, MARCHED, FOLLOWED)
 # relative difference below which a load was itself studied; own loads are rounded to four digits
 SAME_LOAD_TOLERANCE = 1e-3
 
@@ -234,6 +240,8 @@ def wrong_speed(scene: Scene, summary: pd.DataFrame | None) -> list[str]:
     """
     if summary is None or kind_named(scene.kind).is_plane or not scene.operation.speed > 0:
         return []
+    if scene.excitation.engine_order == 0:
+        return []
     excited = scene.excitation.engine_order * scene.operation.speed / (2 * np.pi)
     peaks = summary["peak_frequency"]
     if (1 - OFF_RESONANCE) * peaks.min() <= excited <= (1 + OFF_RESONANCE) * peaks.max():
@@ -320,12 +328,7 @@ def cut_peaks(finite: pd.DataFrame, points: pd.DataFrame | None) -> list[float]:
     """Loads whose highest point is the first or last of its curve."""
     if points is None or points.empty:
         return []
-    ends = points.groupby("load")["frequency"].agg(["min", "max"])
-    return [
-        row["load"]
-        for _, row in finite.iterrows()
-        if row["load"] in ends.index and row["peak_frequency"] in ends.loc[row["load"]].to_numpy()
-    ]
+    return list(finite.loc[at_band_end(finite, points), "load"])
 
 
 def reliability(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
@@ -336,7 +339,7 @@ def reliability(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
         points: response table: load [N], frequency [Hz], converged, method, residual, iterations,
             optionally reason.
     """
-    points = points if points is None else points[points["method"] != "linear"]
+    points = None if points is None else points[~points["method"].isin(NOT_BALANCED)]
     if points is None or points.empty:
         return [], pd.DataFrame()
     good = points["converged"].astype(bool)
@@ -350,13 +353,13 @@ def reliability(points: pd.DataFrame | None) -> tuple[list[str], pd.DataFrame]:
     ]
     if (~good).any():
         text.append(
-            f"{int((~good).sum())} points did NOT converge. They are marked by crosses in the "
-            "charts and take no part in any peak or optimum."
+            f"{counted(int((~good).sum()), 'point')} did NOT converge: marked by crosses in the "
+            "charts, and without part in any peak or optimum."
         )
     if fallback.any():
         used = points.loc[fallback, "method"].value_counts()
         text.append(
-            f"{int(fallback.sum())} points were not reached by {usual} and needed a fallback: "
+            f"{counted(int(fallback.sum()), 'point')} not reached by {usual}, found by a fallback: "
             + ", ".join(f"{name} ({count})" for name, count in used.items())
             + "."
         )

@@ -7,6 +7,7 @@ import hashlib
 import json
 import mimetypes
 import os
+import re
 import struct
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -161,7 +162,9 @@ def page_contents(
 ) -> dict[str, Any]:
     """Everything that the two templates print."""
     statements, shown = _shown_tables(tables)
-    said = by_level(messages)
+    said = {
+        level: [_typeset(text) for text in texts] for level, texts in by_level(messages).items()
+    }
     total = sum(timings.values())
     live = {name: spec for name, spec in (page.live or {}).items() if name in figures}
     keys = {name: f"live-{number}" for number, name in enumerate(live, 1)}
@@ -196,6 +199,15 @@ def page_contents(
     return parts
 
 
+def _typeset(sentence: str) -> str:
+    """A sentence as terminals of any encoding print it, with the signs of the page's tables.
+
+    >>> _typeset("it keeps between 140 and 142 um, and walks 3.5 um/s")
+    'it keeps between 140 and 142 µm, and walks 3.5 µm/s'
+    """
+    return re.sub(r"(?<=\d )um\b", "µm", sentence)
+
+
 def _shown_tables(
     tables: Mapping[str, pd.DataFrame],
 ) -> tuple[list[str], dict[str, pd.DataFrame]]:
@@ -228,7 +240,7 @@ def _answer(
     ]
     steps = next_steps(scene, cautions, summary, own, masses, searched)
     numbers = [*headlines(found, summary, points, searched), *page.more]
-    return {"numbers": numbers, "steps": [*steps, *page.steps]}
+    return {"numbers": numbers, "steps": [_typeset(text) for text in (*steps, *page.steps)]}
 
 
 def _sections(

@@ -34,6 +34,7 @@ from ..hbm.parameters import layer_share, vary
 from ..hbm.peak import Peak, find_peak
 from ..hbm.sensitivity import sensitivities
 from ..scene.tables import Contact, Scene
+from ..scene.validate_contact import friction_of_seats
 from ..util.communicator import Communicator
 from .adaptive.choice import solver_options
 from .adaptive.family import Family, Member, family_member, joined_elements
@@ -120,7 +121,8 @@ def parameters_of(
         Parameter("mu", 1 / FRICTION_FACTOR, FRICTION_FACTOR, "scatter of friction coefficients"),
         Parameter("damping", 1 / DAMPING_FACTOR, DAMPING_FACTOR, "damping without friction"),
     ]
-    ends = None if angles is None else seat_friction_range(scene.contact.mu, angles)
+    mu = float(np.mean(friction_of_seats(scene.contact)))
+    ends = None if angles is None else seat_friction_range(mu, angles)
     if ends is not None:
         found.append(Parameter("seat friction", *ends, "friction while seating"))
     return found

@@ -29,6 +29,13 @@ OPTIONAL_COLUMNS = ("load", "force")
 # of the half width of an interval by the readings: up to such a shift by a richer model the
 # interval is widened, beyond it a richer model is fitted
 ENOUGH_SHIFT = 0.5
+# parameter: fields of [contact] and of its seats that it scales
+SCALED_FIELDS = {
+    "mu": ("mu",),
+    "kt": ("kt_area", "kt"),
+    "kn": ("kn_area", "kn"),
+    "stiffness": ("kt_area", "kt", "kn_area", "kn"),
+}
 # fits with richer models, each of which begins where the last one ended
 MOST_ENRICHMENTS = 4
 
@@ -50,19 +57,22 @@ class FittedScene:
 
     @property
     def scene_values(self) -> dict[str, float]:
-        """Fitted values of those parameters that the scene gives as one number [SI]."""
+        """Field under [contact] to its fitted value [SI], of those fields that the scene gives and
+        that a fitted parameter scales.
+        """
         contact = self.run.scene.contact
-        given = {
-            "mu": contact.mu,
-            "kt": contact.kt_area,
-            "kn": contact.kn_area,
-            "stiffness": contact.kt_area,
-        }
-        return {
-            name: float(factor) * value
-            for name, factor in zip(self.fit.names, self.fit.factors, strict=True)
-            if (value := given.get(name)) is not None
-        }
+        seats = {"": contact, "left.": contact.left, "right.": contact.right}
+        found = {}
+        for name, factor in zip(self.fit.names, self.fit.factors, strict=True):
+            for field in SCALED_FIELDS.get(name, ()):
+                for seat, values in seats.items():
+                    value = getattr(values, field)
+                    if value is not None:
+                        found[seat + field] = float(factor) * value
+        if contact.left.mu is not None and contact.right.mu is not None:
+            # no seat has that of [contact]
+            found.pop("mu", None)
+        return found
 
 
 def _positive_numbers(row: list[str], count: int, path: Path) -> list[float]:
@@ -145,10 +155,10 @@ def check_parameters(names: Sequence[str], scene: Scene) -> None:
         raise InputError(
             f"--parameters {given}: 'stiffness' is both kt and kn, expected it or these"
         )
-    if "kt" in names and scene.contact.kn_area is None:
+    if {"kt", "kn"} & set(names) and not _gives_both_stiffnesses(scene):
         raise InputError(
-            "--parameters kt: the normal stiffness follows the tangential one in this scene, "
-            "expected 'stiffness', or contact.kn_area in the scene"
+            f"--parameters {given}: one stiffness follows the other in this scene, expected "
+            "'stiffness', or both contact.kt_area and contact.kn_area in the scene"
         )
 
 
@@ -231,9 +241,14 @@ def _missing(models: MeasuredModels, settings: Settings, fit: ContactFit) -> Set
     return None
 
 
+def _gives_both_stiffnesses(scene: Scene) -> bool:
+    """Neither of them follows from the other by Mindlin."""
+    return scene.contact.kt_area is not None and scene.contact.kn_area is not None
+
+
 def _parameters_of(scene: Scene, levels: Sequence[MeasuredLevel]) -> tuple[str, ...]:
     """All that can be fitted: one stiffness where the scene gives the other by it."""
-    if scene.contact.kn_area is None:
+    if not _gives_both_stiffnesses(scene):
         return ("mu", "stiffness", "load")
     if all((level.model.elements.kn > 0).any() for level in levels):
         return ("mu", "kt", "kn", "load")

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from ..scene.units import newton_range, newtons
+from ..util.arrays import BooleanArray
 from .response import load_name
 from .style import COLOURS, FAILED_COLOUR, canvas, log_axis
 
@@ -210,6 +211,20 @@ def draw_unknown(ax: Axes, finite: pd.DataFrame) -> None:
     _draw_hollow(ax, unknown, "peak_amplitude", MICRO, 7, 5, "error unknown")
 
 
+def at_band_end(summary: pd.DataFrame, points: pd.DataFrame) -> BooleanArray:
+    """(rows,) whether the highest point is the first or last of its curve.
+
+    Args:
+        summary: rows of the design table.
+        points: response table.
+    """
+    by = ["load", "mass"] if "mass" in points and "mass" in summary else ["load"]
+    ends = points.groupby(by, dropna=False)["frequency"].agg(["min", "max"]).reset_index()
+    joined = summary[[*by, "peak_frequency"]].merge(ends, on=by, how="left")
+    peak = joined["peak_frequency"]
+    return np.asarray((peak == joined["min"]) | (peak == joined["max"]))
+
+
 def draw_cut(
     axes: Any,
     summary: pd.DataFrame,
@@ -218,15 +233,7 @@ def draw_cut(
     """Hollow marks on peaks that are only the end of the frequency band."""
     if points is None or points.empty:
         return
-    ends = summary["load"].map(
-        points.groupby("load")["frequency"].agg(lambda f: (f.min(), f.max()))
-    )
-    cut = summary[
-        [
-            isinstance(end, tuple) and f in end
-            for f, end in zip(summary["peak_frequency"], ends, strict=True)
-        ]
-    ]
+    cut = summary[at_band_end(summary, points)]
     ended = "no peak: end of the frequency band"
     _draw_hollow(axes[0], cut, "peak_amplitude", MICRO, 8, 6, ended)
     _draw_hollow(axes[1], cut, "peak_frequency", 1.0, 8, 6)

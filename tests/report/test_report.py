@@ -22,6 +22,7 @@ from bladefem.report.run_messages import beyond_stick
 from bladefem.report.statements import (
     ResponseAnswer,
     assumed_stiffness,
+    cut_peaks,
     reliability,
     response_answer,
     wrong_speed,
@@ -33,6 +34,8 @@ from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import vary
 from bladefem.util.message import Message, method, warning
 from bladefem.view.contact import pressure_points, pressure_summary
+from bladefem.view.optimum import at_band_end
+from bladefem.view.response import MARCHED
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 import synthetic
@@ -171,6 +174,9 @@ def test_a_searched_optimum_says_how_flat_it_is(low, high, said):
     numbers = headlines(found, summary, points, searched)
     assert numbers[0].value == "170 N"
     assert numbers[0].uncertainty == said
+    # of the frequency of that load, not of the lowest one studied
+    (frequency,) = [one for one in numbers if "frequency" in one.what]
+    assert frequency.uncertainty == "no estimate: no response under this load"
 
 
 def test_the_error_of_a_searched_optimum_has_that_of_the_mesh():
@@ -219,6 +225,9 @@ def test_a_speed_that_does_not_drive_the_resonance_is_named():
     )
     assert "excites at 1200 Hz" in wrong_speed(fast, summary)[0]
     assert "2800 to 3000 rpm" in wrong_speed(fast, summary)[0]
+    # nothing turns with the wheel
+    still = Scene(excitation=Excitation(engine_order=0), operation=Operation(speed=800.0))
+    assert wrong_speed(still, summary) == []
 
 
 def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
@@ -233,6 +242,25 @@ def test_answer_warns_at_the_edge_of_loads_band_and_convergence():
         for text in response_answer(synthetic.summary(), points).cautions
     )
     assert response_answer(None).numbers == []
+
+
+def test_band_ends_are_those_of_each_damper():
+    """The peak of the light damper is the last point of its curve, not of the heavy one's."""
+    curve = pd.DataFrame({"load": 80.0, "frequency": [390.0, 400.0, 430.0]})
+    points = pd.concat([curve[:2].assign(mass=0.01), curve.assign(mass=0.02)])
+    peaks = pd.DataFrame({"load": 80.0, "mass": [0.01, 0.02], "peak_frequency": 400.0})
+    assert cut_peaks(peaks, points) == [80.0]
+    assert list(at_band_end(peaks, points)) == [True, False]
+    assert cut_peaks(peaks[1:], points) == []
+
+
+def test_a_march_is_no_point_of_a_balance():
+    """It is neither solved nor reached by a fallback."""
+    points = synthetic.points().query("load == 200 and converged and method == 'newton'")
+    march = points.iloc[[0]].assign(method=MARCHED, residual=np.nan)
+    text, doubtful = reliability(pd.concat([points, march], ignore_index=True))
+    assert f"{len(points)} of {len(points)} points converged" in text[0]
+    assert len(text) == 1 and doubtful.empty
 
 
 def test_failed_points_and_fallbacks_are_counted():
@@ -268,6 +296,7 @@ def test_page_is_whole_and_self_contained(report):
 
 def test_markdown_page_links_the_figures(report):
     text = report[1].read_text()
+    assert not re.search(r"\d um\b", text[: text.index("## Inputs")])
     assert "](<figures/optimum.png>)" in text
     assert "Figure 1. Amplitude and frequency of the resonance over the normal load" in text
     assert "| normal load [N] |" in text and "**200 N**" in text
@@ -411,6 +440,8 @@ def test_next_steps_name_the_mass_to_try():
     searched = pd.DataFrame({"load": [150.0], "amplitude": [1e-6], "frequency": [800.0]})
     exact = next_steps(Scene(), [], summary, own, None, searched)
     assert "damper.mass = '18 g'" in exact[0]
+    plane = next_steps(Scene(kind="plane blades"), [], summary, own)
+    assert "plane.damper_mass = '24 g'" in plane[0]
     # and what the mesh changes is that of the same load
     meshes = summary.assign(body_mesh=np.linspace(0.01, 0.05, len(summary)))
     finite = meshes[(meshes["load"] > 0) & np.isfinite(meshes["load"])]

@@ -14,6 +14,7 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.modes.clamped_aerofoil import clamped_blade
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.body_mesh import mode_errors
 from bladefem.study.pipeline.damper_contact import condense_contact
 from bladefem.study.pipeline.normal_modes import excited_modes, find_modes
 from bladefem.study.pipeline.reduced_sector import reduce_sector
@@ -56,6 +57,9 @@ def plane():
 
 
 STAGES = {
+    "mode errors": lambda scene, known: mode_errors(
+        Bodies(scene, known.mesh), known.patches, excited_modes(scene, known.mesh, known.modes)
+    ),
     "mesh": lambda scene, known: build_here(scene),
     "modes": lambda scene, known: (
         find_modes(Bodies(scene, known.mesh)),
@@ -87,6 +91,8 @@ def test_a_stage_reads_what_it_declares(stage, plane):
         ("contact", "damper.mass=20 g"),
         ("response", "contact.mu=0.11"),
         ("mesh", "aerofoil.twist=7 deg"),
+        ("mode errors", "excitation.engine_order=3"),
+        ("damped motion", "model.nodal_diameters=0, 1, 6"),
     ],
 )
 def test_a_declared_field_changes_the_key(stage, change):

@@ -17,7 +17,12 @@ from bladefem.scene.toml import vary
 from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram
 from bladefem.study.mistuning.scatter_use import scattered_use
 from bladefem.study.pipeline.preflight import refuse_run
-from bladefem.study.pipeline.utilisation import highest_use, run_utilisation, utilisation_message
+from bladefem.study.pipeline.utilisation import (
+    highest_use,
+    highest_wheel_use,
+    run_utilisation,
+    utilisation_message,
+)
 from bladefem.wheel.statistics import Amplification
 
 MPA = 1e6
@@ -139,9 +144,14 @@ def test_a_run_knows_its_utilisation_and_its_bound():
     assert "80 N: 0.3 at (0.0, 0.0, 0.0) mm, 60 MPa over a mean stress of 300 MPa; 0.396" in (
         utilisation_message(run)
     )
-    # a march that keeps to more than the balance, whose stresses they are
+    # a march that keeps to more than the balance, whose stresses they are, and than any history
     run.response.curves[0].over_balance = 1.5
-    assert highest_use(run, 0, found) == pytest.approx(0.3 * 1.5 * 1.1, rel=1e-12)
+    run.response.curves[0].peak_amplitude = 1.5
+    marched = run_utilisation(run)[0]
+    assert marched.used == pytest.approx([0.45, 0.15], rel=1e-12)
+    assert highest_use(run, 0, marched) == pytest.approx(0.45 * 1.1, rel=1e-12)
+    # a mistuned wheel is balanced too: the tuned march bounds what it may keep to
+    assert highest_wheel_use(run, 0, found, 0.1) == pytest.approx(0.3 * 1.5 * 1.1, rel=1e-12)
     assert run_utilisation(run_of(Scene(), 0.0)) == {}
     assert utilisation_message(run_of(Scene(), 0.0)) == ""
 

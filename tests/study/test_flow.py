@@ -118,6 +118,9 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
         assert abs(last.probe[1, 0]) == pytest.approx(one.amplitude, rel=0.02)
     said = subject.flutter_sentences(found)
     assert "waves flutter without dampers" in said[0] and "limit cycle" in said[1]
+    one_wave = np.where(found.diameters == held.wave, found.net, 1.0)
+    alone = subject.flutter_sentences(replace(found, net=one_wave, held=(held,)))
+    assert alone[0].startswith("flow: 1 wave flutters without dampers")
     shown = replace(reduced, flutter=found)
     tables = flow_tables(shown)
     assert len(tables["response/flow"]) == COUNT

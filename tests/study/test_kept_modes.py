@@ -4,12 +4,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.normal_modes import find_modes
+from bladefem.study.pipeline.normal_modes import find_modes, responding_diameters
 from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
+
+
+def test_a_response_has_the_modes_that_it_excites():
+    """Whatever nodal diameters the tables are asked for: engine order 9 excites 0, 9 and 18."""
+    wedge = load_scene("scenes/wedge.toml", ["mesh.size=24 mm", "aerofoil.fillet=0 mm"])
+    mesh = build_mesh(wedge)
+    for given, wanted in (([0, 1, 6], [0, 1, 6, 9, 18]), ([0, 3, 9, 18], None), (None, None)):
+        listed = vary(wedge, "model.nodal_diameters", given)
+        assert responding_diameters(listed, mesh) == wanted
 
 
 def test_the_reduction_takes_the_modes_that_are_solved_already():

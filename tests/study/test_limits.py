@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bladefem.hbm.model import in_series, softened_layer
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.study.adaptive.family import family_of
@@ -58,6 +59,22 @@ def test_what_modes_leave_out_of_a_limit_is_estimated(modes):
         assert (limit.estimated > 0).all()
     if modes == 2:
         assert found[1].error > 0.01
+
+
+def test_limits_are_of_the_layer_itself():
+    """Where the settings of a damped resonance have a softer layer in its place."""
+    model = reference_model(load=3.0, points=4, harmonics=3)
+    series = -0.5 / model.springs
+    split = replace(model, sides=tuple(in_series(s, series) for s in model.sides), series=series)
+    settings = Settings(5, 1, 64, "rigid", None)
+    band = (1000.0, 1600.0)
+    plain, softened = (
+        judged_limits(family_of(split), one, None, 2, band, True)[1]
+        for one in (settings, replace(settings, softened=True))
+    )
+    assert softened.peak_frequency == plain.peak_frequency
+    softer = linear_limits(softened_layer(split), 2, band)[1]
+    assert softer.peak_frequency < 0.99 * plain.peak_frequency
 
 
 def test_the_error_of_the_bodies_mesh_counts_in_a_limit():

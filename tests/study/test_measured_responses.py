@@ -111,7 +111,7 @@ def test_bad_files_are_refused(text, message, tmp_path):
         ("mu, speed", "--parameters mu, speed: 'speed' is no parameter, expected some of mu, kt"),
         ("kn, stiffness", "--parameters kn, stiffness: 'stiffness' is both kt and kn"),
         ("mu, mu", "--parameters mu, mu: one is given twice"),
-        ("kt", "--parameters kt: the normal stiffness follows"),
+        ("kt", "--parameters kt: one stiffness follows the other"),
     ],
 )
 def test_parameters_are_checked_before_the_readings(parameters, message, tmp_path, capsys):

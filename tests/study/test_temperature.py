@@ -10,6 +10,7 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.damper_contact import condense_contact, contact_patches, thermal_gap
+from bladefem.study.pipeline.history import condense_friction
 from bladefem.study.pipeline.normal_modes import find_modes
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.stage_inputs import stage_key
@@ -33,7 +34,11 @@ def test_a_free_wheel_grows_without_opening_its_seats():
     bodies = Bodies(scene, build_mesh(scene))
     patches = contact_patches(bodies.mesh)
     opened = thermal_gap(bodies, patches)
-    rigid = condense_contact(bodies, patches).rigid
+    problem = condense_contact(bodies, patches)
+    # with friction as well
+    rough = condense_friction(bodies, patches)
+    np.testing.assert_allclose(rough.clearance, problem.clearance, atol=1e-12)
+    rigid = problem.rigid
     left = opened - rigid @ np.linalg.lstsq(rigid, opened, rcond=None)[0]
     assert abs(opened).max() > 1e-3 and abs(left).max() < 1e-12
     inside = np.unique(bodies.mesh.bodies["blade"])

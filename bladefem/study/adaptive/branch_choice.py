@@ -65,7 +65,7 @@ def peak_error(
     if rich == settings:
         return 0.0
     model = family_member(family, rich).model
-    if model.springs.size * (2 * rich.harmonics + 1) > MAX_FOLLOWED_UNKNOWNS:
+    if model.unknowns(rich.harmonics) > MAX_FOLLOWED_UNKNOWNS:
         return _error_below(family, settings, points, top, rich)
     omegas = [p.omega for p in points]
     bounds = 0.9 * min(omegas), 1.1 * max(omegas)

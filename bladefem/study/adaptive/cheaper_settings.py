@@ -11,13 +11,14 @@ from dataclasses import replace
 
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
+from ...hbm.solution import lifts_off
 from .family import Family, family_member, lowest_harmonics
 from .resonance_choice import (
     LIFTING_POINTS,
     SHIFT_WEIGHT,
     SUFFICIENT_SHARE,
     PeakErrors,
-    lifts_off_widely,
+    lacks_harmonics_for_lift_off,
     peak_from,
 )
 from .settings import DAMPER_MODELS, FIRST_SETTINGS, Settings
@@ -63,7 +64,9 @@ def cheaper_settings(
             continue
         height = abs(found.height / peak.height - 1)
         shift = abs(found.omega / peak.omega - 1)
-        if max(height, SHIFT_WEIGHT * shift) > left or lifts_off_widely(poorer, found.solution):
+        if max(height, SHIFT_WEIGHT * shift) > left or lacks_harmonics_for_lift_off(
+            poorer, found.solution
+        ):
             continue
         errors = _with_error(errors, name, height, shift)
         settings = replace(poorer, error=errors.total)
@@ -75,7 +78,7 @@ def cheaper_settings(
 def _too_few_points(settings: Settings, peak: Peak) -> bool:
     """Contacts lift off, and there would be fewer points than a damper that comes off needs."""
     few = settings.points is not None and settings.points < LIFTING_POINTS
-    return few and peak.solution.states["lift"] > 0
+    return few and lifts_off(peak.solution)
 
 
 def _one_step_back(family: Family, settings: Settings, name: str) -> Settings | None:
@@ -113,7 +116,7 @@ def _point_cost(family: Family, settings: Settings) -> float:
     and the solution of the linear equations.
     """
     model = family_member(family, settings).model
-    unknowns = model.springs.size * (2 * settings.harmonics + 1)
+    unknowns = model.unknowns(settings.harmonics)
     modes = len(model.side(1).omega)
     if isinstance(model.damper, tuple):
         modes += len(model.damper[0].omega)

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import NotSolvedError
 from ...hbm.peak import Peak
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, mostly_lifts_off, size
 from .family import Family, lowest_harmonics
 from .resonance_choice import (
     LARGEST_BALANCE,
@@ -82,8 +82,7 @@ class March(Protocol):
 
 def marched_widely(march: March | None, settings: Settings, top: Solution) -> bool:
     """At least half of the contacts lift off at the resonance, and a march may judge that."""
-    lifts = 2 * top.states["lift"] >= len(top.w)
-    return march is not None and lifts and not settings.softened
+    return march is not None and mostly_lifts_off(top) and not settings.softened
 
 
 def choose_in_time(

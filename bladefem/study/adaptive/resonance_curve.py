@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...hbm.band_path import USUAL_LIMITS, PathLimits
 from ...hbm.peak import Peak
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, size
 from ...hbm.sweep import MAX_PATH_UNKNOWNS
 from .branch_choice import peak_error
 from .cheaper_settings import cheaper_settings
@@ -34,7 +34,7 @@ from .resonance_choice import (
     choose_at_peak,
     compared_settings,
     judge_settings,
-    lifts_off_widely,
+    lacks_harmonics_for_lift_off,
     peak_from,
     settings_of_lift_off,
 )
@@ -159,7 +159,9 @@ def _parts(errors: PeakErrors | None) -> Mapping[str, float]:
 def _suited_to_lift_off(family: Family, settings: Settings, top: Solution) -> Settings:
     """Settings for contacts that lift off at the resonance, where they do."""
     softer = softened_where_lifting(family, settings, top)
-    return settings_of_lift_off(softer, top) if lifts_off_widely(settings, top) else softer
+    return (
+        settings_of_lift_off(softer, top) if lacks_harmonics_for_lift_off(settings, top) else softer
+    )
 
 
 def _swept(
@@ -178,7 +180,7 @@ def _swept(
     Args:
         swept: settings and accuracy of that one.
         notes: takes what the sweep could not do.
-        most_folds: after which it is given up; None for as many as a sweep follows by itself.
+        limits: folds and points after which following the paths is given up.
     """
     span = band or (points[0].frequency, points[-1].frequency)
     paths = not too_large_to_follow(family, settings)
@@ -195,7 +197,7 @@ def _with_fewer_folds(settings: Settings, peak: Peak | None) -> Settings | None:
     """Settings with more samples and contact points, where folds of a curve may be of too few of
     them; None where they are the user's, no fewer, or most contacts lift off, whose folds are real.
     """
-    if peak is None or 2 * peak.solution.states["lift"] >= len(peak.solution.w):
+    if peak is None or mostly_lifts_off(peak.solution):
         return None
     finer = settings
     if "samples" in settings.chosen and settings.samples:
@@ -232,7 +234,7 @@ def _with_missed(
     """The choice with the harmonics that points of the rough sweep lack, where the curve will be
     followed round folds: sweeping it twice costs far more than these points.
     """
-    lifts = any(p.states["lift"] > 0 for p in points if p.converged)
+    lifts = any(lifts_off(p) for p in points if p.converged)
     if not lifts or too_large_to_follow(family, settings):
         return settings, peak, errors
     significant = _checked_significant(family, settings, points, top, accuracy)
@@ -289,10 +291,7 @@ def too_large_to_follow(family: Family, settings: Settings) -> bool:
     """The balance has too many unknowns for following its motions round folds in a curve of many
     points.
     """
-    return (
-        family_member(family, settings).model.springs.size * (2 * settings.harmonics + 1)
-        > MAX_PATH_UNKNOWNS
-    )
+    return family_member(family, settings).model.unknowns(settings.harmonics) > MAX_PATH_UNKNOWNS
 
 
 def _chosen(

@@ -16,7 +16,7 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...hbm.model import ReducedModel, in_series
 from ...hbm.peak import Peak, find_peak
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, mostly_lifts_off
 from ...reduction.assemble import change_each
 from .choice import solver_options
 from .family import Family, family_member
@@ -64,8 +64,7 @@ def softened_where_lifting(family: Family, settings: Settings, top: Solution) ->
     off at the resonance.
     """
     split = family_member(family, settings).model.series is not None
-    lifts = 2 * top.states["lift"] >= len(top.w)
-    return replace(settings, softened=True) if split and lifts else settings
+    return replace(settings, softened=True) if split and mostly_lifts_off(top) else settings
 
 
 def with_harmonics_of_stiff_layer(

@@ -52,9 +52,9 @@ def with_whole_wheel(
     comm: Communicator | None = None,
     progress: Progress = without_progress,
 ) -> SolvedRun:
-    """The run with the whole wheel under the load whose tuned resonance is lowest."""
+    """The run with the whole wheel under the load that the report begins with."""
     start = time.perf_counter()
-    best = min(run.response.curves, key=lambda curve: curve.peak_amplitude)
+    best = run.response.curves[run.response.best_curve]
     bodies = Bodies(run.scene, run.mesh, comm, progress)
     deviation = _run_deviations(run)
     root = deviation.of_material or bool(run.scene.mistuning.blades)

@@ -11,7 +11,7 @@ from ...scene.units import newtons
 from ...util.message import warning
 from ..fatigue import Utilisation, fatigue_utilisation, haigh_diagram
 from ..pipeline.run_records import SolvedRun
-from ..pipeline.utilisation import blade_nodes, highest_use, run_utilisation, worst_place
+from ..pipeline.utilisation import blade_nodes, highest_wheel_use, run_utilisation, worst_place
 from .deciding_blades import DecidingBlade
 
 
@@ -74,17 +74,17 @@ def wheel_utilisation_message(run: SolvedRun) -> str:
         return ""
     number = run.response.best_curve
     response, (first, *others) = run.wheel[0], found[0]
+    bound = highest_wheel_use(run, number, first.used, first.blade.worst.mesh_error)
     said = (
         f"utilisation of the mistuned wheel under {newtons(response.load, 4)}, blade "
         f"{first.blade.blade + 1}: {worst_place(first.used)}, against "
         f"{tuned[number].used.max():.3g} of the tuned wheel; "
-        f"{highest_use(run, number, first.used, first.blade.worst.mesh_error):.3g} with the upper "
-        "ends of the error of the mesh and of the loading history"
+        f"{bound:.3g} with the upper ends of the error of the mesh and of the loading history"
     )
     for use in others:
         said += (
             f"; the highest blade of another shape than that, {use.blade.blade + 1}, uses "
             f"{use.highest:.3g} where it moves most, "
-            f"{highest_use(run, number, use.used, use.blade.worst.mesh_error):.3g} with these"
+            f"{highest_wheel_use(run, number, use.used, use.blade.worst.mesh_error):.3g} with these"
         )
     return said

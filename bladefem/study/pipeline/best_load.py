@@ -24,6 +24,7 @@ from ...hbm.peak import Peak, with_slope
 from ...hbm.peak_levels import Variation
 from ...hbm.solution import Solution
 from ...scene.tables import Scene
+from ...scene.validate_contact import friction_of_seats
 from ..adaptive.choice import default_band, solver_options
 from ..adaptive.family import Family, family_member, joined_elements, with_excited_harmonics
 from ..adaptive.resonance_choice import choose_at_peak, too_large
@@ -234,9 +235,14 @@ def _middle(bounds: tuple[float, float]) -> float:
 
 def search_range(scene: Scene) -> tuple[float, float]:
     """Loads [N] between which the best one is sought."""
-    mu = max(scene.contact.mu, 1e-3)
     low, high = SEARCH_RANGE
-    return low * scene.excitation.force / mu, high * scene.excitation.force / mu
+    return low * holding_load(scene), high * holding_load(scene)
+
+
+def holding_load(scene: Scene) -> float:
+    """The load [N] under which friction can hold the excitation."""
+    mu = float(np.mean(friction_of_seats(scene.contact)))
+    return scene.excitation.force / max(mu, 1e-3)
 
 
 def _search(

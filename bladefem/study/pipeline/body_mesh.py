@@ -16,7 +16,7 @@ import numpy as np
 from ...data import ModeSet, Patch, PortModel
 from ...hbm.linear_resonances import free_resonances
 from ...hbm.model import ReducedModel
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, size
 from ...hbm.solve import free_response
 from ..adaptive.changed_peak import changed_peak
 from ..adaptive.family import Family, family_member
@@ -146,11 +146,11 @@ def softened_change(
     """
     model = family_member(softer.family(case), settings).model
     # fallbacks for a damper that comes off take longer than the whole curve, mostly in vain
-    firm = 2 * top.states["lift"] < len(top.w)
+    firm = not mostly_lifts_off(top)
     peak = changed_peak(model, settings, top, top.omega * softer.ratio, PEAK_TOLERANCE, firm)
     if peak is not None:
         return abs(peak.height / size(top) - 1)
-    if not top.states["lift"]:
+    if not lifts_off(top):
         return np.inf
     # a damper that comes off holds little: the motion is nearly that of the free blade
     meshed = family_member(models, settings).model

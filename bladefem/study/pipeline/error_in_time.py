@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...hbm.linear.condensation import condense
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, lifts_off, size
 from ...hbm.solve import as_solution
 from ...hbm.solver.fallback import Attempt
 from ...hbm.solver.newton import Newton
@@ -100,7 +100,7 @@ def error_in_time(
     """
     models = marches.models
     told = curve.settings.error
-    if told is None or told <= accuracy or not top.states["lift"]:
+    if told is None or told <= accuracy or not lifts_off(top):
         return None
     left = sum(change for name, change in curve.parts.items() if name not in COVERED_IN_TIME)
     known = bool(curve.parts) and np.isfinite(left)

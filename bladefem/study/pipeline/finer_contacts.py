@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, moving_contacts, size
 from ...hbm.stability import STABLE, UNIQUE, UNSTABLE, Verdict, stability_verdict
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution, richer_settings
@@ -50,8 +50,7 @@ def unstable_with_more_points(
         point: a motion with these settings that is not unstable.
         verdict: on that one.
     """
-    moving = point.states["slip"] + point.states["lift"]
-    if verdict == UNIQUE or not moving or settings.points is None:
+    if verdict == UNIQUE or not moving_contacts(point) or settings.points is None:
         return None
     counts = list(_more_points(models, settings))
     told = next(filter(None, (_judged(models, settings, point, some) for some in counts)), None)

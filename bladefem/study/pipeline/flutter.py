@@ -22,6 +22,7 @@ from ...reduction.assemble import folded_diameter, pair_model
 from ...reduction.truncate import truncate_modes
 from ...scene.units import newtons, show
 from ...util.arrays import IntegerArray, RealArray
+from ...util.counted import counted
 from ...util.message import warning
 from ...wheel.aerodynamics import limit_cycles, with_flow
 from ..adaptive.settings import Settings
@@ -170,12 +171,12 @@ def with_best_load(
     if not known or best in known:
         return found
     solved: list[tuple[LoadCase, list[HeldFlutter]]] = []
-    for case in load_cases(run.scene, run.mesh, run.contact):
+    cases = load_cases(run.scene, run.mesh, run.contact)
+    for case in cases:
         here = (case.load, case.mass)
         if here in known:
             solved.append((case, [one for one in found.held if (one.load, one.mass) == here]))
-        if here == best:
-            wanted = case
+    wanted = next(c for c in cases if (c.load, c.mass) == best)
     try:
         held = _by_scale(wanted, solved) or _held_anew(found, run, bodies, patches, wanted, keep)
     except InputError as error:
@@ -389,22 +390,25 @@ def flutter_sentences(found: FlutterResult) -> list[str]:
     """What the flow does, in words."""
     d = int(np.argmin(found.net))
     share = (
-        f"least damped wave: {wave_words(found.worst)}, "
+        f"least damped wave: {wave_words(found.worst, len(found.net))}, "
         f"{100 * found.net[d]:.3g} % of critical ({100 * found.flow[d]:+.3g} % by the flow)"
     )
     if not found.held:
         onset = "" if np.isinf(found.onset) else f"; {found.onset:.3g} times this flow flutters"
         return [f"flow: no wave flutters; {share}{onset}"]
+    flutter = "flutters" if len(found.fed) == 1 else "flutter"
     sentences = [
-        f"flow: {len(found.fed)} waves flutter without dampers, from {found.onset:.3g} times this "
-        f"flow on; {share}"
+        f"flow: {counted(len(found.fed), 'wave')} {flutter} without dampers, from "
+        f"{found.onset:.3g} times this flow on; {share}"
     ]
     first = [one for one in found.held if one.wave == found.worst]
     for one, most in zip(first, found.largest, strict=True):
         beyond = ""
         if not np.isnan(one.largest):
             beyond = f"; motions above {growing_words(one.largest)} grow"
-        others = "" if most.wave == one.wave else f"; {_cycle(most)} in {wave_words(most.wave)}"
+        others = ""
+        if most.wave != one.wave:
+            others = f"; {_cycle(most)} in {wave_words(most.wave, len(found.net))}"
         sentences.append(
             f"flutter under {newtons(one.load)}: friction holds it in a limit cycle of "
             f"{_cycle(one)}{beyond}{others} (one harmonic; forced responses leave it out)"
@@ -426,10 +430,16 @@ def growing_words(amplitude: float) -> str:
     return show(float(f"{amplitude:.3g}"), "m")
 
 
-def wave_words(wave: int) -> str:
-    """A wave's nodal diameters and its direction, in words."""
+def wave_words(wave: int, sectors: int) -> str:
+    """A wave's nodal diameters, and its direction where it does not stand, in words.
+
+    >>> wave_words(-2, 36), wave_words(1, 36), wave_words(18, 36)
+    ('2 nodal diameters, backward', '1 nodal diameter, forward', '18 nodal diameters, standing')
+    """
     way = "backward" if wave < 0 else "forward"
-    return f"{abs(wave)} nodal diameters, {way}"
+    if 2 * wave % sectors == 0:
+        way = "standing"
+    return f"{counted(abs(wave), 'nodal diameter')}, {way}"
 
 
 def _cycle(one: HeldFlutter) -> str:

@@ -27,7 +27,7 @@ from ...scene.tables import Scene
 from ...scene.units import newtons
 from ...util.percent import percent
 from .bodies import Bodies
-from .damper_contact import seat_clearance
+from .damper_contact import seat_clearance, thermal_gap
 
 FRICTIONLESS = "frictionless"
 
@@ -70,8 +70,12 @@ def refuse_jamming(
 
 
 def condense_friction(bodies: Bodies, patches: Sequence[Patch]) -> FrictionalProblem:
-    """All ports of the seats, normal and tangential: what takes finite elements."""
-    gap = seat_clearance(bodies, list(patches))
+    """All ports of the seats, normal and tangential: what takes finite elements.
+
+    Blade and damper are warm before speed presses them together: their thermal strains open or
+    close the seats, and leave no tangential traction.
+    """
+    gap = seat_clearance(bodies, list(patches)) + thermal_gap(bodies, list(patches))
     problem = frictional_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
     return hold_axially(problem) if bodies.scene.damper.axial == "held" else problem
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, lifts_off, size
 from ...hbm.stability import UNIQUE, UNSTABLE, Verdict
 from ...scene.tables import Scene
 from ...util.arrays import RealArray
@@ -182,7 +182,7 @@ def _doubtful(point: Solution, verdict: str) -> bool:
     On the shipped wedge with ground faces three harmonics call 301 um stable under 580 N, or
     unstable, by the last digits of the reduction; a march ends on 287 um.
     """
-    return verdict != UNIQUE and point.states["lift"] > 0 and point.harmonics < ENOUGH_HARMONICS
+    return verdict != UNIQUE and lifts_off(point) and point.harmonics < ENOUGH_HARMONICS
 
 
 def _marched(marches: Marches, settings: Settings, point: Solution) -> KeptBand:

@@ -24,7 +24,7 @@ from ...hbm.ring_march import (
     state_of_solution,
     steps_are_resolved,
 )
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, lifts_off, size
 from ...hbm.time_model import time_system
 from ...time.event_integrator import Flow, State, integrate_periods
 from ...util.durations import core_time
@@ -283,7 +283,7 @@ def band_by_steps(
             return found
         if found.reason:
             continue
-        grown = band.highest > GROWN_RATIO * size(point) and bool(point.states["lift"])
+        grown = band.highest > GROWN_RATIO * size(point) and lifts_off(point)
         left = not resolved and not band.holds(size(point), HELD_SHARE)
         if not grown and (not left or _agree(before, band, size(point))):
             return band
@@ -379,7 +379,7 @@ def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
 
 def _grown_too_far(motion: np.ndarray, point: Solution, instants: int) -> bool:
     """It is repeated with more instants."""
-    again = instants < INSTANTS_BY_STEPS[-1] and bool(point.states["lift"])
+    again = instants < INSTANTS_BY_STEPS[-1] and lifts_off(point)
     return again and bool(
         amplitudes_of_periods(motion, point.harmonics).max() > GROWN_RATIO * size(point)
     )

@@ -81,6 +81,8 @@ def judged_limits(
         open_points: the scene leaves the number of contact points open; where more than half of
             the nodes are such, half of them tell the error of the contact mesh.
     """
+    # full stick is that of the layer itself, whatever stood for it where contacts lift off
+    settings = replace(settings, softened=False)
     limits = linear_limits(family_member(family, settings).model, mode, band)
     others = [richer_settings(family, settings, name) for name in DIRECTIONS if name not in EXACT]
     rich = [family_member(family, other).model for other in others if other is not None]

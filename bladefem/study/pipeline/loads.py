@@ -11,11 +11,10 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ...contact.interface_elements import seat_contact
 from ...hbm.history_interval import POINT
 from ...hbm.model import ReducedModel
 from ...hbm.parallel import share_work
-from ...hbm.solution import Solution, size
+from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, moving_contacts, size
 from ...scene.tables import Scene
 from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ...util.communicator import Communicator
@@ -26,7 +25,7 @@ from ..adaptive.family import Family, family_member
 from ..adaptive.resonance_curve import too_large_to_follow
 from ..adaptive.settings import Settings
 from .assemble_model import LoadCase
-from .best_load import BestLoad, studied_load
+from .best_load import BestLoad, holding_load, studied_load
 from .body_mesh import SofterBody
 from .error_in_time import Marches
 from .judged_resonance import judged_in_time, judged_resonance
@@ -43,6 +42,8 @@ Search: TypeAlias = "Callable[[], tuple[BestLoad, Callable[[float], LoadCase]]]"
 # the shipped wedge with ground faces, 1100 N, 536 um with 16 points a seat, they keep 517 um, eight
 # keep some 460 and four some 480 of it
 DOUBT_OF_FEWER_POINTS = 0.5
+# number of loads when none are given
+DEFAULT_LOADS = 8
 # friction work over that of the excitation below which it is rounding
 ROUNDED_WORK = 1e-9
 
@@ -214,7 +215,14 @@ class Curve:
     @property
     def peak_amplitude(self) -> float:
         """That of the curve, or that of the stiff layer that its softer one stands for [m]."""
-        return (1 + self.layer_height if self.reaches_layer else 1.0) * self.curve_amplitude
+        return self.layer_factor * self.curve_amplitude
+
+    @property
+    def layer_factor(self) -> float:
+        """The resonance amplitude of the stiff layer over that of the softer one of the curve; 1
+        where the curve is that of the layer itself.
+        """
+        return 1 + self.layer_height if self.reaches_layer else 1.0
 
     @property
     def reaches_layer(self) -> bool:
@@ -222,13 +230,17 @@ class Curve:
         return bool(np.isfinite(self.layer_height))
 
     @property
+    def governing_march(self) -> ResonanceInTime | KeptBand | None:
+        """The march whose highest amplitude is given as the resonance; None where a balance is."""
+        if self.sought is not None:
+            return self.sought
+        return self.kept if self.marched_instead else None
+
+    @property
     def curve_amplitude(self) -> float:
         """That of the balance, or the highest that a march keeps to where it contradicts it [m]."""
-        if self.sought is not None:
-            return self.sought.highest
-        if self.marched_instead and self.kept is not None:
-            return self.kept.highest
-        return self.balance_amplitude
+        march = self.governing_march
+        return self.balance_amplitude if march is None else march.highest
 
     @property
     def balance_amplitude(self) -> float:
@@ -245,7 +257,7 @@ class Curve:
     @property
     def is_march(self) -> bool:
         """The resonance given is what a march in time keeps to, not a periodic motion."""
-        return self.sought is not None or (self.marched_instead and self.kept is not None)
+        return self.governing_march is not None
 
     @property
     def friction_work(self) -> float:
@@ -255,11 +267,8 @@ class Curve:
         work = self.peak.work.dissipated
         if abs(work) < ROUNDED_WORK * abs(self.peak.work.input):
             work = 0.0
-        if self.sought is not None:
-            work = self.sought.friction_work
-        elif self.marched_instead and self.kept is not None:
-            work = self.kept.friction_work
-        return (1 + self.layer_height if self.reaches_layer else 1.0) * float(work)
+        march = self.governing_march
+        return self.layer_factor * float(work if march is None else march.friction_work)
 
     @property
     def work_over_balance(self) -> float:
@@ -275,7 +284,7 @@ class Curve:
     @property
     def slipping_at_peak(self) -> float:
         """Elements that slip or lift off in a period of the resonance given; NaN for a march."""
-        return np.nan if self.is_march else self.peak.states["slip"] + self.peak.states["lift"]
+        return np.nan if self.is_march else moving_contacts(self.peak)
 
     @property
     def drift_at_peak(self) -> float:
@@ -429,7 +438,7 @@ def curve_of(
     if not judged.contradicted and sought is None:
         curve, estimated, in_time = judged_in_time(scene, marches, curve, top)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
-    lifts = any(p.states["lift"] > 0 for p in curve.points if p.converged)
+    lifts = any(lifts_off(p) for p in curve.points if p.converged)
     return Curve(
         load=case.load,
         mass=case.mass,
@@ -478,7 +487,7 @@ def _sought_in_time(scene: Scene, models: Family, curve: Checked) -> ResonanceIn
     error = curve.settings.error
     if not scene.study.stability or error is None or error <= scene.accuracy:
         return None
-    if curve.settings.softened or 2 * top.states["lift"] < len(top.w):
+    if curve.settings.softened or not mostly_lifts_off(top):
         return None
     return resonance_in_time(models, curve.settings, top)
 
@@ -500,7 +509,7 @@ def _record(p: Solution) -> dict[str, Any]:
         "route": p.route,
         "residual": p.residual,
         "iterations": p.iterations,
-        "slipping": p.states["slip"] + p.states["lift"],
+        "slipping": moving_contacts(p),
         "drift": p.drift,
         "dissipated": p.work.dissipated,
         "imbalance": p.work.imbalance,
@@ -578,10 +587,9 @@ def _linear_row(limit: Limit) -> dict[str, Any]:
     }
 
 
-def default_loads(scene: Scene, count: int = 8) -> tuple[float, ...]:
-    """Loads when none are given: three decades round the force at which friction can hold the
-    excitation.
+def default_loads(scene: Scene) -> tuple[float, ...]:
+    """Loads when none are given: from that under which friction can hold the excitation, over two
+    and a half decades.
     """
-    mu = float(np.mean([seat_contact(scene.contact, patch).mu for patch in ("this", "next")]))
-    held = scene.excitation.force / max(mu, 1e-3)
-    return tuple(float(f"{x:.2g}") for x in np.geomspace(held, 300 * held, count))
+    least = holding_load(scene)
+    return tuple(float(f"{x:.2g}") for x in np.geomspace(least, 300 * least, DEFAULT_LOADS))

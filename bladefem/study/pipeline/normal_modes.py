@@ -134,6 +134,18 @@ def cost_of_diameter(sectors: int) -> Callable[[int], float]:
     return lambda n: 1.0 if 2 * n % sectors == 0 else 2.0
 
 
+def responding_diameters(scene: Scene, mesh: Mesh) -> list[int] | None:
+    """Nodal diameters whose modes a response needs besides those that the scene lists for its
+    tables: stresses and errors of a response are those of the diameters that its harmonics excite.
+    None where the scene lists none, or all of these.
+    """
+    listed = scene.model.nodal_diameters
+    excited = harmonic_diameters(scene, mesh, 3)
+    if not listed or set(excited) <= set(listed):
+        return None
+    return sorted({*listed, *excited})
+
+
 def harmonic_diameters(
     scene: Scene,
     mesh: Mesh,

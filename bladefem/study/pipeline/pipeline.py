@@ -27,7 +27,7 @@ from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
 from .flutter import find_flutter, flutter_sentences, with_best_load
 from .history import refuse_jamming
-from .normal_modes import excited_modes, find_modes
+from .normal_modes import excited_modes, find_modes, responding_diameters
 from .response_stage import run_response
 from .run_records import ModalRun, ReducedRun, Run, SeatedRun, SolvedRun
 from .scene_mesh import build_mesh
@@ -170,11 +170,17 @@ def _run_modes(
     keep: StageRunner,
     responds: bool,
 ) -> ModalRun:
-    key = stage_key("modes", before.scene)
+    scene = before.scene
+    key = stage_key("modes", scene)
     # the reduction needs more modes of the same pencils
-    reduced = judged_modes(before.scene, first_settings(before.scene)) if responds else 0
+    reduced = judged_modes(scene, first_settings(scene)) if responds else 0
+    diameters = responding_diameters(scene, before.mesh) if responds else None
     with keep.clock("modes"):
-        modes = keep("modes", key, lambda: find_modes(bodies, reduced=reduced))
+        modes = keep(
+            "modes",
+            stage_key("modes", scene, *(diameters or ())),
+            lambda: find_modes(bodies, diameters, reduced=reduced),
+        )
         clamped = keep("clamped", key, lambda: on_one_rank(bodies, clamped_blade))
     keep.clock.messages.extend(bodies.storage_remarks)
     return ModalRun(**vars(before), modes=modes, clamped=clamped)
@@ -219,7 +225,7 @@ def _run_reduction(
         settings, reduced = reduced_sector(scene, bodies, middle, patches, keep)
         errors = keep(
             "mode_errors",
-            stage_key("reduction", scene, "mode errors"),
+            stage_key("mode errors", scene),
             lambda: on_one_rank(bodies, lambda some: mode_errors(some, patches, excited)),
         )
     return ReducedRun(

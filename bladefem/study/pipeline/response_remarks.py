@@ -30,6 +30,9 @@ from .stability_remarks import (
 
 # largest estimated error by the mesh of a stress that is no warning
 TRUSTED_STRESS = 0.2
+# relative difference at the probe between the motion of all modes and the balance's: a stress of
+# the same motion is off by less than 1e-5
+SAME_MOTION = 0.02
 # sentences on the search of one curve that are quoted
 MAX_NOTES = 3
 # fields of a curve that are parts of its estimated error, and what lowers them
@@ -327,6 +330,11 @@ def stress_message(found: DampedStress, over_balance: float = 1.0) -> str:
         f"at ({place}) mm, of all modes, harmonics and damper forces; estimated error of the mesh "
         f"there {percent(found.mesh_error)}"
     )
+    if found.mismatch > SAME_MOTION:
+        return warning(
+            f"{text}; the motion that has it differs by {percent(found.mismatch)} from that of the "
+            "balance at the probe"
+        )
     if found.mesh_error <= TRUSTED_STRESS:
         return text
     return warning(f"{text}: too large to rely on, at a sharp edge or on too coarse a mesh")

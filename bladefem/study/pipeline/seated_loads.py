@@ -40,18 +40,15 @@ def seat_every_load(
 ) -> Seating:
     """The damper on its seats under every load, without friction or after the scene's history."""
     key = stage_key("contact", scene)
+    name = seating_stage(scene)
     rough = None
     if scene.contact.history == FRICTIONLESS:
         bare = keep(
-            "contact",
-            key,
-            lambda: on_one_rank(bodies, lambda some: condense_contact(some, patches)),
+            name, key, lambda: on_one_rank(bodies, lambda some: condense_contact(some, patches))
         )
     else:
         rough = keep(
-            "contact_friction",
-            key,
-            lambda: on_one_rank(bodies, lambda some: condense_friction(some, patches)),
+            name, key, lambda: on_one_rank(bodies, lambda some: condense_friction(some, patches))
         )
         bare = normal_part(rough)
     problem = on_layer(scene, bare)
@@ -59,6 +56,11 @@ def seat_every_load(
     return seat_at_loads(
         scene, Seating(problem, {}, own, rough=rough), studied_loads(scene, own), clock
     )
+
+
+def seating_stage(scene: Scene) -> str:
+    """Name under which a run folder holds the contact problem of the seats."""
+    return "contact" if scene.contact.history == FRICTIONLESS else "contact_friction"
 
 
 def seat_at_loads(

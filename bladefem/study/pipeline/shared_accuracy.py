@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...errors import NotSolvedError
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, mostly_lifts_off
 from ...scene.tables import Scene
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import Checked
@@ -106,8 +106,7 @@ def room_of_balance(accuracy: float, unseen: UnseenErrors, top: Solution) -> flo
         top: the resonance.
     """
     left = accuracy - unseen.total
-    lifts = 2 * top.states["lift"] >= len(top.w)
-    return accuracy if lifts or not left >= LEAST_ROOM * accuracy else left
+    return accuracy if mostly_lifts_off(top) or not left >= LEAST_ROOM * accuracy else left
 
 
 def unseen_errors(

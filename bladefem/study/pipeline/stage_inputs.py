@@ -89,6 +89,12 @@ STAGE_INPUTS = {
         fields=("excitation.at", "excitation.direction", "model.reduction", "solver"),
         code=("bladefem.fem",),
     ),
+    # what the mesh leaves uncertain of the modes that are excited, seen from the ports
+    "mode errors": StageInputs(
+        after=("modes", "reduction"),
+        fields=("excitation.engine_order",),
+        code=("bladefem.study",),
+    ),
     "response": StageInputs(
         after=("contact", "reduction"),
         fields=(
@@ -129,7 +135,7 @@ STAGE_INPUTS = {
         code=("bladefem.wheel",),
     ),
     "damped motion": StageInputs(
-        after=("contact", "reduction"),
+        after=("modes", "contact", "reduction"),
         fields=("accuracy", "aerodynamics", "operation", "excitation", "damper.axial"),
         code=("bladefem.study",),
     ),

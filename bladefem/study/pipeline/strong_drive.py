@@ -25,7 +25,7 @@ from ...hbm.ring_march import (
     march_ring,
     state_of_solution,
 )
-from ...hbm.solution import Solution
+from ...hbm.solution import Solution, lifts_off
 from ..adaptive.check_points import heights_of
 from ..adaptive.choice import Checked
 from ..adaptive.resonance_choice import LIFTING_POINTS
@@ -102,7 +102,7 @@ def strong_drives(
         given: amplitude of the resonance [m].
     """
     heights = heights_of(curve.points)
-    lifts = [p.states["lift"] > 0 for p in curve.points]
+    lifts = [lifts_off(p) for p in curve.points]
     high = np.flatnonzero((heights >= NEARLY_AS_HIGH * heights.max()) & np.array(lifts))
     if not len(high):
         return StrongDrives()

@@ -16,7 +16,8 @@ from .run_records import SolvedRun
 def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
     """Number of a curve to the utilisation at the blade's nodes at its resonance.
 
-    Empty where the scene gives no diagram.
+    Stresses are those of the balance, in proportion to the amplitude that is given. Empty where the
+    scene gives no diagram.
 
     Raises:
         InputError: the diagram does not reach a mean stress of the blade.
@@ -27,10 +28,11 @@ def run_utilisation(run: SolvedRun) -> dict[int, Utilisation]:
     blade = blade_nodes(run.mesh)
     points = run.mesh.points[blade]
     mean = run.strength.mean[blade]
-    return {
-        number: fatigue_utilisation(diagram, points, found.field[blade], mean)
-        for number, found in run.damped.items()
-    }
+    found = {}
+    for number, stress in run.damped.items():
+        alternating = run.response.curves[number].over_balance * stress.field[blade]
+        found[number] = fatigue_utilisation(diagram, points, alternating, mean)
+    return found
 
 
 def blade_nodes(mesh: Mesh) -> np.ndarray:
@@ -68,25 +70,32 @@ def worst_place(used: Utilisation) -> str:
     )
 
 
-def highest_use(
-    run: SolvedRun,
-    number: int,
-    used: Utilisation,
-    mesh_error: float | None = None,
-) -> float:
-    """The largest utilisation with the estimated error of the mesh and the largest amplitude that
-    a loading history can leave, or a march from an unstable motion.
+def highest_use(run: SolvedRun, number: int, used: Utilisation) -> float:
+    """The largest utilisation of the tuned wheel with the estimated error of the mesh and the
+    largest amplitude that a loading history can leave.
 
     Args:
         number: of the curve under the same load.
-        mesh_error: estimated relative error of the stress by the mesh; that of the tuned wheel at
-            the curve's resonance when left out.
     """
+    highest = float(used.used[used.worst])
+    return highest * _history_share(run, number) * (1 + run.damped[number].mesh_error)
+
+
+def highest_wheel_use(run: SolvedRun, number: int, used: Utilisation, mesh_error: float) -> float:
+    """The same of a blade of a mistuned wheel, whose stresses are those of a balance: with the rise
+    of a march above the tuned one too.
+
+    Args:
+        number: of the tuned wheel's curve under the same load.
+        mesh_error: estimated relative error of the stress by the mesh.
+    """
+    share = _history_share(run, number) * max(run.response.curves[number].over_balance, 1.0)
+    return float(used.used[used.worst]) * share * (1 + mesh_error)
+
+
+def _history_share(run: SolvedRun, number: int) -> float:
+    """Largest amplitude that a loading history can leave over the one given."""
     curve = run.response.curves[number]
-    # stresses are those of the balance
-    share = curve.over_balance
-    if curve.interval is not None:
-        share = max(curve.interval.highest / curve.balance_amplitude, share)
-    if mesh_error is None:
-        mesh_error = run.damped[number].mesh_error
-    return float(used.used[used.worst] * share * (1 + mesh_error))
+    if curve.interval is None:
+        return 1.0
+    return max(curve.interval.highest / curve.peak_amplitude, 1.0)
