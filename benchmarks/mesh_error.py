@@ -33,7 +33,7 @@ from pathlib import Path
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline import pipeline
-from bladefem.study.pipeline.loads import Curve
+from bladefem.study.pipeline.curve import Curve
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from geometry.export import write_msh
 

@@ -292,7 +292,7 @@ def truth_of(known: Prepared, k: int, harmonics: int) -> Truth:
     family = known.families[k]
     case = known.cases[k]
     curve = curve_of(known.scene, case, lambda _: family, restarted_settings(known.settings))
-    if curve.marched_instead and curve.marched > WIDE_BAND:
+    if curve.march_replaces_balance and curve.marched > WIDE_BAND:
         raise NotSolvedError(
             f"{case.load:g} N: the blade bounces between amplitudes {100 * curve.marched:.0f} % "
             "apart, which no balance tells"

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from ..data import ModeSet, PortModel, PressureMap
     from ..study.modes.survey import Survey
-    from ..study.pipeline.loads import Curve
+    from ..study.pipeline.curve import Curve
     from ..study.pipeline.reduced_sector import Reduced
     from ..study.pipeline.run_records import Response, Run, SolvedRun
 
@@ -169,7 +169,7 @@ def response_tables(response: Response) -> str:
     """
     import pandas as pd
 
-    from ..study.pipeline.loads import design_table
+    from ..study.pipeline.design_table import design_table
 
     curves = response.curves
     rows = pd.DataFrame(design_table(curves, response.limits))

@@ -11,7 +11,9 @@ import pandas as pd
 
 from ..scene.units import newtons
 from ..study.pipeline.best_load import BestLoad, studied_load
-from ..study.pipeline.loads import Curve, design_table, lower_studied
+from ..study.pipeline.curve import Curve
+from ..study.pipeline.design_table import design_table
+from ..study.pipeline.loads import lower_studied
 from ..study.pipeline.run_records import Response
 from ..util.percent import percent
 from .response_points import points_of

@@ -8,7 +8,7 @@ from dataclasses import asdict
 import pandas as pd
 
 from ..hbm.stability import STABLE
-from ..study.pipeline.loads import Curve
+from ..study.pipeline.curve import Curve
 from ..study.pipeline.resonance_list import LocalResonance, local_resonances, motions_at
 from ..view.response import MARCHED
 
@@ -37,6 +37,7 @@ def _marched(curve: Curve) -> list[LocalResonance]:
     if curve.curve_amplitude == curve.balance_amplitude:
         return []
     frequency, height = curve.peak_frequency, curve.peak_amplitude
-    driven = curve.sought is None and curve.kept is not None and curve.kept.drive > 1
+    march = curve.march_at_peak
+    driven = curve.resonance_by_march is None and march is not None and march.drive > 1
     reached = f"{MARCHED} after a strong drive" if driven else MARCHED
     return [LocalResonance(frequency, height, STABLE, "", motions_at(curve, frequency), reached)]

@@ -15,8 +15,8 @@ import pandas as pd
 from ..data import SEATS
 from ..hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
 from ..study.pipeline.contact_cycle import ContactCycle
+from ..study.pipeline.curve import Curve
 from ..study.pipeline.linear_limits import Limit
-from ..study.pipeline.loads import Curve
 from .response_points import LINEAR
 from .tables import units_of
 

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 
 from ..hbm.stability import STABLE
+from ..study.pipeline.curve import Curve
 from ..study.pipeline.linear_limits import Limit
-from ..study.pipeline.loads import Curve
 from ..view.response import FOLLOWED, MARCHED
 
 # method of the points of a linear limit

@@ -14,7 +14,7 @@ from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
 from ..study.pipeline.contact_cycle import ContactCycle
-from ..study.pipeline.loads import design_table
+from ..study.pipeline.design_table import design_table
 from ..study.pipeline.run_records import SolvedRun
 from .best_load import best_load_table
 from .fatigue import utilisation_table

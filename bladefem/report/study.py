@@ -13,7 +13,7 @@ import pandas as pd
 from ..scene.fields import field_at, value_at
 from ..scene.tables import Scene
 from ..scene.units import newtons, parse, show
-from ..study.pipeline.loads import design_table
+from ..study.pipeline.design_table import design_table
 from ..study.pipeline.run_records import Response
 from ..view.study import draw_study
 from .best_load import error_words

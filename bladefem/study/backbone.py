@@ -26,7 +26,7 @@ from ..util.communicator import Communicator
 from ..util.progress import Progress, without_progress
 from .adaptive.family import family_member
 from .pipeline.case_models import family_of_case, load_cases
-from .pipeline.loads import Curve
+from .pipeline.curve import Curve
 from .pipeline.run_records import SolvedRun
 from .pipeline.stage_inputs import stage_key
 

@@ -16,10 +16,10 @@ from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import flank_motions as module
 from bladefem.study.pipeline import judged_resonance
+from bladefem.study.pipeline.curve import Curve
 from bladefem.study.pipeline.error_in_time import Marches
 from bladefem.study.pipeline.flank_motions import FlankMotions, flank_motions
 from bladefem.study.pipeline.kept_band import KeptBand
-from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import Stability
 from bladefem.study.pipeline.stability_remarks import unmarched_sentence, unstable_sentence
 
@@ -117,9 +117,9 @@ def test_marches_that_are_not_known_are_told(curve, marks, kept):
     assert found.point is curve.points[3] and kept[1] == [3.0, 2.0]
     kept[0][3.0] = (np.nan, np.nan)
     assert flank_motions(MARCHES, curve, marks, 1.0).point is None
-    told = unmarched_sentence([SimpleNamespace(load=4.0, unmarched=found.reason)])
+    told = unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure=found.reason)])
     assert "4 N (a march takes too many operations)" in told
-    assert unmarched_sentence([SimpleNamespace(load=4.0, unmarched="")]) == ""
+    assert unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure="")]) == ""
 
 
 @pytest.mark.parametrize(
@@ -139,8 +139,8 @@ def test_a_motion_beside_the_resonance_is_given_or_counted(
     scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
     found = judged_resonance.judged_resonance(MARCHES, curve, scene)
     assert found.amplitude == pytest.approx(given)
-    assert found.beside == pytest.approx(beside)
-    assert found.contradicted == (given == highest)
+    assert found.flank_rise == pytest.approx(beside)
+    assert found.march_replaces_balance == (given == highest)
     assert found.unstable_peak(curve) is None
 
 
@@ -149,10 +149,10 @@ def test_a_higher_march_beside_a_marched_resonance_is_given(curve, marks, monkey
     flank = FlankMotions(curve.points[2], KeptBand(2.0, 0.93, 0.94, 300))
     monkeypatch.setattr(judged_resonance, "flank_motions", lambda *_: flank)
     top = judged_resonance.JudgedResonance(
-        curve.points[4], marks, KeptBand(4.0, 0.9, 0.91, 200), contradicted=True
+        curve.points[4], marks, KeptBand(4.0, 0.9, 0.91, 200), march_replaces_balance=True
     )
     found = judged_resonance._with_flanks(MARCHES, curve, top, curve.points[4], 0.05)
-    assert found.contradicted and found.amplitude == 0.94
+    assert found.march_replaces_balance and found.amplitude == 0.94
 
 
 @pytest.mark.parametrize(("verdict", "said"), [(STABLE, "lasts"), ("unknown", "was not judged")])
@@ -160,7 +160,7 @@ def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
     curve = SimpleNamespace(
         load=4.0,
         unstable_peak=None,
-        marched_instead=True,
+        march_replaces_balance=True,
         # what was not solved is no motion
         amplitude=np.array([2.05e-6, 2.149e-6, 9e-6]),
         frequency=np.array([1014.2, 1077.3, 1090.0]),
@@ -168,7 +168,7 @@ def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
         stability=np.array([UNSTABLE, verdict, ""]),
         balance_amplitude=2.05e-6,
         peak_frequency=1014.2,
-        kept=KeptBand(1014.2, 1.15e-6, 3.6e-6, 350),
+        march_at_peak=KeptBand(1014.2, 1.15e-6, 3.6e-6, 350),
     )
     text = unstable_sentence(curve, 0.02)
     assert (

@@ -20,10 +20,10 @@ from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import finer_contacts, judged_resonance
 from bladefem.study.pipeline import kept_band as module
+from bladefem.study.pipeline.curve import Curve
 from bladefem.study.pipeline.finer_contacts import FinerMotion, unstable_with_more_points
 from bladefem.study.pipeline.flank_motions import FlankMotions
 from bladefem.study.pipeline.kept_band import kept_band
-from bladefem.study.pipeline.loads import Curve
 from bladefem.study.pipeline.stability import Stability, in_one_body
 from bladefem.study.pipeline.stability_remarks import doubtful_sentence
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
@@ -104,23 +104,23 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
     band = module.KeptBand(380.0, lowest, highest, 200, reason)
     elsewhere = SimpleNamespace(
-        kept=band,
+        march_at_peak=band,
         curve_amplitude=1.0,
-        in_time=None,
+        error_march=None,
         keeps_unstable=False,
         is_marched_from=False,
-        marched_instead=False,
+        march_replaces_balance=False,
     )
     assert Curve.marched.fget(elsewhere) == pytest.approx(share)
-    assert Curve.marched.fget(SimpleNamespace(kept=None, curve_amplitude=1.0)) == 0.0
+    assert Curve.marched.fget(SimpleNamespace(march_at_peak=None, curve_amplitude=1.0)) == 0.0
     here = SimpleNamespace(**vars(elsewhere) | {"keeps_unstable": True, "is_marched_from": True})
     # an unstable resonance without a known march has no error that holds
     beside = np.inf if reason else max(abs(lowest - 1), abs(highest - 1))
     assert Curve.marched.fget(here) == pytest.approx(beside)
-    judged = SimpleNamespace(**vars(here) | {"in_time": band})
+    judged = SimpleNamespace(**vars(here) | {"error_march": band})
     assert Curve.marched.fget(judged) == 0.0
     if not reason:
-        instead = SimpleNamespace(**vars(here) | {"marched_instead": True})
+        instead = SimpleNamespace(**vars(here) | {"march_replaces_balance": True})
         assert Curve.marched.fget(instead) == pytest.approx(1 - lowest / highest)
 
 
@@ -176,14 +176,14 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
 
     done = SimpleNamespace(models=None, band=marched_from)
     found = judged_resonance.judged_resonance(done, curve, scene)
-    assert size(found.point) == pytest.approx(given) and found.kept is band
+    assert size(found.point) == pytest.approx(given) and found.march is band
     # motions are judged only above what the blade keeps to, where that is another amplitude
     assert asked == ([kept_to] if kept_to in (0.7, 0.95, 1.3) else [])
     # where that is not marched by steps at this size
     monkeypatch.setattr(judged_resonance, "kept_of_family", marched_from)
     none = SimpleNamespace(models=None, band=lambda *_: None)
     found = judged_resonance.judged_resonance(none, curve, scene)
-    assert size(found.point) == pytest.approx(given) and found.kept is band
+    assert size(found.point) == pytest.approx(given) and found.march is band
 
 
 @pytest.mark.parametrize(("held_to", "given"), [(0.88, 0.9), (0.8, 0.8), (0.6, 0.7)])
@@ -207,7 +207,7 @@ def test_a_motion_called_stable_that_the_blade_leaves_is_not_given(monkeypatch, 
     marches = SimpleNamespace(models=None, band=marched_from)
     found = judged_resonance._at_the_highest(marches, curve, scene, marks, 2)
     assert found.amplitude == pytest.approx(given)
-    assert found.contradicted == (given < 0.9)
+    assert found.march_replaces_balance == (given < 0.9)
 
 
 def marches_that_grow(point, instants_that_hold):
@@ -386,7 +386,7 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
         return judged_resonance._at_the_highest(marches, curve, scene, marks, 0)
 
     found = given(lift=3, harmonics=3)
-    assert found.contradicted and found.amplitude == 0.8
+    assert found.march_replaces_balance and found.amplitude == 0.8
     assert found.marks.verdict[0] == UNSTABLE
     # nothing lifts off, or a verdict has harmonics enough
     assert given(lift=0, harmonics=3).amplitude == given(lift=3, harmonics=15).amplitude == 1.0
@@ -395,22 +395,25 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     held = given(lift=3, harmonics=3)
     assert held.amplitude == 1.0 and held.marks.verdict[0] == STABLE
     shown = SimpleNamespace(
-        kept=held.kept,
+        march_at_peak=held.march,
         unstable_peak=None,
         keeps_unstable=False,
-        marched_instead=False,
+        march_replaces_balance=False,
         curve_amplitude=1.0,
-        in_time=None,
+        error_march=None,
     )
     shown.is_marched_from = Curve.is_marched_from.fget(shown)
     assert Curve.marched.fget(shown) == pytest.approx(0.04)
     # what could not be marched is said
     marches.band = lambda *_: module.KeptBand(1.0, np.nan, np.nan, 0, "no march")
     unknown = given(lift=3, harmonics=3)
-    shown = SimpleNamespace(load=580.0, kept=unknown.kept, unstable_peak=None)
+    shown = SimpleNamespace(load=580.0, march_at_peak=unknown.march, unstable_peak=None)
     assert "580 N (no march)" in doubtful_sentence([shown])
     assert "580 N (a flow)" in doubtful_sentence([shown], "a flow")
-    assert doubtful_sentence([SimpleNamespace(kept=held.kept, unstable_peak=None, load=1.0)]) == ""
+    assert (
+        doubtful_sentence([SimpleNamespace(march_at_peak=held.march, unstable_peak=None, load=1.0)])
+        == ""
+    )
 
 
 def test_a_march_with_fewer_points_far_from_the_balance_is_in_doubt():
@@ -420,8 +423,8 @@ def test_a_march_with_fewer_points_far_from_the_balance_is_in_doubt():
         band = module.KeptBand(446.7, 457e-6, 457e-6, 100, points=points)
         return Curve.marched.fget(
             SimpleNamespace(
-                kept=band,
-                marched_instead=True,
+                march_at_peak=band,
+                march_replaces_balance=True,
                 settings=SimpleNamespace(points=16),
                 balance_amplitude=536e-6,
             )
@@ -530,9 +533,9 @@ def test_a_motion_that_more_contact_points_leave_is_marched_with_them(monkeypatc
     marches = SimpleNamespace(models=None, band=lambda *_: module.KeptBand(1.0, 0.9, 1.15, 400))
     found = judged_resonance.judged_resonance(marches, curve, scene)
     assert size(found.point) == pytest.approx(1.2)
-    assert found.contradicted and found.amplitude == pytest.approx(1.38)
-    assert found.kept.lowest == pytest.approx(1.08) and found.kept.highest == pytest.approx(1.38)
-    assert found.kept.points == 8
+    assert found.march_replaces_balance and found.amplitude == pytest.approx(1.38)
+    assert found.march.lowest == pytest.approx(1.08) and found.march.highest == pytest.approx(1.38)
+    assert found.march.points == 8
     assert list(found.marks.verdict) == ["stable", UNSTABLE, "stable"]
     assert found.marks.multiplier[1] == 1.03 and found.marks.bifurcation[1] == "torus"
 

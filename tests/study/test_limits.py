@@ -12,8 +12,8 @@ from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline.design_table import design_table
 from bladefem.study.pipeline.linear_limits import judged_limits, linear_limits
-from bladefem.study.pipeline.loads import design_table
 
 
 def test_limits_are_reached_under_extreme_loads():

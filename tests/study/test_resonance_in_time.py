@@ -127,7 +127,9 @@ def one_point(**given):
 
 def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     sought = ResonanceInTime(101.0, 1.9e-3, 2e-3, 0.07, 8, 5, 900, friction_work=6e-3)
-    curve = one_point(settings=replace(SETTINGS, error=np.inf), sought=sought, halved=0.3)
+    curve = one_point(
+        settings=replace(SETTINGS, error=np.inf), resonance_by_march=sought, halved=0.3
+    )
     assert (curve.peak_frequency, curve.peak_amplitude) == (101.0, 2e-3)
     assert curve.balance_amplitude == 1e-3 and curve.error == pytest.approx(0.07)
     row = points_of(curve).iloc[-1]
@@ -136,7 +138,7 @@ def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     assert curve.input_work == pytest.approx(10e-3)
     # of the march neither is known
     assert np.isnan([row["slipping"], row["drift"]]).all()
-    assert points_of(replace(curve, sought=None))["method"].tolist() == [1.0]
+    assert points_of(replace(curve, resonance_by_march=None))["method"].tolist() == [1.0]
     assert "at 101 Hz the blade keeps between 1900 and 2000 um" in sought.sentence
 
 
@@ -156,11 +158,13 @@ def test_the_resonance_of_a_stiff_layer_is_the_one_of_the_curve():
     assert row["dissipated"] == pytest.approx(3.6e-3) and row["slipping"] == 3
     band = KeptBand(100.0, 0.8e-3, 1.1e-3, 200)
     # from the resonance itself, to both of its sides
-    higher = replace(reached, kept=band)
+    higher = replace(reached, march_at_peak=band)
     assert higher.marched == pytest.approx(0.2)
     # from another motion, above the resonance alone
     elsewhere = SimpleNamespace(**(vars(curve.peak) | {"omega": 190 * np.pi}))
     assert replace(higher, unstable_peak=elsewhere).marched == pytest.approx(0.1)
-    instead = replace(higher, marched_instead=True, kept=replace(band, friction_work=3e-3))
+    instead = replace(
+        higher, march_replaces_balance=True, march_at_peak=replace(band, friction_work=3e-3)
+    )
     assert instead.peak_amplitude == pytest.approx(0.99e-3)
     assert instead.friction_work == pytest.approx(2.7e-3)

@@ -32,7 +32,7 @@ def curve_of(points) -> SimpleNamespace:
     }
     peak = max(columns["amplitude"])
     arrays = {name: np.array(values) for name, values in columns.items()}
-    return SimpleNamespace(**arrays, load=80.0, balance_amplitude=peak, sought=None)
+    return SimpleNamespace(**arrays, load=80.0, balance_amplitude=peak, resonance_by_march=None)
 
 
 def test_columns_give_what_the_paths_gave():
@@ -82,8 +82,8 @@ def sweep_with(*motions, branch=2) -> SimpleNamespace:
         **columns,
         load=8.0,
         mass=None,
-        sought=None,
-        kept=None,
+        resonance_by_march=None,
+        march_at_peak=None,
         balance_amplitude=abs(first).max(),
         curve_amplitude=abs(first).max(),
     )
@@ -112,7 +112,9 @@ def test_a_marched_resonance_has_a_row_in_the_table():
         (SimpleNamespace(drive=16.0), "march in time after a strong drive"),
     ):
         curve = sweep_with()
-        vars(curve).update(kept=kept, curve_amplitude=30.0, peak_amplitude=30.0, peak_frequency=310)
+        vars(curve).update(
+            march_at_peak=kept, curve_amplitude=30.0, peak_amplitude=30.0, peak_frequency=310
+        )
         (table,) = resonance_table([curve]).values()
         assert list(table["reached"]) == [reached, "up and down"]
         assert list(table["amplitude"]) == [30.0, pytest.approx(curve.balance_amplitude)]

@@ -24,7 +24,7 @@ def curve(
     converged=True,
     layer_law=np.nan,
     body_mesh=np.nan,
-    in_time=None,
+    error_march=None,
 ):
     """Three points, the resonance in the middle."""
     return SimpleNamespace(
@@ -34,8 +34,8 @@ def curve(
         halved=halved,
         layer_law=layer_law,
         body_mesh=body_mesh,
-        in_time=in_time,
-        sought=None,
+        error_march=error_march,
+        resonance_by_march=None,
         peak=SimpleNamespace(frequency=100.0),
         peak_amplitude=656e-6,
         curve_amplitude=656e-6,
@@ -95,7 +95,7 @@ def test_an_error_by_the_mesh_of_the_bodies_says_so():
 
 def test_an_error_from_a_march_says_so():
     band = KeptBand(369.8, 640e-6, 662e-6, 200, points=16)
-    told, above = resonance_warnings([curve(36.0, 0.08, in_time=band)], 0.05)
+    told, above = resonance_warnings([curve(36.0, 0.08, error_march=band)], 0.05)
     assert "error of the resonance amplitude, 656 um; it is estimated from a march" in told
     assert "with 16 contact points a seat, which keeps between 640 and 662 um" in told
     assert above.endswith("above the wanted 5 %: 36 N 8 %")

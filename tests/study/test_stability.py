@@ -125,8 +125,8 @@ def rippling(kept):
     top = SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1)
     return SimpleNamespace(
         load=50.0, frequency=np.array([100.0]), amplitude=np.array([1e-3]), bifurcation=np.array(["torus"]), peak=top,
-        unstable_peak=top, kept=kept, peak_amplitude=1e-3, peak_frequency=100.0,
-        keeps_unstable=True, marched_instead=False,
+        unstable_peak=top, march_at_peak=kept, peak_amplitude=1e-3, peak_frequency=100.0,
+        keeps_unstable=True, march_replaces_balance=False,
     )  # fmt: skip
 
 
@@ -137,11 +137,11 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     assert "keeps between 990 and 1200 um" in unstable_sentence(rippling(far), 0.05)
     assert ripple_sentence([rippling(far)], 0.05) == ""
     # given in place of the balance where the mesh leaves little of the accuracy
-    instead = SimpleNamespace(**vars(rippling(near)) | {"marched_instead": True})
+    instead = SimpleNamespace(**vars(rippling(near)) | {"march_replaces_balance": True})
     assert ripple_sentence([instead], 0.05) == ""
     assert "the amplitude given is that of a march from there" in unstable_sentence(instead, 0.05)
     marched = SimpleNamespace(
-        **vars(rippling(far)) | {"marched_instead": True, "peak_amplitude": 1.2e-3}
+        **vars(rippling(far)) | {"march_replaces_balance": True, "peak_amplitude": 1.2e-3}
     )
     assert "; the amplitude given is that of a march from there; " in unstable_sentence(
         marched, 0.05
@@ -155,16 +155,16 @@ def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
     case = LoadCase(3.0, model.elements, np.eye(4))
     curve = curve_of(scene, case, lambda _: family_of(model), first_for(10))
     band = KeptBand(curve.peak_frequency, *(share * curve.peak_amplitude for share in (0.99, 1)), 9)
-    fresh = replace(curve, unstable_peak=curve.peak, kept=band)
+    fresh = replace(curve, unstable_peak=curve.peak, march_at_peak=band)
     cached_stage(tmp_path, "curve", "key", lambda: fresh)
     again, seconds = cached_stage(tmp_path, "curve", "key", lambda: None)
     assert seconds is not None and fresh.keeps_unstable and again.keeps_unstable
     assert ripple_sentence([again], 0.05) == ripple_sentence([fresh], 0.05) != ""
     assert unstable_sentence(again, 0.001) == unstable_sentence(fresh, 0.001) != ""
     above = replace(band, lowest=2e-3, highest=2.5e-3)
-    marched = replace(again, kept=above, marched_instead=True)
+    marched = replace(again, march_at_peak=above, march_replaces_balance=True)
     assert marched.peak_amplitude == 2.5e-3 and marched.balance_amplitude == again.peak_amplitude
-    assert marched.error == pytest.approx(replace(again, kept=None).error + 0.2)
+    assert marched.error == pytest.approx(replace(again, march_at_peak=None).error + 0.2)
     assert not replace(again, unstable_peak=None).keeps_unstable
     assert not replace(again, unstable_peak=replace(again.peak, omega=1.0)).keeps_unstable
 

@@ -118,7 +118,10 @@ def test_marches_that_take_too_long_are_told(folding, monkeypatch):
     low = curve.points[0]
     monkeypatch.setattr(module, "MOST_OPERATIONS", 0.0)
     assert strong_drives(Marches(family_of(folding)), curve, size(low)).too_long
-    curves = [SimpleNamespace(load=4.0, undriven=True), SimpleNamespace(load=9.0, undriven=False)]
+    curves = [
+        SimpleNamespace(load=4.0, strong_drive_skipped=True),
+        SimpleNamespace(load=9.0, strong_drive_skipped=False),
+    ]
     assert undriven_sentence(curves).startswith("under 4 N contacts lift off")
     assert undriven_sentence(curves[1:]) == ""
 

@@ -103,19 +103,20 @@ def _judged_sentence(scene: Scene, models: Family, curve: Checked) -> str:
     top = peak_of(curve.points)
     judged = judged_resonance(Marches(models), curve, scene)
     balance = f"{1e6 * size(top):.4g} um at {top.frequency:.5g} Hz"
-    if judged.contradicted and judged.kept is not None:
+    if judged.march_replaces_balance and judged.march is not None:
         return warning(
             f"the errors above compare balances, {balance}, to which the blade does not keep at "
-            f"this load; at {judged.point.frequency:.5g} Hz {judged.kept.sentence}"
+            f"this load; at {judged.point.frequency:.5g} Hz {judged.march.sentence}"
         )
-    undriven = ""
-    if judged.undriven:
-        undriven = "; motions that only a strong drive leads to were not sought"
-    if judged.kept is not None:
-        return f"the resonance of the automatic choice, {balance}: {judged.kept.sentence}{undriven}"
+    skipped = ""
+    if judged.strong_drive_skipped:
+        skipped = "; motions that only a strong drive leads to were not sought"
+    if judged.march is not None:
+        said = f"{judged.march.sentence}{skipped}"
+        return f"the resonance of the automatic choice, {balance}: {said}"
     verdict = judged.marks.verdict[[p is top for p in curve.points]][0]
     words = "was not judged" if verdict == UNKNOWN else f"is {verdict}"
-    return f"the resonance of the automatic choice, {balance}, {words}{undriven}"
+    return f"the resonance of the automatic choice, {balance}, {words}{skipped}"
 
 
 def _fewer_diameters(reduced: Reduced, order: int) -> Iterator[tuple[str, Reduced]]:

@@ -20,7 +20,7 @@ from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification, scatter_statistics, unknown_statistics
 from ...wheel.walking import with_free_means
 from ..adaptive.choice import solver_options
-from ..pipeline.loads import Curve
+from ..pipeline.curve import Curve
 from .engine_orders import own_harmonic
 from .law_level import law_level, with_checks
 from .other_blades import OtherBlades

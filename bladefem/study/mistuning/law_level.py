@@ -21,7 +21,7 @@ from ...wheel.scatter import Scatter, drawn_deviations
 from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification
 from ...wheel.tuned import travelling_order
-from ..pipeline.loads import Curve
+from ..pipeline.curve import Curve
 
 # smallest and largest motion of a pair of blades in the table, over the tuned resonance: both
 # amplified by 2.8; far beyond, light dampers lift off and have no one motion

@@ -15,7 +15,7 @@ from ...wheel.solve import WheelSolution, free_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
 from ...wheel.walking import with_free_means
-from ..pipeline.loads import Curve
+from ..pipeline.curve import Curve
 from .deciding_blades import BladeStress, DecidingBlade, SearchedWheel, deciding_blades
 from .other_blades import OtherBlades
 from .peak_choice import (

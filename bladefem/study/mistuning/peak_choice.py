@@ -14,7 +14,7 @@ from ...wheel.pattern_peak import PatternPeak
 from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, solve_wheel
 from ...wheel.statistics import wheel_respond
-from ..pipeline.loads import Curve
+from ..pipeline.curve import Curve
 
 # harmonics of the engine order beyond which the indicator asks for no more
 MOST_HARMONICS = 15

@@ -14,7 +14,7 @@ import numpy as np
 from ...wheel.model import Wheel
 from ...wheel.statistics import Amplification
 from ...wheel.tuned import travelling_order
-from ..pipeline.loads import Curve
+from ..pipeline.curve import Curve
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,8 @@ from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases
+from ..pipeline.curve import Curve
 from ..pipeline.damped_motion import DampedStress, stress_of_motion
-from ..pipeline.loads import Curve
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.stage_inputs import stage_key
 from .blade_material import deviation_pattern

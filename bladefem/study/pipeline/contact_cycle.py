@@ -29,7 +29,7 @@ from ...friction.law_table import select_elements
 from ...util.arrays import IntegerArray, RealArray
 from ..adaptive.family import joined_elements
 from .assemble_model import LoadCase
-from .loads import Curve
+from .curve import Curve
 
 # harmonics that draw the corners of a loop; the balance has fewer
 DRAWN_HARMONICS = 63

@@ -35,27 +35,27 @@ class JudgedResonance:
     # of all points of the curve
     marks: Stability
     # what the blade does at the highest point where that is unstable, or its verdict in doubt
-    kept: KeptBand | None = None
+    march: KeptBand | None = None
     # the amplitude given is the highest that the blade keeps to after the point
-    contradicted: bool = False
+    march_replaces_balance: bool = False
     # relative rise above it by marches from unstable motions beside it
-    beside: float = 0.0
+    flank_rise: float = 0.0
     # why not all marches from unstable motions beside it are known; else ""
-    unmarched: str = ""
+    flank_march_failure: str = ""
     # contacts lift off, and marches after a strong drive take too long
-    undriven: bool = False
+    strong_drive_skipped: bool = False
 
     @property
     def amplitude(self) -> float:
         """The one given [m]."""
-        if self.contradicted and self.kept is not None:
-            return self.kept.highest
+        if self.march_replaces_balance and self.march is not None:
+            return self.march.highest
         return size(self.point)
 
     def unstable_peak(self, curve: Checked) -> Solution | None:
         """The highest point of the curve where it is unstable."""
         place = int(heights_of(curve.points).argmax())
-        unstable = self.marks.verdict[place] == UNSTABLE and self.kept is not None
+        unstable = self.marks.verdict[place] == UNSTABLE and self.march is not None
         return curve.points[place] if unstable else None
 
 
@@ -89,9 +89,13 @@ def judged_resonance(
     judged = _with_flanks(marches, curve, judged, highest, scene.accuracy)
     driven = strong_drives(marches, curve, judged.amplitude)
     if driven.point is None:
-        return replace(judged, undriven=driven.too_long)
+        return replace(judged, strong_drive_skipped=driven.too_long)
     return JudgedResonance(
-        driven.point, marks, driven.kept, contradicted=True, unmarched=judged.unmarched
+        driven.point,
+        marks,
+        driven.kept,
+        march_replaces_balance=True,
+        flank_march_failure=judged.flank_march_failure,
     )
 
 
@@ -106,16 +110,20 @@ def _with_flanks(
     is a march's as well, or lower by more than the accuracy.
     """
     given = judged.amplitude
-    known = None if judged.kept is None else highest
+    known = None if judged.march is None else highest
     found = flank_motions(marches, curve, judged.marks, given, known)
     if found.point is None or found.highest <= given:
-        return replace(judged, unmarched=found.reason)
+        return replace(judged, flank_march_failure=found.reason)
     rise = found.highest / given - 1
-    if judged.contradicted or rise > accuracy:
+    if judged.march_replaces_balance or rise > accuracy:
         return JudgedResonance(
-            found.point, judged.marks, found.kept, contradicted=True, unmarched=found.reason
+            found.point,
+            judged.marks,
+            found.kept,
+            march_replaces_balance=True,
+            flank_march_failure=found.reason,
         )
-    return replace(judged, beside=rise, unmarched=found.reason)
+    return replace(judged, flank_rise=rise, flank_march_failure=found.reason)
 
 
 def _at_the_highest(
@@ -146,8 +154,8 @@ def _at_the_highest(
     if held.reason or held.holds(size(lasting), scene.accuracy):
         return JudgedResonance(lasting, marks, kept)
     if held.highest > kept.highest:
-        return JudgedResonance(lasting, marks, held, contradicted=True)
-    return JudgedResonance(highest, marks, kept, contradicted=True)
+        return JudgedResonance(lasting, marks, held, march_replaces_balance=True)
+    return JudgedResonance(highest, marks, kept, march_replaces_balance=True)
 
 
 def _left_for(

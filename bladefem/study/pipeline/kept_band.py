@@ -117,10 +117,13 @@ class KeptBand:
     # of a blade's dampers in a period, mean of the periods whose amplitudes count [J]
     friction_work: float = np.nan
 
+    def farthest(self, amplitude: float) -> float:
+        """Relative distance of the farther end from an amplitude; NaN where it is not known."""
+        return max(abs(end / amplitude - 1) for end in (self.lowest, self.highest))
+
     def holds(self, amplitude: float, accuracy: float) -> bool:
         """It is known, and within a relative accuracy of an amplitude."""
-        ends = np.array([self.lowest, self.highest])
-        return not self.reason and bool(np.all(abs(ends / amplitude - 1) <= accuracy))
+        return not self.reason and self.farthest(amplitude) <= accuracy
 
     @property
     def sentence(self) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...hbm.slow_sweep import DOWN, ISOLATED, UP, Visit, reached_by, visited_pieces
 from ...scene.units import newtons
-from .loads import Curve
+from .curve import Curve
 
 # distance of the first harmonics of two ends over the largest one, up to which pieces are joined
 MAX_JOINED_DISTANCE = 0.2
@@ -129,7 +129,7 @@ def reach_sentence(curve: Curve) -> str:
     """How the resonance that is given is reached, where not every slow sweep comes to it; "" for
     one that marches have found.
     """
-    if curve.sought is not None:
+    if curve.resonance_by_march is not None:
         return ""
     listed = local_resonances(curve)
     given = [r for r in listed if abs(r.amplitude / curve.balance_amplitude - 1) < SAME_HEIGHT]

@@ -12,9 +12,9 @@ from ...util.message import method, warning
 from ...util.percent import percent
 from ..adaptive.settings import Settings
 from .best_load import BestLoad, studied_load
+from .curve import Curve
 from .damped_motion import DampedStress
 from .load_interval import interval_sentence
-from .loads import Curve
 from .resonance_list import reach_sentence
 from .stability_remarks import (
     Disturbances,
@@ -75,7 +75,9 @@ def response_remarks(
     unstable = (unstable_sentence(c, scene.accuracy) for c in curves)
     remarks.extend(warning(text) for text in unstable if text)
     remarks.extend(
-        warning(f"load {load_of(c)}: {c.sought.sentence}") for c in curves if c.sought is not None
+        warning(f"load {load_of(c)}: {c.resonance_by_march.sentence}")
+        for c in curves
+        if c.resonance_by_march is not None
     )
     doubtful = doubtful_sentence(curves, judged.reason)
     unknown = unjudged_sentence(curves), unmarched_sentence(curves), doubtful
@@ -91,7 +93,7 @@ def response_remarks(
                 "converge; they are marked in tables and pictures"
             )
         )
-    single = [load_of(c) for c in curves if c.unfollowed]
+    single = [load_of(c) for c in curves if c.folds_not_followed]
     if single:
         remarks.append(
             warning(
@@ -210,14 +212,16 @@ def beyond_tolerance(curves: list[Curve]) -> str:
 
 def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
     """Why the highest points of curves may be wrong: one sentence a reason, with all its loads."""
-    next_to_unsolved = [load_of(c) for c in curves if c.sought is None and _beside_unsolved(c)]
+    next_to_unsolved = [
+        load_of(c) for c in curves if c.resonance_by_march is None and _beside_unsolved(c)
+    ]
     if next_to_unsolved:
         yield (
             f"under {', '.join(next_to_unsolved)} the highest point that was solved lies next to "
             "one that was not; the resonance may be higher"
         )
     for c in curves:
-        if c.in_time is not None:
+        if c.error_march is not None:
             yield in_time_sentence(c)
     unknown = [load_of(c) for c in curves if c.error == np.inf]
     if unknown:
@@ -239,7 +243,7 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
 
 def in_time_sentence(c: Curve) -> str:
     """What the estimated error of a resonance was taken from, where that is a march."""
-    band = c.in_time
+    band = c.error_march
     assert band is not None
     more = "" if band.points is None else f" with {band.points} contact points a seat"
     return (

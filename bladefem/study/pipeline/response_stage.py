@@ -26,10 +26,11 @@ from .bodies import Bodies, is_wheel
 from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
 from .changed_cases import cases_of, changed_cases
+from .curve import Curve
 from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
 from .linear_limits import judged_limits
-from .loads import Curve, Search, best_curve, study_loads
+from .loads import Search, best_curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
 from .response_remarks import (

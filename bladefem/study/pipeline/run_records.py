@@ -24,10 +24,11 @@ from ..influences import Influence
 from ..modes.stress import Strength
 from .best_load import BestLoad, studied_load
 from .body_mesh import ModeErrors
+from .curve import Curve
 from .damped_motion import DampedStress
 from .history import DamperMass
 from .linear_limits import Limit
-from .loads import Curve, best_curve
+from .loads import best_curve
 from .other_diameters import ClassVerdict
 from .reduced_sector import Reduced
 

@@ -18,7 +18,7 @@ from ..adaptive.settings import Settings
 from .stability import model_in_time
 
 if TYPE_CHECKING:
-    from .loads import Curve
+    from .curve import Curve
 
 
 @dataclass(frozen=True)
@@ -127,9 +127,9 @@ def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
     small ripples grow, and the blade hardly takes note of them.
     """
     moved = [
-        max(abs(end / size(c.unstable_peak) - 1) for end in (c.kept.lowest, c.kept.highest))
+        c.march_at_peak.farthest(size(c.unstable_peak))
         for c in curves
-        if c.unstable_peak is not None and c.kept is not None and _rippled(c, accuracy)
+        if c.unstable_peak is not None and c.march_at_peak is not None and _rippled(c, accuracy)
     ]
     if not moved:
         return ""
@@ -142,9 +142,9 @@ def ripple_sentence(curves: Sequence[Curve], accuracy: float) -> str:
 
 def _rippled(curve: Curve, accuracy: float) -> bool:
     # with little room beside the mesh's error a march is given that keeps within the accuracy
-    if curve.marched_instead or not curve.keeps_unstable or curve.kept is None:
+    if curve.march_replaces_balance or not curve.keeps_unstable or curve.march_at_peak is None:
         return False
-    return curve.kept.holds(size(curve.peak), accuracy)
+    return curve.march_at_peak.holds(size(curve.peak), accuracy)
 
 
 def folded_sentence(curves: Sequence[Curve]) -> str:
@@ -156,7 +156,7 @@ def folded_sentence(curves: Sequence[Curve]) -> str:
 
 def unstable_sentence(curve: Curve, accuracy: float) -> str:
     """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
-    top = curve.unstable_peak
+    top, march = curve.unstable_peak, curve.march_at_peak
     if top is None:
         return _from_a_flank(curve)
     if _rippled(curve, accuracy):
@@ -167,11 +167,11 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
         f"load {newtons(curve.load)}: the highest motion, {1e6 * size(top):.4g} um at "
         f"{top.frequency:.5g} Hz, is unstable{named}"
     )
-    if curve.marched_instead and not curve.keeps_unstable:
+    if curve.march_replaces_balance and not curve.keeps_unstable:
         return f"{lost}; {_marched_from_flank(curve)}"
-    if curve.marched_instead:
+    if curve.march_replaces_balance:
         lost += "; the amplitude given is that of a march from there"
-    elif curve.keeps_unstable and curve.kept is not None and not curve.kept.reason:
+    elif curve.keeps_unstable and march is not None and not march.reason:
         lost += "; it is given as the resonance"
     elif curve.keeps_unstable:
         lost += "; it is given as the resonance, being the larger amplitude"
@@ -180,18 +180,18 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
             "; the resonance given is the highest one that is not, "
             f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
         )
-    return lost if curve.kept is None else f"{lost}; {curve.kept.sentence}"
+    return lost if march is None else f"{lost}; {march.sentence}"
 
 
 def _from_a_flank(curve: Curve) -> str:
     """That a march beside the highest motion, which is not known to be unstable, gives the
     resonance, or "".
     """
-    if not curve.marched_instead:
+    if not curve.march_replaces_balance:
         return ""
     top = int(np.where(curve.converged, curve.amplitude, 0.0).argmax())
     judged = "was not judged" if curve.stability[top] == UNKNOWN else "lasts"
-    driven = curve.kept is not None and curve.kept.drive > 1
+    driven = curve.march_at_peak is not None and curve.march_at_peak.drive > 1
     why = "a strong drive leads to a higher one" if driven else "motions beside it do not last"
     return (
         f"load {newtons(curve.load)}: the highest motion, {1e6 * curve.amplitude[top]:.4g} um at "
@@ -201,7 +201,7 @@ def _from_a_flank(curve: Curve) -> str:
 
 def _marched_from_flank(curve: Curve) -> str:
     """What the resonance was marched from, and what was found."""
-    found = "" if curve.kept is None else f"; {curve.kept.sentence}"
+    found = "" if curve.march_at_peak is None else f"; {curve.march_at_peak.sentence}"
     ends = {curve.frequency.min(): "first", curve.frequency.max(): "last"}
     end = ends.get(curve.peak_frequency)
     beyond = f"; it is the {end} point of the band, beyond which it may be higher" if end else ""
@@ -213,7 +213,9 @@ def _marched_from_flank(curve: Curve) -> str:
 
 def unmarched_sentence(curves: Sequence[Curve]) -> str:
     """The resonances beside which marches from unstable motions are not known, or ""."""
-    each = ", ".join(f"{newtons(c.load)} ({c.unmarched})" for c in curves if c.unmarched)
+    each = ", ".join(
+        f"{newtons(c.load)} ({c.flank_march_failure})" for c in curves if c.flank_march_failure
+    )
     if not each:
         return ""
     return (
@@ -224,7 +226,7 @@ def unmarched_sentence(curves: Sequence[Curve]) -> str:
 
 def undriven_sentence(curves: Sequence[Curve]) -> str:
     """The resonances beside which no motion was sought that only a strong drive leads to, or ""."""
-    loads = ", ".join(newtons(c.load) for c in curves if c.undriven)
+    loads = ", ".join(newtons(c.load) for c in curves if c.strong_drive_skipped)
     if not loads:
         return ""
     return (
@@ -256,9 +258,9 @@ def doubtful_sentence(curves: Sequence[Curve], unjudged: str = "") -> str:
         unjudged: why no motion of any curve could be judged or marched; "" where some could.
     """
     each = ", ".join(
-        f"{newtons(c.load)} ({unjudged or c.kept.reason})"
+        f"{newtons(c.load)} ({unjudged or c.march_at_peak.reason})"
         for c in curves
-        if c.unstable_peak is None and c.kept is not None and c.kept.reason
+        if c.unstable_peak is None and c.march_at_peak is not None and c.march_at_peak.reason
     )
     if not each:
         return ""

@@ -1,0 +1,81 @@
+"""The design table: resonance of each load from no damper to full stick, one row a load."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...hbm.history_interval import POINT
+from .curve import Curve
+from .linear_limits import Limit
+
+
+def design_table(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.ndarray]:
+    """The design table: one row a load, from no damper (load 0) to full stick (load inf)."""
+    free, stuck = (_linear_row(limit) for limit in limits)
+    rows = [free, *map(_row, curves), stuck]
+    if any(c.interval is not None for c in curves):
+        ends = [limits[0].peak_amplitude, limits[1].peak_amplitude]
+        added = [_certain(ends[0]), *(_interval_row(c) for c in curves), _certain(ends[1])]
+        rows = [row | more for row, more in zip(rows, added, strict=True)]
+        free = rows[0]
+    table = {name: np.array([row[name] for row in rows]) for name in free}
+    if any(c.mass is not None for c in curves):
+        table["mass"] = np.array([np.nan, *(c.mass for c in curves), np.nan])
+    table["reduction"] = free["peak_amplitude"] / table["peak_amplitude"]
+    return table
+
+
+def _row(c: Curve) -> dict[str, Any]:
+    return {
+        "load": c.load,
+        "peak_frequency": c.peak_frequency,
+        "peak_amplitude": c.peak_amplitude,
+        "reduction": 1.0,
+        "dissipated": c.friction_work,
+        "slipping": c.slipping_at_peak,
+        "drift": c.drift_at_peak,
+        "error": np.nan if c.error is None else c.error,
+        "halved": c.halved,
+        "body_mesh": c.body_mesh,
+        "layer_law": c.layer_law,
+        "harmonics": c.settings.harmonics,
+        "points": len(c.frequency),
+        "unconverged": int((~c.converged).sum()),
+    }
+
+
+def _certain(amplitude: float) -> dict[str, float | str]:
+    """Columns of the interval where the response is linear."""
+    return {"lowest": amplitude, "highest": amplitude, "interval": POINT}
+
+
+def _interval_row(c: Curve) -> dict[str, float | str]:
+    if c.interval is None:
+        return {"lowest": np.nan, "highest": np.nan, "interval": ""}
+    return {
+        # the curve's highest point may lie below its maximum by the tolerance
+        "lowest": min(c.interval.lowest, c.peak_amplitude),
+        "highest": max(c.interval.highest, c.peak_amplitude),
+        "interval": c.interval.certificate,
+    }
+
+
+def _linear_row(limit: Limit) -> dict[str, Any]:
+    return {
+        "load": limit.load,
+        "peak_frequency": limit.peak_frequency,
+        "peak_amplitude": limit.peak_amplitude,
+        "reduction": 1.0,
+        "dissipated": 0.0,
+        "slipping": 0,
+        "drift": 0.0,
+        "error": limit.error,
+        "halved": limit.halved,
+        "body_mesh": limit.body_mesh,
+        "layer_law": 0.0,
+        "harmonics": 1,
+        "points": len(limit.frequency),
+        "unconverged": 0,
+    }
