@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
     from ..data import ModeSet, PortModel, PressureMap
     from ..study.modes.survey import Survey
-    from ..study.pipeline.curve import Curve
     from ..study.pipeline.reduced_sector import Reduced
     from ..study.pipeline.run_records import Response, Run, SolvedRun
 
@@ -169,31 +168,33 @@ def response_tables(response: Response) -> str:
     """
     import pandas as pd
 
+    from ..study.pipeline.curve import load_of
     from ..study.pipeline.design_table import design_table
 
     curves = response.curves
     rows = pd.DataFrame(design_table(curves, response.limits))
     rows = rows[[name for name in SUMMARY_COLUMNS if name in rows]]
-    rows.insert(0, "seat load", ["no damper", *map(_case_label, curves), "full stick"])
+    rows.insert(0, "seat load", ["no damper", *map(load_of, curves), "full stick"])
     return f"{report_table(rows)}\n{_best_load_line(response)}"
 
 
 def _best_load_line(response: Response) -> str:
     from ..report.best_load import lowest_of_response
+    from ..study.pipeline.curve import load_of
 
     curves = response.curves
     lowest = min(curves, key=lambda c: c.peak_amplitude)
     against = lowest_of_response(response).against
     if against:
         return (
-            f"best load: not determined: {against[0]}; {_case_label(lowest)} has the lowest of "
+            f"best load: not determined: {against[0]}; {load_of(lowest)} has the lowest of "
             "these amplitudes"
         )
     best = lowest if response.best_found is None else curves[response.best_curve]
     words = "best of these loads" if response.best_found is None else "best load, by search"
     gain = response.free_peak[1] / best.peak_amplitude
-    beside = "" if best is lowest else f"; {_case_label(lowest)} has the lowest of these amplitudes"
-    return f"{words}: {_case_label(best)}, amplitude divided by {gain:.3g}{beside}"
+    beside = "" if best is lowest else f"; {load_of(lowest)} has the lowest of these amplitudes"
+    return f"{words}: {load_of(best)}, amplitude divided by {gain:.3g}{beside}"
 
 
 SUMMARY_COLUMNS = (
@@ -208,11 +209,6 @@ SUMMARY_COLUMNS = (
     "points",
     "unconverged",
 )
-
-
-def _case_label(curve: Curve) -> str:
-    """Load, and mass where several are studied."""
-    return show(curve.load, "N") + ("" if curve.mass is None else f" on {show(curve.mass, 'kg')}")
 
 
 def side_by_side(name: str, best: pd.DataFrame) -> str:

@@ -1,3 +1,3 @@
-"""Dampers in time: the paper's two cases, its loop, exact integration of the coupled system, where
-methods fail.
+"""Dampers in time: the two cases of the paper (doi:10.1007/s11071-016-3239-6), its loop, and exact
+integration of the coupled system.
 """

@@ -98,7 +98,7 @@ def follow_path(
                     f"{limits.folds} folds: there may be further motions"
                 )
                 break
-            if len(points) >= budget or _closed(points, band):
+            if len(points) >= budget or _closed(points):
                 break
     except NotSolvedError as error:
         notes.append(str(error))
@@ -119,7 +119,7 @@ def follow_both_ways(
     limits: PathLimits = USUAL_LIMITS,
 ) -> BandPath:
     """The path continued beyond its start in the other direction, unless it closed on itself."""
-    if _closed(path.points, band):
+    if _closed(path.points):
         return path
     left = budget - len(path.points)
     back = follow_path(model, start, band, False, left, notes, options, limits)
@@ -142,7 +142,7 @@ def _end_of_band(omega: float, band: tuple[float, float]) -> str:
     return "high" if omega >= band[1] - margin else ""
 
 
-def _closed(points: Sequence[PathPoint], band: tuple[float, float]) -> bool:
+def _closed(points: Sequence[PathPoint]) -> bool:
     """The path has come round to its start in the same direction."""
     if len(points) < 10 or points[0].forward != points[-1].forward:
         return False

@@ -46,7 +46,7 @@ def first_amplitudes(motion: RealArray) -> ComplexArray:
 
 
 def scatter(amplitudes: ComplexArray) -> float:
-    """Of the mean of a part, by what its periods leave of a straight line [m]."""
+    """Standard error [m] of the mean amplitude of a part, by its residuals from a straight line."""
     count = len(amplitudes)
     place = np.arange(count) - (count - 1) / 2
     rest = amplitudes - amplitudes.mean()

@@ -213,7 +213,7 @@ def _gain(
     place: _Place,
     sign: float,
 ) -> float:
-    """Of the height, relative."""
+    """Relative gain of the height."""
     return sign * (better.peak.height / place.peak.height - 1)
 
 

@@ -126,7 +126,7 @@ def _led(way: _Way, x: np.ndarray, arcs: int) -> np.ndarray | None:
 
 
 def _direction(way: _Way, trail: list[_Point], size: float) -> tuple[np.ndarray, float]:
-    """Of the secant through the last two points, length 1; forward for one point."""
+    """Direction of the secant through the last two points, length 1; forward for one point."""
     if len(trail) == 1:
         return np.zeros_like(trail[0].x), 1.0
     change = np.where(way.moving, trail[-1].x - trail[-2].x, 0.0) / size

@@ -91,8 +91,6 @@ class PathSpot:
     residual: float
     # the amplitude turns here
     fold: bool = False
-    # reached along arcs
-    walked: bool = False
 
     @property
     def amplitude(self) -> float:
@@ -239,8 +237,8 @@ def _towards(
         turns = [f"{spot.amplitude:.4g}" for spot in spots if spot.fold]
         if turns:
             more = f" and {len(turns) - TURNS_TOLD} times more" if len(turns) > TURNS_TOLD else ""
-            told = " and ".join(turns[:TURNS_TOLD])
-            reason = f"the amplitude turns back at {told}{more}, then {reason}"
+            named = " and ".join(turns[:TURNS_TOLD])
+            reason = f"the amplitude turns back at {named}{more}, then {reason}"
         # what does not come back is left out
         known = plain = near
     starts = [
@@ -318,7 +316,6 @@ def _walk(
         if passed:
             trail.append(spot)
             end = _solve(frame, _Plane(_between(trail, s), s), MAX_ARC_STEPS)
-            end = replace(end, walked=True)
             return ([*spots, end], "") if end.converged else (spots, end.reason)
         if len(trail) > 1 and (spot.s - trail[-1].s) * (trail[-1].s - trail[-2].s) < 0:
             trail[-1] = replace(trail[-1], fold=True)
@@ -357,7 +354,9 @@ def _direction(
     trail: list[PathSpot],
     way: float,
 ) -> tuple[np.ndarray, float]:
-    """Of the secant through the last two motions, length 1; of growing amplitude for one motion."""
+    """Direction of the secant through the last two motions, length 1; of growing amplitude for one
+    motion.
+    """
     if len(trail) == 1:
         return np.zeros_like(trail[-1].q), float(way)
     change = np.where(frame.moving, trail[-1].q - trail[-2].q, 0.0)
@@ -431,7 +430,7 @@ def _tangent(
     spot: PathSpot,
     direction: tuple[np.ndarray, float],
 ) -> tuple[np.ndarray, float]:
-    """Of the branch on the piece of the forces on which a motion lies, length 1.
+    """Tangent of the branch, length 1, on the piece of the forces on which a motion lies.
 
     Raises:
         LinAlgError: the direction is at a right angle to it.

@@ -29,7 +29,7 @@ FIRST_LOOK_INTERVALS = 12
 
 
 def local_maxima(points: list[Solution], probe: int = 0) -> list[Solution]:
-    """Those of the points, sorted by frequency, that are above both neighbours."""
+    """Those points, sorted by frequency, that are above both neighbours."""
     heights = np.array([size(point, probe) for point in points])
     return [points[i] for i in find_maxima(heights)]
 

@@ -137,7 +137,7 @@ def modal_damping(model: ReducedModel, points: Sequence[NonlinearMode]) -> np.nd
 
 
 def _moving_parts(model: ReducedModel, points: Sequence[NonlinearMode]) -> list[np.ndarray]:
-    """Of each point (k,), the squared size of each mode over that of the blade mode."""
+    """Squared size of each mode over that of the blade mode, point by point (k,)."""
     blades = model.blades(1)
     return [abs(mode_with_others(blades, p.mode, p.omega, p.zeta)) ** 2 for p in points]
 

@@ -42,7 +42,7 @@ ITERATIONS = 3
 
 @dataclass(frozen=True)
 class Growth:
-    """Of the disturbance of a class that grows most."""
+    """Growth of the disturbance of a class that grows most."""
 
     # modulus of its Floquet multiplier; NaN where it would take too many operations
     multiplier: float = float("nan")

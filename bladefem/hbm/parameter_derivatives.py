@@ -129,7 +129,7 @@ def _rate_by_differences(
     state: State,
     name: str,
 ) -> np.ndarray:
-    """The same for laws that need not be homogeneous: central differences of the forces."""
+    """Derivative for laws that need not be homogeneous, by central differences of the forces."""
     model = balance.model
     walk = walk_ramp(balance, state.w)
     if name == "gap" and model.directions == model.elements.tangents:

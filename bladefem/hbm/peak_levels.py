@@ -58,7 +58,7 @@ class PeakSearch:
 
     @property
     def name(self) -> str:
-        """Of the parameter."""
+        """Name of the parameter."""
         return self.along.name
 
     def peak(

@@ -42,8 +42,10 @@ COMPILED_NEWTON_UNKNOWNS = 20000
 DENSE_UNKNOWNS = 300
 # Unknowns up to which the dense LU is the last resort where iterations fail: 200 MB, some seconds.
 DENSE_FALLBACK_UNKNOWNS = 5000
-# Unknowns above which compiled Newton iterates, and above which its LU works on blocks.
+# Unknowns above which the LU of compiled Newton works on blocks of columns.
 BLOCKED_LU_UNKNOWNS = 64
+# Unknowns above which compiled Newton iterates in place of factoring each Jacobian.
+COMPILED_ITERATION_UNKNOWNS = 64
 # Unknowns from which the second level of the iterations pays: 5 steps in place of 46 at 2500.
 DEFLATION_UNKNOWNS = 300
 # Unknowns up to which the sign of the Jacobian's determinant is worth its time.

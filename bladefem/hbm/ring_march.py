@@ -90,7 +90,8 @@ class RingMarch:
 def march_operations(
     model: ReducedModel, periods: int, instants: int = INSTANTS_PER_PERIOD
 ) -> float:
-    """Of a march of soft layers, roughly: one of stiff layers takes up to 20 times as many.
+    """Operations of a march of soft layers, roughly; one of stiff layers takes up to 20 times as
+    many.
 
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
@@ -228,7 +229,7 @@ def state_of_solution(
 
 
 def driven_anew(model: ReducedModel, state: RingState, drive: Drive) -> RingState:
-    """The same motion of the modes under another drive from now on; on a model of other contact
+    """The state with its modal motion under another drive from now on; on a model of other contact
     points with forces that are found in its first steps.
     """
     before, after = (_free_modal_state(model, one) for one in (state.drive, drive))

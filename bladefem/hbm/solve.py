@@ -189,7 +189,8 @@ def _stuck_throughout(
     H: int,
     start: Solution | None,
 ) -> Solution | None:
-    """The same for one point of any model; looked for only where the start sticks."""
+    """The linear solution at one frequency if all contacts stick, else None; looked for only where
+    the start sticks."""
     low = max((1, *model.excitation, *model.normal))
     if low >= H or not (start is None or start.states["stick"] == len(model.elements.kt)):
         return None

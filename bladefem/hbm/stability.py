@@ -56,7 +56,7 @@ REAL_MULTIPLIER_ANGLE = 1e-3
 
 @dataclass(frozen=True)
 class Verdict:
-    """Of one solution."""
+    """Verdict on one solution."""
 
     # UNIQUE, STABLE, UNSTABLE or UNKNOWN
     verdict: str
@@ -200,7 +200,7 @@ def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:
 
 
 def map_operations(contacts: OpenContacts, blades: int, S: int) -> float:
-    """Of carrying all disturbances through 1/r of S steps, and of the multipliers."""
+    """Operations of carrying all disturbances through 1/r of S steps, and of the multipliers."""
     rows, M = contacts.reading.shape
     coupled = sum((2.0 * len(group)) ** 2 for group in contacts.groups)
     return _products(M, rows, contacts.push.shape[1], coupled, S / blades)
@@ -212,7 +212,7 @@ def _operations_from_states(
     system: SectorModes,
     S: int,
 ) -> float:
-    """The same from how many nodes stick, slip and lift off."""
+    """Operations of a verdict from how many nodes stick, slip and lift off."""
     states = solution.states
     d = model.directions
     lifting = states["lift"] + states["open"]

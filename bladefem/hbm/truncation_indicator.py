@@ -112,7 +112,7 @@ def _harmonics_by_law(
     w: np.ndarray,
     most: int,
 ) -> np.ndarray:
-    """The same for any law, from its periodic state."""
+    """Harmonics of the forces by any law, from its periodic state."""
     p, n, d, K = w.shape
     wide = np.zeros((p, n, d, 2 * most + 1))
     wide[..., :K] = w

@@ -234,7 +234,7 @@ def _version(distribution: str) -> str:
 
 
 def found_remark(name: str, seconds: float) -> str:
-    """That a stage was found, for the messages of a run."""
+    """A remark that a stage was found, for the messages of a run."""
     return Message(f"{name}: found in the folder, where it was made in {seconds:.1f} s", "timing")
 
 

@@ -95,7 +95,7 @@ def wheel_models(
                 f"harmonic {h} of engine order {engine_order} needs the modes of nodal diameter {n}"
             )
         if diameter not in models:
-            body = _mirror(sector[n]) if mirrored else sector[n]
+            body = conjugate_wave(sector[n]) if mirrored else sector[n]
             models[diameter] = pair_model(body, following, 2 * pi * diameter / sectors)
     return tuple(models[diameter] for diameter in diameters)
 
@@ -182,7 +182,7 @@ def _circulatory_matrix(body: PortModel) -> np.ndarray:
     return np.zeros((len(body.omega),) * 2) if body.circulatory is None else body.circulatory
 
 
-def _mirror(body: PortModel) -> PortModel:
+def conjugate_wave(body: PortModel) -> PortModel:
     """The body in nodal diameter -n: everything conjugate."""
     return replace(
         body,

@@ -10,7 +10,7 @@ from ..data import PortModel
 
 
 def truncate_modes(body: PortModel, count: int) -> PortModel:
-    """The same body with its lowest `count` modes; exactly what a Rubin reduction with `count`
+    """The body with its lowest `count` modes; exactly what a Rubin reduction with `count`
     modes would give.
     """
     if count >= len(body.omega):

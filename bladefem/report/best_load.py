@@ -60,7 +60,7 @@ def lowest_resonance(
 
 
 def lowest_of_response(response: Response) -> LowestResonance:
-    """The same of responses that are not tables yet."""
+    """`lowest_resonance` of responses that are not tables yet."""
     return lowest_resonance(
         pd.DataFrame(design_table(response.curves, response.limits)),
         pd.concat([points_of(curve) for curve in response.curves], ignore_index=True),

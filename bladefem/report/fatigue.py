@@ -134,7 +134,7 @@ class WorstUse:
 
 
 def worst_utilisation(run: SolvedRun) -> list[WorstUse]:
-    """Of each response of the whole wheel; empty where it is not known."""
+    """Highest utilisation, response by response of the whole wheel; empty where it is not known."""
     tuned = known_utilisation(run)
     if not tuned:
         return []

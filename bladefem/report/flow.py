@@ -26,8 +26,8 @@ def flow_tables(run: SolvedRun) -> dict[str, pd.DataFrame]:
             {
                 "nodal_diameter": found.diameters[order],
                 "frequency_shift": found.shift[order],
-                "flow_damping": found.flow[order],
-                "net_damping": found.net[order],
+                "flow_damping": found.flow_damping[order],
+                "net_damping": found.net_damping[order],
             }
         )
     }
@@ -40,8 +40,8 @@ def flow_tables(run: SolvedRun) -> dict[str, pd.DataFrame]:
                     "nodal_diameter": one.wave,
                     "frequency": one.frequency,
                     "limit_cycle": one.amplitude,
-                    "flutter_amplitude": one.largest,
-                    "most_friction": one.friction,
+                    "flutter_amplitude": one.stability_limit,
+                    "most_friction": one.largest_friction_damping,
                 }
                 for one in found.held
             ]
@@ -55,14 +55,14 @@ def flow_drawing(run: SolvedRun) -> dict[str, Callable[[Path], object]]:
     if found is None:
         return {}
     order = np.argsort(found.diameters)
-    own = run.scene.excitation.engine_order % len(found.net)
+    own = run.scene.excitation.engine_order % len(found.net_damping)
     return {
         "response/flow_damping": lambda file: draw_waves(
             found.diameters[order],
-            found.net[order],
-            float((found.net - found.flow)[0]),
+            found.net_damping[order],
+            float((found.net_damping - found.flow_damping)[0]),
             int(found.diameters[own]),
-            [one.friction for one in found.held],
+            [one.largest_friction_damping for one in found.held],
             file,
         )
     }
@@ -73,10 +73,10 @@ def flow_headlines(run: SolvedRun) -> list[Headline]:
     found = run.flutter
     if found is None or not found.held:
         return []
-    one = min(found.largest, key=lambda held: held.amplitude)
-    grows = "" if np.isnan(one.largest) else f"; motions above {growing_words(one.largest)} grow"
-    wave = wave_words(one.wave, len(found.net))
-    loads = {held.load for held in found.largest}
+    one = min(found.largest_cycles, key=lambda held: held.amplitude)
+    grows = growing_words(one)
+    wave = wave_words(one.wave, len(found.net_damping))
+    loads = {held.load for held in found.largest_cycles}
     among = f", of {len(loads)} loads the one that keeps it smallest" if len(loads) > 1 else ""
     return [
         Headline(

@@ -24,7 +24,7 @@ class Library:
 
     @property
     def megabytes(self) -> float:
-        """What it adds to a page [MB]."""
+        """Size that it adds to a page [MB]."""
         return len(self.packed) / 1e6
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..contact.state_table import quasi_static
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.coriolis import CORIOLIS_SHARE, has_coriolis
-from ..study.pipeline.response_remarks import load_of
+from ..study.pipeline.curve import load_of
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.state_check import state_sentence
 from ..util.message import method, warning

@@ -53,7 +53,7 @@ def _wheel_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
 
 
 def _study_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
-    """Those of every study: mesh, modes, contact and responses."""
+    """Tables of every study: mesh, modes, contact and responses."""
     curves = result.response.curves
     return {
         "mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),

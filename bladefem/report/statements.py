@@ -103,7 +103,7 @@ def _optimum_numbers(
         (
             "resonance frequency there",
             f"{best['peak_frequency']:.5g} Hz",
-            frequency_shift_sentence(summary, best),
+            linear_limits_text(summary),
         ),
     ]
     if np.isfinite(best.get("friction_damping", np.nan)):
@@ -120,7 +120,7 @@ def _optimum_numbers(
 
 
 def best_of_studied(finite: pd.DataFrame) -> str:
-    """That the load is the best of those studied, which is not the optimum."""
+    """Words that the load is the best of those studied, which is not the optimum."""
     return f"best of {len(finite)} loads studied" if len(finite) > 1 else ""
 
 
@@ -271,8 +271,8 @@ def reduction(summary: pd.DataFrame, best: pd.Series) -> str:
     return ""
 
 
-def frequency_shift_sentence(summary: pd.DataFrame, best: pd.Series) -> str:
-    """Where the resonance lies between the free and the stuck blade."""
+def linear_limits_text(summary: pd.DataFrame) -> str:
+    """Resonance frequencies of the free and the stuck blade."""
     ends = [summary.loc[summary["load"] == load, "peak_frequency"] for load in (0.0, np.inf)]
     words = ("free", "in full stick")
     return ", ".join(

@@ -121,7 +121,7 @@ def load_words(load: float, loads: pd.DataFrame) -> str:
 
 
 def end_words(load: float, loads: pd.DataFrame) -> str:
-    """That a load is at an end of those studied, or ""."""
+    """Words that a load is at an end of those studied, or ""."""
     damped = loads["load"][(loads["load"] > 0) & np.isfinite(loads["load"])]
     if load == damped.min():
         return ", the smallest load studied: a smaller one may do better"

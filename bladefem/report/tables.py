@@ -253,7 +253,7 @@ def units_of(table: pd.DataFrame) -> dict[str, str]:
 
 
 def readable_texts(table: pd.DataFrame) -> pd.DataFrame:
-    """The same table as text: titles with units in the head, numbers rounded and in the unit that
+    """The table as text: titles with units in the head, numbers rounded and in the unit that
     people use.
     """
     columns = {name: COLUMNS.get(name, Column(_words(str(name)))) for name in table}

@@ -117,7 +117,7 @@ def pattern_headlines(
 
 
 def shown_response(found: Sequence[PatternResponse]) -> PatternResponse:
-    """That of the load whose highest blade is lowest."""
+    """The response under the load whose highest blade is lowest."""
     return min(found, key=lambda one: one.peak.height)
 
 
@@ -257,7 +257,7 @@ def use_headlines(used: Sequence[ScatteredUse]) -> list[Headline]:
 
 
 def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
-    """The same in words, with what it assumes."""
+    """The utilisation with scatter in words, with what it assumes."""
     return [
         f"utilisation under {newtons(one.load, 4)}: {100 * SHARE:g} % of wheels stay below "
         f"{one.share.value:.3g} (95 % interval {one.share.low:.3g} to {_upper(one.share.high)}), "

@@ -299,7 +299,7 @@ def _figure(
 
 
 def _width_over_height(file: Path) -> float:
-    """Of a PNG file; 1 of others."""
+    """Width over height of a PNG file; 1 of others."""
     head = file.read_bytes()[:24]
     if not head.startswith(b"\x89PNG"):
         return 1.0

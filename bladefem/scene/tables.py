@@ -136,7 +136,7 @@ class Contact:
         help="normal stiffness: of one interface layer for seating and vibration, as given above; "
         "rigid faces in both; "
         "or of each node from the pressure map between rigid faces, its static force over the "
-        "approach of the bodies there (the paper's Eq. 23)",
+        "approach of the bodies there (Eq. 23 of doi:10.1007/s11071-016-3239-6)",
     )
     stiffening: float | None = quantity(
         None,
@@ -485,8 +485,8 @@ class Solver:
 
 @dataclass(frozen=True)
 class Foundation:
-    """The supports of the Z-shaped mass, how they move, and what presses and pulls (the paper's Eq.
-    30, Table 1).
+    """The supports of the Z-shaped mass, how they move, and what presses and pulls: Eq. 30 and
+    Table 1 of doi:10.1007/s11071-016-3239-6.
     """
 
     depth: float = quantity(

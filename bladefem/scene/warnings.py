@@ -54,7 +54,7 @@ def _doubtful_material(name: str, material: Material) -> Iterator[str]:
 
 
 def _doubtful_masses(scene: Scene) -> Iterator[str]:
-    """Of the damper, as the scene gives it and as the study varies it."""
+    """Doubtful masses of the damper, as the scene gives it and as the study varies it."""
     field = kind_named(scene.kind).damper_mass
     given = None if field is None else value_at(scene, field)
     named = {} if field is None or given is None else {field: (given,)}

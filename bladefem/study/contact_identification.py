@@ -132,7 +132,7 @@ class _Fit:
         return np.where(lost, np.nan, misfit)
 
     def amplitudes(self, misfit: np.ndarray) -> list[RealArray]:
-        """Of each level, the amplitudes that have these deviations [m]; NaN where not solved."""
+        """Amplitudes [m] that have these deviations, level by level; NaN where not solved."""
         ratios = np.exp(self.error * self.solved(misfit))
         cuts = np.cumsum([len(level.omega) for level in self.levels])[:-1]
         measured = np.concatenate([level.amplitude for level in self.levels])

@@ -58,8 +58,8 @@ class Knowledge:
         # beyond what is told nothing is known on either side
         ends[half >= MAX_LOG_HALF_WIDTH] = 0.0, np.inf
         wide = replace(self, half=half, intervals=ends)
-        told = {name for one in self.open for name in one}
-        lost = [n for n, k in zip(names, wide.known, strict=True) if not k and n not in told]
+        named = {name for one in self.open for name in one}
+        lost = [n for n, k in zip(names, wide.known, strict=True) if not k and n not in named]
         return replace(wide, open=[*self.open, *((name,) for name in lost)])
 
     def sentence(self, what: str) -> str:

@@ -331,7 +331,7 @@ class _Study:
         load: float,
         ends: list[LoadCase],
     ) -> float:
-        """The same from the friction elements on both sides of a step.
+        """Derivative by differences of the friction elements on both sides of a step.
 
         Stiffnesses are those of the whole layer. Elements of a split layer keep theirs over the
         step; for an open one that shifts the load at zero displacement, -kn times its gap.

@@ -66,7 +66,7 @@ class MeasuredModels:
 
     @property
     def family(self) -> Family:
-        """Of one of the loads, to ask which models there are."""
+        """Models of one of the loads, to ask which there are."""
         return next(iter(self.families.values()))
 
     def levels(self, settings: Settings) -> tuple[list[MeasuredLevel], IntegerArray]:
@@ -158,14 +158,14 @@ class MeasuredModels:
         )
 
     def _unknowns(self, settings: Settings) -> int:
-        """Of the balance."""
+        """Real unknowns of the balance."""
         member = family_member(self.family, replace(settings, harmonics=1))
         dofs = len(member.model.elements.kt) * member.model.directions
         return int(dofs * (2 * settings.harmonics + 1))
 
 
 def measured_models(run: ReducedRun, readings: Readings) -> MeasuredModels:
-    """Of a reduced run that was seated under the loads of the readings."""
+    """Models of a reduced run that was seated under the loads of the readings."""
     scene = run.scene
     patches = list(run.contact.problem.patches)
     cases = load_cases(scene, run.mesh, run.contact)
@@ -180,7 +180,7 @@ def measured_models(run: ReducedRun, readings: Readings) -> MeasuredModels:
 
 
 def first_fit_settings(settings: Settings) -> Settings:
-    """Those of a run, with as many harmonics and samples as a fit begins with."""
+    """The settings of a run with as many harmonics and samples as a fit begins with."""
     H = max(settings.harmonics, FEWEST_HARMONICS)
     samples = max(settings.samples, FEWEST_SAMPLES, 8 * (H + 1))
     return replace(settings, harmonics=H, samples=samples)

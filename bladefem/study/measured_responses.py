@@ -224,11 +224,11 @@ def _missing(models: MeasuredModels, settings: Settings, fit: ContactFit) -> Set
     """Settings richer in what moves some parameter most, against its interval by the readings;
     None where nothing moves any by much, or no more can be had.
     """
-    told = fit.half_by_readings < MAX_LOG_HALF_WIDTH
-    if not told.any():
+    determined = fit.half_by_readings < MAX_LOG_HALF_WIDTH
+    if not determined.any():
         return None
     sizes = {
-        one.what: float((abs(one.shift) / fit.half_by_readings)[told].max())
+        one.what: float((abs(one.shift) / fit.half_by_readings)[determined].max())
         for one in fit.left_out
         if one.widens
     }

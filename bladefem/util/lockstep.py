@@ -119,7 +119,7 @@ def run_together(
 
 
 def _standing(iterations: list[_Iteration]) -> list[tuple[int, _Iteration]]:
-    """Those that wait for a reply; what one of them raised is raised here."""
+    """Processes that wait for a reply; what one of them raised is raised here."""
     for each in iterations:
         if each.error is not None:
             raise each.error

@@ -43,7 +43,7 @@ def with_progress(
     shown: bool = True,
     **options: Any,
 ) -> Iterator[T]:
-    """The same items, with a bar of the remaining time once two seconds have passed.
+    """The items, with a bar of the remaining time once two seconds have passed.
 
     Args:
         items: a list or a generator.

@@ -4,14 +4,13 @@ by.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..data import PortModel
 from ..friction.fourier import to_complex, to_real
 from ..hbm.model import ReducedModel
 from ..hbm.solve import solve
+from ..reduction.assemble import conjugate_wave
 from .model import Wheel
 
 # relative deviation of the forces from a travelling wave
@@ -91,11 +90,4 @@ def _sector(
     # the flow does nothing to the mean
     if harmonic == 0:
         body = wheel.sectors[diameter]
-    if not mirrored:
-        return body
-    return replace(
-        body,
-        shapes=body.shapes.conj(),
-        residual=body.residual.conj(),
-        damping=None if body.damping is None else body.damping.conj(),
-    )
+    return conjugate_wave(body) if mirrored else body

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from models import block, single_mass
 from plain_linear import plain_condense, plain_error, plain_jacobian, plain_works
-from test_small import STATIC, elastic_damper, normal_direction
+from test_point_compiled import STATIC, elastic_damper, normal_direction
 
 from bladefem.data import PortModel
 from bladefem.errors import NotSolvedError

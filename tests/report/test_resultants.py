@@ -20,7 +20,7 @@ from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.run_records import SeatedRun, Seating
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "study"))
-from test_cycle import strip
+from test_contact_cycle import strip
 
 UNITS = {
     "force": "N",

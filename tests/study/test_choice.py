@@ -198,8 +198,8 @@ def test_settings_tell_how_many_contact_points_there_are():
     assert "all 23 contact points" in replace(settings, points=None).sentence(23)
     unjudged = replace(settings, error=None)
     assert "not estimated" in unjudged.sentence()
-    assert "(error of each load;" in unjudged.sentence(told="error of each load")
-    assert "(error of each load;" in settings.sentence(told="error of each load")
+    assert "(error of each load;" in unjudged.sentence(error_text="error of each load")
+    assert "(error of each load;" in settings.sentence(error_text="error of each load")
 
 
 def test_exact_events_stay_exact_in_the_models_that_judge():

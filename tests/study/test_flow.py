@@ -91,15 +91,17 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
     keep = StageRunner(None, None, StageClock({}, []))
     found = subject.find_flutter(reduced, Bodies(reduced.scene, reduced.mesh), patches, keep)
     waves = wave_influence(reduced.scene, COUNT)
-    np.testing.assert_allclose(found.net, 1e-3 + waves.imag)
+    np.testing.assert_allclose(found.net_damping, 1e-3 + waves.imag)
     assert [one.wave for one in found.held] == found.fed
-    assert sorted(found.fed) == sorted(found.diameters[found.net < 0]) and len(found.fed) > 5
-    (largest,) = found.largest
+    assert (
+        sorted(found.fed) == sorted(found.diameters[found.net_damping < 0]) and len(found.fed) > 5
+    )
+    (largest,) = found.largest_cycles
     assert largest.amplitude == max(one.amplitude for one in found.held)
     held = found.held[0]
     assert held.wave == found.worst
-    assert found.net.min() < 0 < found.net[9]
-    assert 0 < held.amplitude < held.largest
+    assert found.net_damping.min() < 0 < found.net_damping[9]
+    assert 0 < held.amplitude < held.stability_limit
     flow = scene_flow(reduced.scene, COUNT)
     wanted = sorted({0, 9, abs(held.wave), abs(largest.wave)})
     sector = subject.reduce_sector(
@@ -118,8 +120,8 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
         assert abs(last.probe[1, 0]) == pytest.approx(one.amplitude, rel=0.02)
     said = subject.flutter_sentences(found)
     assert "waves flutter without dampers" in said[0] and "limit cycle" in said[1]
-    one_wave = np.where(found.diameters == held.wave, found.net, 1.0)
-    alone = subject.flutter_sentences(replace(found, net=one_wave, held=(held,)))
+    one_wave = np.where(found.diameters == held.wave, found.net_damping, 1.0)
+    alone = subject.flutter_sentences(replace(found, net_damping=one_wave, held=(held,)))
     assert alone[0].startswith("flow: 1 wave flutters without dampers")
     shown = replace(reduced, flutter=found)
     tables = flow_tables(shown)

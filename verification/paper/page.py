@@ -24,7 +24,7 @@ from .errata import ERRATA
 INTRODUCTION = (
     "An effective numerical method for calculating nonlinear dynamics of structures with dry "
     "friction: application to predict the vibration response of blades with underplatform "
-    "dampers. Each figure and claim of that paper beside what is found here, in the paper's "
+    "dampers (Nonlinear Dynamics, doi:10.1007/s11071-016-3239-6). Each figure and claim of that paper beside what is found here, in the paper's "
     "order. The paper gives no dimensions for its blades and no stiffness for its contacts: "
     "shapes and numbers of the blades are this project's, of the mass those of its Table 1. "
     "Errors are against the exact integration of the coupled system unless said otherwise."

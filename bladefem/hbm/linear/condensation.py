@@ -130,7 +130,7 @@ def own_flexibility(linear: Linear) -> ComplexArray:
 
 
 def scale_loads(linear: Linear, factor: float) -> Linear:
-    """The same bodies under a multiple of all loads."""
+    """The condensed bodies under a multiple of all loads."""
     return _with_motion(
         replace(linear, g=factor * linear.g), factor * linear.free, factor * linear.stuck
     )
@@ -157,8 +157,8 @@ def with_mean(
     A: np.ndarray,
     stuck: np.ndarray,
 ) -> Linear:
-    """The same bodies with another mean: flexibility with springs (m, m) and displacement in full
-    stick (m,).
+    """The condensed bodies with another mean: flexibility with springs (m, m) and displacement in
+    full stick (m,).
     """
     matrices, mean, R, U, T = linear.condensed.flex
     if len(matrices):
@@ -175,7 +175,7 @@ def _with_motion(
     free: np.ndarray,
     stuck: np.ndarray,
 ) -> Linear:
-    """The same bodies with other motions without contact forces and in full stick."""
+    """The condensed bodies with other motions without contact forces and in full stick."""
     still = to_real(free.T)
     motion = to_real(stuck.T)
     scale, least = motion_scale(still, motion, linear.bodies.compression)

@@ -1,11 +1,9 @@
 """What is tried, in order, when Newton does not reach a point; every attempt leaves its reason.
 
-1. Newton from the given start and from full stick, its line search on the step and on the
-   residual. Small models of 1-D elements, which have a compiled loop for it, take both from each
-   start, the step first; elsewhere the residual is cheaper, and on 3-D patches that lift off it
-   converges where the step stalls (wedge of 96 nodes at 60 and 90 N: half the time): it is tried
-   from all starts first, alone where one is given and no fallbacks are wanted (but on stiff layers
-   that are split);
+1. Newton from the given start and from full stick, with two line searches: on the step and on the
+   residual. Compiled loops, which small models of 1-D elements have, try both from each start, the
+   step first. Other models try the residual from all starts, then the step; without fallbacks and
+   with several starts, the residual only. Stiff layers that are split go start by start;
 2. twice and four times the samples where Newton came close: sampled 2-D friction jumps a little at
    the limit of stick, and there may be no exact zero; the solution then says how many samples it
    has;
@@ -85,13 +83,11 @@ def _newton_attempts(
     start: np.ndarray | None,
     options: Options,
 ) -> Iterator[Attempt]:
-    """Newton from the given start and from full stick, with each merit function.
-
-    Where the loop is not compiled the residual comes first from all starts, and the step only
-    where there is no start but full stick, or fallbacks are wanted: on the shipped wedge under 18
-    and 36 N it solved 12 of 300 points after the residual, and took a third of the time. Stiff
-    layers that are split need it from each start: their residual is badly scaled.
-    """
+    """Newton from the given start and from full stick, with each merit function."""
+    # Where the loop is not compiled the residual is cheaper, and on 3-D patches that lift off it
+    # converges where the step stalls: half the time on a wedge of 96 nodes at 60 and 90 N. The step
+    # solved 12 of 300 points after it under 18 and 36 N, and took a third of the time. Stiff layers
+    # that are split need the step from each start: their residual is badly scaled.
     starts = [w for w in (start, start_in_stick(balance)) if w is not None]
     compiled = runs_compiled(balance)
     merits = NEWTON_MERITS if compiled else NEWTON_MERITS[::-1]

@@ -26,7 +26,12 @@ from ..linear.contact_flexibility import (
     form_matrices,
     select_nodes,
 )
-from ..policy import BLOCKED_LU_UNKNOWNS, DEFLATION_UNKNOWNS, DENSE_FALLBACK_UNKNOWNS
+from ..policy import (
+    BLOCKED_LU_UNKNOWNS,
+    COMPILED_ITERATION_UNKNOWNS,
+    DEFLATION_UNKNOWNS,
+    DENSE_FALLBACK_UNKNOWNS,
+)
 from .deflation import no_level, no_ramp, second_level
 from .dense_lu import back_substitute, factorise_large, factorise_small
 from .krylov import conjugate_residuals
@@ -216,7 +221,7 @@ def _apply_inverse(r, accuracy, flex, C, factors, level):
     """(a K,) the solution of (1 + A C) x = r, and the factors where they were needed."""
     x = np.empty(r.size)
     if (
-        r.size > BLOCKED_LU_UNKNOWNS
+        r.size > COMPILED_ITERATION_UNKNOWNS
         and factors[1].size == 0
         and conjugate_residuals(flex, C, no_ramp(), r, accuracy, level, x) >= 0
     ):
@@ -391,7 +396,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         factors = (np.empty((0, 0)), np.empty(0, np.int64))
         factors = _newton_step(r, accuracy, d, active, C, linear.flex, few, factors, level, step)
         before = frobenius_norm(step)
-        if C.shape[0] * C.shape[1] > BLOCKED_LU_UNKNOWNS:
+        if C.shape[0] * C.shape[1] > COMPILED_ITERATION_UNKNOWNS:
             solver |= BY_ITERATIONS
         if factors[1].size:
             solver |= BY_LU

@@ -102,7 +102,7 @@ class _System:
 
     @cached_property
     def single(self) -> Parts:
-        """The same in single precision."""
+        """The preconditioner in single precision."""
         (A, mean, R, U, T), change = self.double
         halved = (
             A.astype(np.complex64),
@@ -279,5 +279,5 @@ def _single_product(flex: Flexibility, forces: np.ndarray) -> np.ndarray:
 
 
 def _by_matrices(A: np.ndarray, forces: np.ndarray) -> np.ndarray:
-    """The same for A (H+1, a, a)."""
+    """The product for A (H+1, a, a)."""
     return to_real((A @ to_complex(forces).T[:, :, None].astype(A.dtype))[:, :, 0].T)

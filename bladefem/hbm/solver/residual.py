@@ -179,10 +179,10 @@ def walk_ramp(balance: Balance, w: np.ndarray) -> np.ndarray | None:
     """(n, tangents) by which the motion goes on in each period [m]; None where nothing walks."""
     if balance.walk is None:
         return None
-    return _as_ramp(balance, _walk_steps(balance, w))
+    return _as_ramp(balance, walk_steps(balance, w))
 
 
-def _walk_steps(balance: Balance, w: np.ndarray) -> np.ndarray:
+def walk_steps(balance: Balance, w: np.ndarray) -> np.ndarray:
     """(z,) steps along the motions of the walk, from the mean of w (n, d, K)."""
     return balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
 
@@ -199,7 +199,7 @@ def walk_rates(balance: Balance, state: State) -> np.ndarray:
     """
     if "walk rates" in state.derived:
         return state.derived["walk rates"]
-    steps = _walk_steps(balance, state.w)
+    steps = walk_steps(balance, state.w)
     first = balance.model.directions - balance.model.elements.tangents
     size = WALK_DIFFERENCE * max(np.abs(state.w[:, first:, 1:]).max(), np.finfo(float).tiny)
     rates = []
@@ -224,7 +224,7 @@ def walking_force_change(
     """
     if balance.walk is None:
         return 0.0
-    return np.tensordot(_walk_steps(balance, dw), walk_rates(balance, state), 1)
+    return np.tensordot(walk_steps(balance, dw), walk_rates(balance, state), 1)
 
 
 def force_change(

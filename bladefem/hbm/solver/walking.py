@@ -18,7 +18,7 @@ from ...friction.law_table import forgets_position
 from ..linear.condensation import with_mean
 from ..linear.mean_motion import with_springs
 from ..model import ReducedModel
-from .residual import Balance, State
+from .residual import Balance, State, walk_steps
 
 # share of the contact springs below which a motion is not resisted: by the normal ones, whose
 # directions come from a mesh, and by nodes that stick
@@ -123,14 +123,14 @@ def drift_speed(balance: Balance, w: np.ndarray) -> float:
     """Step a period times frequency, of the contact that moves most [m/s]."""
     if balance.walk is None:
         return 0.0
-    steps = balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
+    steps = walk_steps(balance, w)
     ramp = (balance.walking @ steps).reshape(w.shape[:2])
     return float(np.linalg.norm(ramp, axis=1).max() * balance.linear.omega / (2 * np.pi))
 
 
 def without_step(balance: Balance, w: np.ndarray) -> np.ndarray:
     """w (n, d, K) with a walk of zero along the motions of the balance."""
-    steps = balance.walking.T @ (balance.linear.springs * w[:, :, 0].ravel())
+    steps = walk_steps(balance, w)
     still = w.copy()
     still[:, :, 0] -= (balance.walking @ steps).reshape(w.shape[:2])
     return still

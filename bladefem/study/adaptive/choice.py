@@ -62,7 +62,6 @@ def choose_settings(
     point: Solution,
     accuracy: float,
     fixed: tuple[str, ...] = (),
-    apart: bool = False,
 ) -> tuple[Settings, Solution, Indicators]:
     """Settings whose estimated error at one point is below half the accuracy, or the best that may
     be chosen.
@@ -73,7 +72,6 @@ def choose_settings(
     Args:
         point: solved with `settings`; its frequency is kept.
         fixed: names that may not be changed here although they are not the user's.
-        apart: the error is wanted by its sources.
     """
     known: dict[str, float] = {}
     if (
@@ -86,7 +84,7 @@ def choose_settings(
         settings, point = (usual, further) if further.converged else (settings, point)
     found: Indicators
     for _ in range(MAX_ROUNDS):
-        judged = None if apart else total_error(family, settings, point)
+        judged = total_error(family, settings, point)
         if judged is not None and judged.total <= accuracy / 2:
             found = judged
         else:
@@ -177,7 +175,6 @@ def adapted_settings(
     band: tuple[float, float] | None,
     mode: int,
     accuracy: float,
-    fixed: tuple[str, ...] = (),
 ) -> Checked:
     """A swept curve with settings that hold at its peak and on its flanks; swept again where they
     did not.
@@ -196,7 +193,7 @@ def adapted_settings(
     settings = with_excited_harmonics(family, settings)
     if settings.chosen:
         rough = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
-        settings, _, _ = choose_settings(family, settings, peak_of(rough), accuracy, fixed)
+        settings, _, _ = choose_settings(family, settings, peak_of(rough), accuracy)
         band = band or (rough[0].frequency, rough[-1].frequency)
     points: list[Solution] = []
     for last in [False] * (MAX_SWEEPS - 1) + [True]:
@@ -207,7 +204,7 @@ def adapted_settings(
         else:
             points = _replaced(points, response_points(model, settings, inner, accuracy))
         if settings.chosen and any(p.branch for p in points):
-            return _adapted_branches(family, settings, band, mode, accuracy, fixed, points)
+            return _adapted_branches(family, settings, band, mode, accuracy, points)
         top = peak_of(points)
         used = settings
         errors = {}
@@ -218,7 +215,7 @@ def adapted_settings(
             if last or not (whole or point is top):
                 found = total_error(family, settings, point)
             else:
-                used, _, found = choose_settings(family, settings, point, tolerated, fixed)
+                used, _, found = choose_settings(family, settings, point, tolerated)
                 used = replace(used, error=settings.error)
             errors[point.omega] = found.total
             if used != settings:
@@ -235,11 +232,10 @@ def _adapted_branches(
     band: tuple[float, float] | None,
     mode: int,
     accuracy: float,
-    fixed: tuple[str, ...],
     points: list[Solution],
 ) -> Checked:
-    """The same where several motions were found: the error is that of the height of the highest
-    peak that is not unstable, wherever it lies.
+    """The adapted curve where several motions were found: its error is that of the height of the
+    highest peak that is not unstable, wherever it lies.
     """
     widen = band is None
     band = band or (points[0].frequency, points[-1].frequency)
@@ -251,7 +247,7 @@ def _adapted_branches(
             break
         demanded *= max(accuracy / 2 / error, MIN_ACCURACY_FACTOR)
         before = replace(settings, error=None)
-        settings, _, _ = choose_settings(family, settings, anchor_of(points, top), demanded, fixed)
+        settings, _, _ = choose_settings(family, settings, anchor_of(points, top), demanded)
         if replace(settings, error=None) == before:
             continue
         points = covered_band(

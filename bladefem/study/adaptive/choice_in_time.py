@@ -173,10 +173,10 @@ def _with_left_out(
     """
     known = {name: (0.0, 0.0) for name in COVERED_IN_TIME} | {"harmonics": (left_out, 0.0)}
     errors = replace(peak_errors(family, settings, peak, accuracy, known), in_time=True)
-    told = _change_with_all_points(family, settings, peak, accuracy)
-    if not errors.height["points"] < told < OTHER_MOTION:
+    change = _change_with_all_points(family, settings, peak, accuracy)
+    if not errors.height["points"] < change < OTHER_MOTION:
         return errors
-    return replace(errors, height={**errors.height, "points": told})
+    return replace(errors, height={**errors.height, "points": change})
 
 
 def _change_with_all_points(

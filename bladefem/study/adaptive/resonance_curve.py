@@ -276,9 +276,9 @@ def _judged_top(
         return settings, False
     rise = size(top) / peak.height - 1
     if rise > accuracy / 2 and top.branch:
-        told = peak_error(family, settings, points, top)
-        if told <= accuracy / 2:
-            return replace(settings, error=told + accuracy * MAXIMUM_SHARE), False
+        error = peak_error(family, settings, points, top)
+        if error <= accuracy / 2:
+            return replace(settings, error=error + accuracy * MAXIMUM_SHARE), False
     return replace(settings, error=settings.error + abs(rise)), rise > accuracy / 2
 
 
@@ -311,9 +311,9 @@ def _chosen(
     try:
         peak = peak_from(family, settings, top, settings, accuracy)
         if march is not None and marched_widely(march, settings, peak.solution):
-            told = choose_in_time(family, settings, peak, accuracy, march, fixed=("modes",))
-            if told is not None:
-                return told
+            choice = choose_in_time(family, settings, peak, accuracy, march, fixed=("modes",))
+            if choice is not None:
+                return choice
         enough = choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
         return cheaper_settings(family, *enough, accuracy) if lower else enough
     except NotSolvedError:
@@ -382,7 +382,7 @@ def _flanks(
     heights: np.ndarray,
     top: Solution,
 ) -> list[Solution]:
-    """Of each side of the peak, the points whose heights are nearest to CHECKED_HEIGHT_SHARES of
+    """The points on each side of the peak whose heights are nearest to CHECKED_HEIGHT_SHARES of
     it.
     """
     omegas = np.array([p.omega for p in points])

@@ -75,14 +75,14 @@ class Settings:
             return "error unknown: richer models were not solved"
         return f"estimated error {percent(self.error)}"
 
-    def sentence(self, nodes: int | None = None, told: str = "") -> str:
+    def sentence(self, nodes: int | None = None, error_text: str = "") -> str:
         """The settings in words.
 
         Args:
             nodes: those that a seat has, where known.
-            told: what is known of their errors, in place of that of the choice.
+            error_text: what is known of their errors, in place of that of the choice.
         """
-        error = told or self.error_words
+        error = error_text or self.error_words
         kind = "chosen: " + ", ".join(self.chosen) if self.chosen else "all given by the scene"
         points = (
             "all contact points"

@@ -47,7 +47,7 @@ ENOUGH_OF_THE_WAY = 0.5
 
 @dataclass(frozen=True)
 class StiffLayerChange:
-    """Of a resonance, from the softer layer to the layer itself."""
+    """Change of a resonance from the softer layer to the layer itself."""
 
     # estimated relative error of the amplitude: what the heights on the way are found to where it
     # was solved to its end, else the change that is not known; inf where less than half of the way

@@ -96,7 +96,7 @@ def obstacle_in_time(model: ReducedModel) -> str:
 
 
 def tangential_model(model: ReducedModel) -> ReducedModel:
-    """The same model without the normal dofs of its ports, and the damper's freedom scaled to
+    """The model without the normal dofs of its ports, and the damper's freedom scaled to
     contact displacement.
     """
     sides = tuple(_only(body, model.rows) for body in model.sides)

@@ -180,7 +180,7 @@ def held_port_flexibility(
 
 
 def _odd(body: Body) -> Body:
-    """The same body for motions that turn over in the mirror x = 0."""
+    """The body for motions that turn over in the mirror x = 0."""
     faces = dict(body.mesh.faces)
     faces["antisymmetry_x"] = faces.pop("symmetry_x")
     return replace(body, mesh=replace(body.mesh, faces=faces))

@@ -57,7 +57,7 @@ class DrawnWheels:
 
     @property
     def harmonic(self) -> int:
-        """Of the common period that is the scene's engine order."""
+        """Harmonic of the common period that is the scene's engine order."""
         return own_harmonic(self.scene)
 
     def grid(self, pattern: Pattern) -> np.ndarray:

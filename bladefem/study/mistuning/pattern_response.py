@@ -100,7 +100,7 @@ class PatternResponse:
 
     @property
     def frequency(self) -> float:
-        """Of the scene's engine order, at the peak [Hz]."""
+        """Frequency of the scene's engine order at the peak [Hz]."""
         return self.harmonic * self.solution.frequency
 
     @property

@@ -151,7 +151,7 @@ def _best_response(
 
 
 def _run_deviations(run: SolvedRun) -> BladeDeviations:
-    """Those of the scene's pattern."""
+    """Deviations of the blades by the scene's pattern."""
     name = kind_named(run.scene.kind).sectors
     count = 0 if name is None else value_at(run.scene, name)
     return scene_deviations(run.scene, count, run.scene.mistuning.families)

@@ -31,8 +31,8 @@ class BladeUse:
 
 
 def wheel_utilisation(run: SolvedRun) -> list[list[BladeUse]]:
-    """Of each load of the whole wheel the utilisation of the highest blade of each shape, where
-    that moves most; the blade that decides first.
+    """Utilisation of the highest blade of each shape, where that moves most, load by load of the
+    whole wheel; the blade that decides first.
 
     Empty where all blades are alike or the scene gives no diagram.
 

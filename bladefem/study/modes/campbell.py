@@ -144,8 +144,8 @@ def read_speeds(text: str) -> list[float]:
         raise InputError(f"campbell = {text!r}: expected speeds, such as '0, 2000, 4000 rpm'")
     for item in items:
         if is_plain(item) and parse(item, "rad/s", "campbell"):
-            told = f"{text.strip()} rpm" if is_plain(items[-1]) else "0, 2000, 4000 rpm"
-            raise InputError(f"campbell = {text}: expected a unit, such as '{told}'")
+            example = f"{text.strip()} rpm" if is_plain(items[-1]) else "0, 2000, 4000 rpm"
+            raise InputError(f"campbell = {text}: expected a unit, such as '{example}'")
     numbers = [
         None if item.startswith("...") else parse(item, "rad/s", "campbell") for item in items
     ]

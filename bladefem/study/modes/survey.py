@@ -232,6 +232,6 @@ def _blade_alone(mesh: Mesh) -> Mesh:
 
 
 def _of_blade(mesh: Mesh, modes: ModeSet) -> ModeSet:
-    """The same modes, at rest away from the blade."""
+    """The modes with everything but the blade at rest."""
     inside = np.isin(np.arange(len(mesh.points)), mesh.bodies["blade"])
     return replace(modes, shapes=np.where(inside[:, None], modes.shapes, 0.0))

@@ -78,7 +78,7 @@ class Bodies:
 
     @cached_property
     def alone(self) -> Bodies:
-        """The same bodies on this rank alone."""
+        """The bodies on this rank alone."""
         from ...fem.compat import MPI
 
         if (self.comm or MPI.COMM_WORLD).size == 1:

@@ -59,7 +59,7 @@ def mode_errors(
     patches: Sequence[Patch],
     modes: ModeSet,
 ) -> ModeErrors:
-    """Of the modes that the excitation meets."""
+    """Errors by the mesh of the modes that the excitation meets."""
     from ...fem.stiffness_error import stiffness_error
 
     ports = blade_ports(bodies.mesh, list(patches), bodies.scene.excitation)

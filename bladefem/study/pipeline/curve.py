@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...hbm.solution import Solution, moving_contacts, size
+from ...scene.units import newtons
 from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ..adaptive.settings import Settings
 from .kept_band import KeptBand
@@ -183,7 +184,9 @@ class Curve:
 
     @property
     def peak_amplitude(self) -> float:
-        """That of the curve, or that of the stiff layer that its softer one stands for [m]."""
+        """Resonance amplitude [m]: of the curve, or of the stiff layer that its softer one stands
+        for.
+        """
         return self.layer_factor * self.curve_amplitude
 
     @property
@@ -207,19 +210,21 @@ class Curve:
 
     @property
     def curve_amplitude(self) -> float:
-        """That of the balance, or the highest that a march keeps to where it contradicts it [m]."""
+        """Resonance amplitude of the balance, or the highest that a march keeps to where it
+        contradicts the balance [m].
+        """
         march = self.governing_march
         return self.balance_amplitude if march is None else march.highest
 
     @property
     def balance_amplitude(self) -> float:
-        """Of the periodic motion at the resonance [m]."""
+        """Amplitude of the periodic motion at the resonance [m]."""
         return size(self.peak)
 
     @property
     def over_balance(self) -> float:
         """The amplitude given over that of the balance: what else follows from the balance's motion
-        is told in proportion.
+        is reported in proportion.
         """
         return self.peak_amplitude / self.balance_amplitude
 
@@ -230,8 +235,8 @@ class Curve:
 
     @property
     def friction_work(self) -> float:
-        """Of the motion that is given as the resonance, a period and blade [J]; zero where rounding
-        alone leaves some.
+        """Friction work of the motion that is given as the resonance, a period and blade [J]; zero
+        where rounding alone leaves some.
         """
         work = self.peak.work.dissipated
         if abs(work) < ROUNDED_WORK * abs(self.peak.work.input):
@@ -247,7 +252,7 @@ class Curve:
 
     @property
     def input_work(self) -> float:
-        """Of the excitation at the resonance given, in proportion to its amplitude [J]."""
+        """Work of the excitation at the resonance given, in proportion to its amplitude [J]."""
         return self.over_balance * float(self.peak.work.input)
 
     @property
@@ -259,6 +264,11 @@ class Curve:
     def drift_at_peak(self) -> float:
         """How fast the damper walks at the resonance given [m/s]; NaN for a march."""
         return np.nan if self.is_march else float(self.peak.drift)
+
+
+def load_of(curve: Curve) -> str:
+    """ "80 N", with the damper's mass where several are studied."""
+    return newtons(curve.load) + ("" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g")
 
 
 def _doubt_of_march(curve: Curve, kept: KeptBand) -> float:

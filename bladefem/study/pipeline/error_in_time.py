@@ -63,8 +63,8 @@ class Marches:
         point: Solution,
         on: Settings | None = None,
     ) -> MarchedBand | None:
-        """The same for the choice of harmonics, also on the model of other settings; None as well
-        where the march came to no end.
+        """The marched band for the choice of harmonics, also on the model of other settings; None
+        as well where the march came to no end.
         """
         if on is not None:
             point = carried_motion(self.models, settings, point, on)
@@ -74,7 +74,7 @@ class Marches:
 
 @dataclass(frozen=True)
 class ErrorInTime:
-    """Of the amplitude of a resonance."""
+    """Error of a resonance amplitude by a march."""
 
     # relative
     error: float
@@ -99,8 +99,8 @@ def error_in_time(
         top: the resonance, a point of the curve.
     """
     models = marches.models
-    told = curve.settings.error
-    if told is None or told <= accuracy or not lifts_off(top):
+    estimated = curve.settings.error
+    if estimated is None or estimated <= accuracy or not lifts_off(top):
         return None
     left = sum(change for name, change in curve.parts.items() if name not in COVERED_IN_TIME)
     known = bool(curve.parts) and np.isfinite(left)
@@ -117,7 +117,7 @@ def error_in_time(
     elif _finer_settings(models, settings) is not None:
         error *= ERROR_OVER_CHANGE
     # a march that the harmonics were chosen by tells the same
-    if error > told * (1 + ROUNDING):
+    if error > estimated * (1 + ROUNDING):
         return None
     return ErrorInTime(error, band if known else replace(band, points=settings.points))
 

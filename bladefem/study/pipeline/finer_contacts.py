@@ -53,11 +53,11 @@ def unstable_with_more_points(
     if verdict == UNIQUE or not moving_contacts(point) or settings.points is None:
         return None
     counts = list(_more_points(models, settings))
-    told = next(filter(None, (_judged(models, settings, point, some) for some in counts)), None)
-    if told is None or told.verdict.verdict != UNSTABLE:
+    judged = next(filter(None, (_judged(models, settings, point, some) for some in counts)), None)
+    if judged is None or judged.verdict.verdict != UNSTABLE:
         return None
     fewer = (_judged(models, settings, point, some) for some in counts[:0:-1])
-    return next((some for some in fewer if some and some.verdict.verdict == UNSTABLE), told)
+    return next((some for some in fewer if some and some.verdict.verdict == UNSTABLE), judged)
 
 
 def _more_points(models: Family, settings: Settings) -> Iterator[Settings]:
@@ -97,8 +97,8 @@ def _judged(
     if not motion.converged or abs(size(motion) / size(point) - 1) > SAME_MOTION:
         return None
     model = model_in_time(models, settings_in_time(models, finer))
-    told = stability_verdict(model, motion, CURVE_OPERATIONS)
-    if told.verdict == UNSTABLE:
-        told, _ = judged_again(told, motion, richer_models(models, finer))
-    known = told.verdict in (STABLE, UNIQUE, UNSTABLE)
-    return FinerMotion(finer, motion, told) if known else None
+    judged = stability_verdict(model, motion, CURVE_OPERATIONS)
+    if judged.verdict == UNSTABLE:
+        judged, _ = judged_again(judged, motion, richer_models(models, finer))
+    known = judged.verdict in (STABLE, UNIQUE, UNSTABLE)
+    return FinerMotion(finer, motion, judged) if known else None

@@ -3,8 +3,8 @@
 A ripple that is weak at the resonance may grow far from a flank of it. Plane blades under 4 N are
 stable at 2.15 um and 1077 Hz; from 2.06 um at 1016 Hz, which is not, they come to bounce between
 1.15 and 3.6 um. Where every motion along a flat top is unstable, the blade may keep most of another
-hump of it than of the highest: of 150.0 um at 382.7 Hz under 79 N on the shipped wedge 137.7 are
-left, of 149.7 um at 386.9 Hz 147.5.
+local maximum of it than of the highest: of 150.0 um at 382.7 Hz under 79 N on the shipped wedge
+137.7 are left, of 149.7 um at 386.9 Hz 147.5.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from .stability import Stability, model_in_time, settings_in_time
 
 # share of the resonance amplitude from which an unstable motion is marched from
 NEARLY_AS_HIGH = 0.9
-# humps of a curve that are marched from
-MAX_HUMPS = 4
+# local maxima of a curve that are marched from
+MAX_MAXIMA = 4
 # steps to better neighbours: where the blade bounces the ends of bands scatter, and one of some
 # neighbours is always a little higher
 MAX_STEPS_BESIDE = 3
@@ -58,10 +58,10 @@ def flank_motions(
     given: float,
     known: Solution | None = None,
 ) -> FlankMotions:
-    """March from the highest unstable motions, one a hump of the curve, from the one that is left
-    fastest, from those at both ends of their range and beside one that was marched from already;
-    and from the neighbours of the best one, as long as one of them is better, where it is beyond
-    the resonance.
+    """March from unstable motions that are NEARLY_AS_HIGH as the resonance: the highest, each local
+    maximum, the one with the largest multiplier, both ends of their range, and the neighbours of
+    one that was marched from already. Where the best of them is beyond the resonance, then from its
+    neighbours, as long as one of these is better.
 
     Args:
         given: amplitude of the resonance [m].
@@ -79,7 +79,7 @@ def flank_motions(
         return FlankMotions()
     first = [
         max(places, key=lambda i: heights[i]),
-        *_humps(heights, places),
+        *_local_maxima(heights, places),
         max(places, key=lambda i: marks.multiplier[i]),
         places[0],
         places[-1],
@@ -112,11 +112,11 @@ def flank_motions(
     return FlankMotions(curve.points[best], bands[best], reason)
 
 
-def _humps(heights: RealArray, places: list[int]) -> list[int]:
-    """The MAX_HUMPS highest of the places that are higher than the points on both sides."""
+def _local_maxima(heights: RealArray, places: list[int]) -> list[int]:
+    """The MAX_MAXIMA highest of the places that are higher than the points on both sides."""
     around = np.concatenate([[0.0], heights, [0.0]])
-    humps = [i for i in places if heights[i] > max(around[i], around[i + 2])]
-    return sorted(humps, key=lambda i: -heights[i])[:MAX_HUMPS]
+    maxima = [i for i in places if heights[i] > max(around[i], around[i + 2])]
+    return sorted(maxima, key=lambda i: -heights[i])[:MAX_MAXIMA]
 
 
 def _highest(bands: dict[int, KeptBand]) -> int | None:

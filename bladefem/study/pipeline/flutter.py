@@ -18,7 +18,7 @@ from ...data import Patch
 from ...errors import InputError
 from ...hbm.model import ReducedModel
 from ...hbm.nonlinear_modes import NonlinearMode, modal_damping, nonlinear_mode
-from ...reduction.assemble import folded_diameter, pair_model
+from ...reduction.assemble import conjugate_wave, folded_diameter, pair_model
 from ...reduction.truncate import truncate_modes
 from ...scene.units import newtons, show
 from ...util.arrays import IntegerArray, RealArray
@@ -65,9 +65,9 @@ class HeldFlutter:
     amplitude: float
     frequency: float
     # amplitude at the probe from which motions grow [m]; NaN where none that was looked at does
-    largest: float
+    stability_limit: float
     # largest damping by friction [1]
-    friction: float
+    largest_friction_damping: float
 
 
 @dataclass(frozen=True)
@@ -76,30 +76,30 @@ class FlutterResult:
 
     # (N,) relative frequency shift, damping by the flow and with that of the blade [1]
     shift: RealArray
-    flow: RealArray
-    net: RealArray
+    flow_damping: RealArray
+    net_damping: RealArray
     # load by load, each with all fed waves, the least damped one first; empty where none is fed
     held: tuple[HeldFlutter, ...]
 
     @property
     def diameters(self) -> IntegerArray:
         """(N,) nodal diameters; negative ones run backwards."""
-        d = np.arange(len(self.net))
+        d = np.arange(len(self.net_damping))
         return np.where(2 * d <= len(d), d, d - len(d))
 
     @property
     def worst(self) -> int:
         """Nodal diameter of the least damped wave."""
-        return int(self.diameters[np.argmin(self.net)])
+        return int(self.diameters[np.argmin(self.net_damping)])
 
     @property
     def fed(self) -> list[int]:
         """Nodal diameters of the waves that flutter without dampers, the least damped one first."""
-        order = np.argsort(self.net, kind="stable")
-        return [int(self.diameters[i]) for i in order if self.net[i] < 0]
+        order = np.argsort(self.net_damping, kind="stable")
+        return [int(self.diameters[i]) for i in order if self.net_damping[i] < 0]
 
     @property
-    def largest(self) -> tuple[HeldFlutter, ...]:
+    def largest_cycles(self) -> tuple[HeldFlutter, ...]:
         """The largest limit cycle of each load and mass, in their order."""
         found: dict[tuple[float, float | None], HeldFlutter] = {}
         for one in self.held:
@@ -113,8 +113,8 @@ class FlutterResult:
         """Factor of the whole influence at which the first wave flutters; infinite where none
         does.
         """
-        blade = float((self.net - self.flow)[0])
-        lowest = float(self.flow.min())
+        blade = float((self.net_damping - self.flow_damping)[0])
+        lowest = float(self.flow_damping.min())
         return blade / -lowest if lowest < 0 else np.inf
 
 
@@ -163,7 +163,7 @@ def with_best_load(
     """With the limit cycles under the best load of the forced response, where a search has found it
     and none was asked for: at no cost where they follow by a factor.
 
-    A best load under which friction holds some wave at no amplitude is told in a message.
+    A best load under which friction holds some wave at no amplitude is reported in a message.
     """
     curve = run.response.curves[run.response.best_curve]
     best = (curve.load, curve.mass)
@@ -181,7 +181,7 @@ def with_best_load(
         held = _by_scale(wanted, solved) or _held_anew(found, run, bodies, patches, wanted, keep)
     except InputError as error:
         keep.clock.messages.append(
-            warning(f"flutter under the best load, {newtons(curve.load)}, is not told: {error}")
+            warning(f"flutter under the best load, {newtons(curve.load)}, is not known: {error}")
         )
         return found
     ordered = sorted([*solved, (wanted, held)], key=lambda one: (one[0].mass or 0, one[0].load))
@@ -245,7 +245,7 @@ def _by_scale(
                     one,
                     load=case.load,
                     amplitude=factor * one.amplitude,
-                    largest=factor * one.largest,
+                    stability_limit=factor * one.stability_limit,
                 )
                 for one in held
             ]
@@ -367,13 +367,7 @@ def _wave_model(
     n, mirrored = folded_diameter(1, wave % count, count)
     bodies = [truncate_modes(sector.sector[d], settings.modes) for d in (0, n)]
     if mirrored:
-        body = bodies[1]
-        bodies[1] = replace(
-            body,
-            shapes=body.shapes.conj(),
-            residual=body.residual.conj(),
-            damping=None if body.damping is None else body.damping.conj(),
-        )
+        bodies[1] = conjugate_wave(bodies[1])
     sides = [
         pair_model(body, sector.following, phase)
         for body, phase in zip(bodies, (0.0, 2 * pi * wave / count), strict=True)
@@ -388,10 +382,11 @@ def _wave_model(
 
 def flutter_sentences(found: FlutterResult) -> list[str]:
     """What the flow does, in words."""
-    d = int(np.argmin(found.net))
+    d = int(np.argmin(found.net_damping))
+    net, by_flow = 100 * found.net_damping[d], 100 * found.flow_damping[d]
     share = (
-        f"least damped wave: {wave_words(found.worst, len(found.net))}, "
-        f"{100 * found.net[d]:.3g} % of critical ({100 * found.flow[d]:+.3g} % by the flow)"
+        f"least damped wave: {wave_words(found.worst, len(found.net_damping))}, "
+        f"{net:.3g} % of critical ({by_flow:+.3g} % by the flow)"
     )
     if not found.held:
         onset = "" if np.isinf(found.onset) else f"; {found.onset:.3g} times this flow flutters"
@@ -402,16 +397,14 @@ def flutter_sentences(found: FlutterResult) -> list[str]:
         f"{found.onset:.3g} times this flow on; {share}"
     ]
     first = [one for one in found.held if one.wave == found.worst]
-    for one, most in zip(first, found.largest, strict=True):
-        beyond = ""
-        if not np.isnan(one.largest):
-            beyond = f"; motions above {growing_words(one.largest)} grow"
+    for one, most in zip(first, found.largest_cycles, strict=True):
         others = ""
         if most.wave != one.wave:
-            others = f"; {_cycle(most)} in {wave_words(most.wave, len(found.net))}"
+            others = f"; {_cycle(most)} in {wave_words(most.wave, len(found.net_damping))}"
         sentences.append(
             f"flutter under {newtons(one.load)}: friction holds it in a limit cycle of "
-            f"{_cycle(one)}{beyond}{others} (one harmonic; forced responses leave it out)"
+            f"{_cycle(one)}{growing_words(one)}{others} (one harmonic; forced responses leave it "
+            "out)"
         )
     if len(found.fed) > 1:
         sentences.append(
@@ -421,13 +414,13 @@ def flutter_sentences(found: FlutterResult) -> list[str]:
     return sentences
 
 
-def growing_words(amplitude: float) -> str:
-    """The amplitude [m] from which flutter grows, far above limit cycles: three digits.
-
-    >>> growing_words(0.0187234)
-    '18.7 mm'
+def growing_words(one: HeldFlutter) -> str:
+    """From which amplitude flutter grows, far above limit cycles: three digits; empty where that
+    is not known.
     """
-    return show(float(f"{amplitude:.3g}"), "m")
+    if np.isnan(one.stability_limit):
+        return ""
+    return f"; motions above {show(float(f'{one.stability_limit:.3g}'), 'm')} grow"
 
 
 def wave_words(wave: int, sectors: int) -> str:

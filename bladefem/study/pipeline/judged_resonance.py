@@ -208,12 +208,12 @@ def _scaled(kept: KeptBand, finer: FinerMotion, point: Solution) -> KeptBand:
     return replace(scaled_band(kept, ratio), points=points)
 
 
-def _with_verdict(marks: Stability, place: int, told: Verdict) -> Stability:
+def _with_verdict(marks: Stability, place: int, verdict_there: Verdict) -> Stability:
     """The verdicts on a curve with another one at a point."""
     verdict, multiplier = marks.verdict.astype("<U15"), marks.multiplier.copy()
     bifurcation = marks.bifurcation.copy()
-    verdict[place], multiplier[place] = told.verdict, told.multiplier
-    bifurcation[place] = told.bifurcation
+    verdict[place], multiplier[place] = verdict_there.verdict, verdict_there.multiplier
+    bifurcation[place] = verdict_there.bifurcation
     return replace(marks, verdict=verdict, multiplier=multiplier, bifurcation=bifurcation)
 
 

@@ -231,7 +231,9 @@ def kept_band(model: ReducedModel, point: Solution, counted: float = MAX_COUNTED
 
 
 def exact_band(model: ReducedModel, point: Solution) -> KeptBand | None:
-    """The same by an exact march; None where contacts have two tangents, or waves travel."""
+    """Band of amplitudes by event-exact integration; None where contacts have two tangents, or
+    waves travel.
+    """
     try:
         system = time_system(in_one_body(model), point.harmonics)
     except InputError:
@@ -262,7 +264,7 @@ def band_by_steps(
     point: Solution,
     counted: float = MAX_COUNTED,
 ) -> KeptBand:
-    """The same with two tangents, and for travelling waves.
+    """Band of amplitudes by time stepping: with two tangents, and for travelling waves.
 
     Begun with the fewest instants whose steps are short enough for the bodies on their contacts.
     Marched again with more of them where the blade seems to leave the motion at the start and
@@ -433,7 +435,7 @@ def _band_of(point: Solution, motion: np.ndarray, periods: int, friction_work: f
 
 
 def _work_of_flow(flow: Flow) -> float:
-    """Of the friction forces between the samples of a flow, by the trapezoidal rule [J]."""
+    """Work of the friction forces between the samples of a flow, by the trapezoidal rule [J]."""
     means = (flow.force[1:] + flow.force[:-1]) / 2
     return float(np.sum(means * np.diff(flow.w, axis=0)))
 

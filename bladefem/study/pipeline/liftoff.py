@@ -73,6 +73,6 @@ def seat_travel(
 
 
 def _compression(case: LoadCase) -> float:
-    """Of the contact springs of one seat under the load [m]."""
+    """Compression of the contact springs of one seat under the load [m]."""
     stiffness = float(physical_stiffness(case.elements, case.series).kn.sum()) / 2
     return case.load / stiffness if stiffness > 0 else np.inf

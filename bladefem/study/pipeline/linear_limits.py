@@ -111,8 +111,8 @@ def judged_limits(
 def _changes(
     limits: tuple[Limit, Limit], model: ReducedModel, mode: int
 ) -> list[tuple[RealArray, float]]:
-    """Of each limit, what another model changes in the first harmonic (k,) and in the peak
-    amplitude, relative.
+    """Relative changes by another model, limit by limit: of the first harmonic (k,) and of the
+    peak     amplitude.
     """
     found = []
     for limit, (other, response, omega) in zip(limits, _linear_models(model, mode), strict=True):

@@ -26,11 +26,9 @@ UNKNOWN = "unknown"
 class LoadInterval:
     """Range of a resonance over all loading histories."""
 
-    # [m], [Hz]
+    # [m]
     lowest: float
-    lowest_frequency: float
     highest: float
-    highest_frequency: float
     # "point", "monotone", "sampled" (`bladefem.hbm.history_interval`), or "unknown"
     certificate: str
     # contact points that never slip at the resonance
@@ -65,18 +63,14 @@ def load_interval(
         )
         found = history_interval(model, peak, tolerance=tolerance, most=MAX_COST_RATIO * points)
     except NotSolvedError as error:
-        return LoadInterval(
-            size(top), top.frequency, size(top), top.frequency, UNKNOWN, 0, 0, str(error)
-        )
+        return LoadInterval(size(top), size(top), UNKNOWN, 0, 0, str(error))
     return _record(found, peak.points)
 
 
 def _record(found: HistoryInterval, before: int) -> LoadInterval:
     return LoadInterval(
         found.lowest.height,
-        found.lowest.solution.frequency,
         found.highest.height,
-        found.highest.solution.frequency,
         found.certificate,
         found.sticking,
         found.points + before,

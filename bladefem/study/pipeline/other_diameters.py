@@ -41,7 +41,7 @@ CLASS_OPERATIONS = 1.5e10
 
 @dataclass(frozen=True)
 class ClassVerdict:
-    """Of one motion and one class of disturbances."""
+    """Verdict on one motion and one class of disturbances."""
 
     # 0..N/2, in which they move
     diameters: tuple[int, ...]

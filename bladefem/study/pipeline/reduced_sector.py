@@ -45,7 +45,9 @@ class Reduced:
 
 
 def with_damper_mass(reduced: Reduced, mass: float | None) -> Reduced:
-    """The same with a damper of another density: its mass [kg] scales, its flexibility stays."""
+    """The reduced sector with a damper of another density: its mass [kg] scales, its flexibility
+    stays.
+    """
     if mass is None:
         return reduced
     root = (mass / reduced.mass) ** 0.5

@@ -164,8 +164,8 @@ class _Top:
 
     @property
     def rise_behind(self) -> float:
-        """The same towards the neighbour, by a parabola of 1 / height^2 through both, bent as that
-        of the blade alone: the blade may have come from above.
+        """Relative rise that is possible towards the neighbour, by a parabola of 1 / height^2
+        through both, bent as that of the blade alone: the blade may have come from above.
         """
         run = abs(self.best.omega - self.neighbour.omega)
         higher = self.neighbour.mean**-2 - self.best.mean**-2
@@ -414,7 +414,7 @@ def _with_more_points(
 
 
 def _calmed(model: ReducedModel, found: _Settled, work: _Work) -> _Settled:
-    """The same after many more periods, where it bounces so that no period is like another.
+    """What the blade keeps to after many more periods, where no period is like another.
 
     Raises:
         _MarchFailedError: the forces of a step were not found, or the march takes too long.

@@ -12,7 +12,7 @@ from ...util.message import method, warning
 from ...util.percent import percent
 from ..adaptive.settings import Settings
 from .best_load import BestLoad, studied_load
-from .curve import Curve
+from .curve import Curve, load_of
 from .damped_motion import DampedStress
 from .load_interval import interval_sentence
 from .resonance_list import reach_sentence
@@ -65,48 +65,32 @@ def response_remarks(
         nodes: contact points of a seat.
         judged: what verdicts looked at.
     """
-    remarks: list[str] = _of_settings(scene, settings, curves, nodes)
+    methods = []
     if scene.study.stability:
         verdicts = [(c.stability, c.multiplier) for c in curves]
-        remarks.append(method(stability_sentence(verdicts, judged)))
-    told = ripple_sentence(curves, scene.accuracy), undriven_sentence(curves)
-    remarks.extend(map(method, filter(None, told)))
-    remarks.extend(map(warning, filter(None, [folded_sentence(curves)])))
-    unstable = (unstable_sentence(c, scene.accuracy) for c in curves)
-    remarks.extend(warning(text) for text in unstable if text)
-    remarks.extend(
-        warning(f"load {load_of(c)}: {c.resonance_by_march.sentence}")
-        for c in curves
-        if c.resonance_by_march is not None
-    )
-    doubtful = doubtful_sentence(curves, judged.reason)
-    unknown = unjudged_sentence(curves), unmarched_sentence(curves), doubtful
-    remarks.extend(map(warning, filter(None, unknown)))
-    intervals = [c.interval for c in curves if c.interval is not None]
-    if intervals:
-        remarks.append(interval_sentence([c.load for c in curves], intervals))
-    lost = sum(int((~c.converged).sum()) for c in curves)
-    if lost:
-        remarks.append(
-            warning(
-                f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not "
-                "converge; they are marked in tables and pictures"
-            )
-        )
-    single = [load_of(c) for c in curves if c.folds_not_followed]
-    if single:
-        remarks.append(
-            warning(
-                f"under {', '.join(single)} contacts lift off, and the response was not followed "
-                "round folds: a sweep sees one motion a frequency, a higher one may exist"
-            )
-        )
-    remarks.extend(warning(text) for text in map(search_sentence, curves) if text)
-    remarks.extend(warning(text) for text in map(reach_sentence, curves) if text)
-    remarks.extend(map(warning, filter(None, [stiff_layer_sentence(curves)])))
-    remarks.extend(map(warning, resonance_warnings(curves, scene.accuracy)))
-    remarks.extend(map(warning, filter(None, [beyond_tolerance(curves)])))
-    return remarks
+        methods.append(stability_sentence(verdicts, judged))
+    methods += [ripple_sentence(curves, scene.accuracy), undriven_sentence(curves)]
+    warnings = [
+        folded_sentence(curves),
+        *(unstable_sentence(c, scene.accuracy) for c in curves),
+        *map(march_sentence, curves),
+        unjudged_sentence(curves),
+        unmarched_sentence(curves),
+        doubtful_sentence(curves, judged.reason),
+        unconverged_sentence(curves),
+        single_motion_sentence(curves),
+        *map(search_sentence, curves),
+        *map(reach_sentence, curves),
+        stiff_layer_sentence(curves),
+        *resonance_warnings(curves, scene.accuracy),
+        beyond_tolerance(curves),
+    ]
+    return [
+        *_of_settings(scene, settings, curves, nodes),
+        *map(method, filter(None, methods)),
+        *history_remarks(curves),
+        *map(warning, filter(None, warnings)),
+    ]
 
 
 def _of_settings(scene: Scene, settings: Settings, curves: list[Curve], nodes: int) -> list[str]:
@@ -186,9 +170,38 @@ def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
-def load_of(curve: Curve) -> str:
-    """ "80 N", with the damper's mass where several are studied."""
-    return newtons(curve.load) + ("" if curve.mass is None else f" of {1e3 * curve.mass:.4g} g")
+def march_sentence(curve: Curve) -> str:
+    """How the resonance was sought where balances do not tell it, or ""."""
+    found = curve.resonance_by_march
+    return "" if found is None else f"load {load_of(curve)}: {found.sentence}"
+
+
+def history_remarks(curves: Sequence[Curve]) -> list[str]:
+    """What the loading history changes, where that was asked for."""
+    known = [(c.load, c.interval) for c in curves if c.interval is not None]
+    return [interval_sentence(*zip(*known, strict=True))] if known else []
+
+
+def unconverged_sentence(curves: Sequence[Curve]) -> str:
+    """How many points did not converge, or ""."""
+    lost = sum(int((~c.converged).sum()) for c in curves)
+    if not lost:
+        return ""
+    return (
+        f"{lost} of {sum(len(c.frequency) for c in curves)} response points did not converge; they "
+        "are marked in tables and pictures"
+    )
+
+
+def single_motion_sentence(curves: Sequence[Curve]) -> str:
+    """Under which loads one motion a frequency was seen, where there may be several, or ""."""
+    single = [load_of(c) for c in curves if c.folds_not_followed]
+    if not single:
+        return ""
+    return (
+        f"under {', '.join(single)} contacts lift off, and the response was not followed round "
+        "folds: a sweep sees one motion a frequency, a higher one may exist"
+    )
 
 
 def beyond_tolerance(curves: list[Curve]) -> str:
@@ -285,6 +298,7 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
             yield (f"best load{damper}: not found between {lowest} and {highest}, since {b.reason}")
             continue
         start, end = b.between
+        error = f"{b.settings.error_words} of the balance, meshes apart"
         tolerated = ""
         if np.isfinite([start, end]).all():
             share = f"{100 * scene.accuracy:.3g} %"
@@ -293,7 +307,7 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
             f"best load{damper}: {newtons(b.load, 4)} by exact search between {lowest} and "
             f"{highest}, {len(b.tried)} loads and {b.points} points; no load near it lowers the "
             f"amplitude of these balances by more than {percent(b.tolerance)}{tolerated}; "
-            f"{b.settings.sentence(told=f'{b.settings.error_words} of the balance, meshes apart')}"
+            f"{b.settings.sentence(error_text=error)}"
         )
 
 

@@ -26,7 +26,7 @@ from .bodies import Bodies, is_wheel
 from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
 from .changed_cases import cases_of, changed_cases
-from .curve import Curve
+from .curve import Curve, load_of
 from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
 from .linear_limits import judged_limits
@@ -35,7 +35,6 @@ from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
 from .response_remarks import (
     best_load_remarks,
-    load_of,
     lower_studied_remarks,
     response_remarks,
     stress_message,
@@ -214,7 +213,7 @@ def _class_verdicts(
     sectors: int,
     keep: StageRunner,
 ) -> tuple[ClassVerdict, ...]:
-    """Of the resonance of a curve, kept with the run."""
+    """Verdicts on the resonance of a curve in other nodal diameters, kept with the run."""
     if models.disturbed is None:
         return ()
     order = scene.excitation.engine_order

@@ -82,7 +82,7 @@ def with_more_loads(
     loads: Iterable[float],
     messages: list[str],
 ) -> Seating:
-    """The same with the seats under more loads."""
+    """The seating with the seats under more loads."""
     new = sorted(set(loads) - set(seating.maps))
     if not new:
         return seating

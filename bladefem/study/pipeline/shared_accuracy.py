@@ -48,7 +48,7 @@ class UnseenErrors:
 
     @property
     def total(self) -> float:
-        """Of the amplitude, those that are known."""
+        """Sum of the errors of the amplitude that are known."""
         return float(np.nansum([self.halved, self.body_mesh, self.layer_law]))
 
 

@@ -68,7 +68,7 @@ RING_HARMONICS = (7, 15, 31)
 
 @dataclass(frozen=True)
 class Stability:
-    """Of each point of a curve."""
+    """Stability verdicts on the points of a curve."""
 
     # (k,) "unique", "stable", "unstable" or "unknown"
     verdict: np.ndarray
@@ -258,9 +258,9 @@ def judged_again(
             last = again
     if found is None:
         return verdict, spent
-    told = stability_verdict(found, last)
+    judged = stability_verdict(found, last)
     spent += verdict_operations(found, last)
-    return told if told.verdict in (STABLE, UNSTABLE) else verdict, spent
+    return judged if judged.verdict in (STABLE, UNSTABLE) else verdict, spent
 
 
 def _judging_operations(model: ReducedModel, point: Solution) -> float:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Disturbances:
-    """Those that the points of a travelling wave were judged against."""
+    """Disturbances that the points of a travelling wave were judged against."""
 
     # after which they repeat, as the wave does; 1 where all move in phase, or no wave can be judged
     blades: int = 1
@@ -184,8 +184,8 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
 
 
 def _from_a_flank(curve: Curve) -> str:
-    """That a march beside the highest motion, which is not known to be unstable, gives the
-    resonance, or "".
+    """A sentence where a march beside the highest motion, which is not known to be unstable, gives
+    the resonance; else "".
     """
     if not curve.march_replaces_balance:
         return ""

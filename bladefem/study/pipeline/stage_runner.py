@@ -59,7 +59,7 @@ class StageRunner:
         key: str,
         compute: Callable[[], Result],
     ) -> Result:
-        """The same for a stage that this rank runs by itself."""
+        """The result of a stage that this rank runs by itself."""
         return self._reported(name, *cached_stage(self.folder, name, key, compute))
 
     def _reported(

@@ -82,8 +82,8 @@ def highest_use(run: SolvedRun, number: int, used: Utilisation) -> float:
 
 
 def highest_wheel_use(run: SolvedRun, number: int, used: Utilisation, mesh_error: float) -> float:
-    """The same of a blade of a mistuned wheel, whose stresses are those of a balance: with the rise
-    of a march above the tuned one too.
+    """The largest utilisation of a blade of a mistuned wheel, whose stresses are those of a
+    balance: as ``highest_use``, with the rise of a march above the tuned balance too.
 
     Args:
         number: of the tuned wheel's curve under the same load.
