@@ -270,6 +270,11 @@ def recombine(W: np.ndarray, C: np.ndarray) -> np.ndarray:
     return few
 
 
+def hermitian_part(A: np.ndarray) -> np.ndarray:
+    """(A + A^H) / 2, (k, k): what rounding leaves of symmetry is removed."""
+    return (A + A.conj().T) / 2
+
+
 def inertia(A: Matrix) -> int:
     """Number of negative eigenvalues, by Sylvester's law; the factors are not kept."""
     if isinstance(A, Folded):
