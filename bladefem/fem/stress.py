@@ -29,7 +29,9 @@ from .cell_functions import (
 from .elasticity import lame_parameters, stress_of
 from .temperature import point_temperatures, strain_tensor_at
 
-VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+# axes of the six components as stresses are written: shear xy, yz, zx; stiffness matrices have the
+# order of elasticity.STIFFNESS_PAIRS
+OUTPUT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
 CELLS_PER_BLOCK = 20000
 # of a period, for principal stresses of complex fields
@@ -327,7 +329,7 @@ def _mises_form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _stress_tensor(stress: np.ndarray) -> np.ndarray:
     out = np.empty((*stress.shape[:-1], 3, 3), stress.dtype)
-    for i, (a, b) in enumerate(VOIGT_PAIRS):
+    for i, (a, b) in enumerate(OUTPUT_PAIRS):
         out[..., a, b] = out[..., b, a] = stress[..., i]
     return out
 
@@ -419,7 +421,7 @@ def element_stress(
 def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
-    for i, (a, b) in enumerate(VOIGT_PAIRS):
+    for i, (a, b) in enumerate(OUTPUT_PAIRS):
         if max(a, b) < d:
             out[..., i] = stress[..., a, b]
     if across is not None:
