@@ -31,8 +31,6 @@ from geometry.sector import wedge_sector
 from geometry.session import gmsh_session
 from geometry.step_file import read_step
 
-PAIRS = {"cyclic", "this", "next"}
-
 
 def same(found, mesh, tolerance=1e-12):
     for name, pair in mesh.pairs.items():
