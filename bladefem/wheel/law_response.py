@@ -19,6 +19,7 @@ from ..util.curve_extremum import parabola_at_middle
 from .damper_law import DamperLaw
 from .family import Family
 from .model import Pattern
+from .resonance import SAME_POINT
 from .statistics import Amplification, no_checks
 
 # wheels solved together: matrices of 72 x 72 numbers
@@ -29,8 +30,6 @@ MAX_HALVINGS = 6
 # frequencies of the first look, and times that the highest point is closed in on
 FIRST_LOOK_POINTS = 61
 PEAK_ROUNDS = 4
-# relative distance of points that are the same
-SAME_POINT = 1e-7
 
 
 @dataclass(frozen=True)

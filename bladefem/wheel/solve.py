@@ -11,6 +11,7 @@ from ..data import Elements
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_complex, to_real
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
+from ..hbm.solver.walking import WALK_SAMPLES
 from ..util.arrays import ComplexArray, RealArray
 from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
@@ -35,8 +36,6 @@ HOMOTOPY_POINTS = 60
 WALK_ROUNDS = 10
 UNDECIDED_SHARE = 0.3
 MOST_UNDECIDED = 2
-# samples for each harmonic of a walk where transitions were to be located exactly
-WALK_SAMPLES = 64
 
 
 @dataclass(frozen=True)
