@@ -26,7 +26,7 @@ from ...hbm.ring_march import (
 )
 from ...hbm.solution import Solution, size
 from ...hbm.time_model import time_system
-from ...time.event_integrator import Flow, State, integrate_periods
+from ...time.event_integrator import State, Trajectory, integrate_periods
 from ...util.durations import core_time
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution
@@ -429,10 +429,10 @@ def _band_of(point: Solution, motion: np.ndarray, periods: int, friction_work: f
     return KeptBand(point.frequency, *ends, periods, friction_work=friction_work)
 
 
-def _work_of_flow(flow: Flow) -> float:
-    """Of the friction forces between the samples of a flow, by the trapezoidal rule [J]."""
-    means = (flow.force[1:] + flow.force[:-1]) / 2
-    return float(np.sum(means * np.diff(flow.w, axis=0)))
+def _work_of_flow(path: Trajectory) -> float:
+    """Of the friction forces between the samples of a trajectory, by the trapezoidal rule [J]."""
+    means = (path.force[1:] + path.force[:-1]) / 2
+    return float(np.sum(means * np.diff(path.w, axis=0)))
 
 
 def _unknown_band(point: Solution, reason: str) -> KeptBand:
