@@ -17,7 +17,7 @@ import numpy as np
 from ..util.arrays import RealArray
 from ..util.curve_extremum import parabola_at_middle
 from .damper_law import DamperLaw
-from .family import Family
+from .family import ModeFamily
 from .model import Pattern
 from .resonance import SAME_POINT
 from .statistics import Amplification, no_checks
@@ -68,10 +68,10 @@ class ScatteredLaw:
 class LawWheels:
     """A batch of wheels; B wheels of N blades."""
 
-    family: Family
+    family: ModeFamily
     law: ScatteredLaw
     # (B, N) dynamic stiffness of each blade's deviation in the family's reading at the frequency
-    # `Family.at` [1/s^2]
+    # `ModeFamily.at` [1/s^2]
     deviation: RealArray
     # parameter to factors (B, N) of each damper
     factors: Mapping[str, RealArray]
@@ -92,11 +92,11 @@ class LawWheels:
 
 
 def pattern_deviations(
-    patterns: Sequence[Pattern], family: Family, count: int
+    patterns: Sequence[Pattern], family: ModeFamily, count: int
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """(B, N) dynamic stiffness of the deviations in the family's reading at the frequency
-    `Family.at`, to whose forces all other modes of the blade give way, and their mass there; None
-    where no mass deviates.
+    `ModeFamily.at`, to whose forces all other modes of the blade give way, and their mass there;
+    None where no mass deviates.
     """
     y = family.readings
     found = np.zeros((len(patterns), count))
@@ -165,7 +165,7 @@ def _solve_batch(
     return a, _error(z, r, a) <= RESIDUAL_TOLERANCE
 
 
-def _impedance(family: Family, omega: np.ndarray) -> np.ndarray:
+def _impedance(family: ModeFamily, omega: np.ndarray) -> np.ndarray:
     """(B, N) of the nodal diameters, over the squared readings."""
     w = omega[:, None]
     z = family.omega**2 - w**2 + 1j * (w * family.viscous + family.hysteretic)
@@ -285,7 +285,7 @@ def _find_peaks(
     )
 
 
-def _sizes(family: Family, a: np.ndarray) -> np.ndarray:
+def _sizes(family: ModeFamily, a: np.ndarray) -> np.ndarray:
     """(..., N) amplitudes at the probes of the blades [m]."""
     return abs(np.fft.ifft(np.fft.fft(a, axis=-1) * family.probe, axis=-1))
 

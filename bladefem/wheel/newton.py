@@ -303,15 +303,15 @@ class _Steps:
         shape = state.residual.shape
         flat = (shape[0], -1, shape[3])
         change = state.forces.jacobian
-        deal = self.balance.wheel.deal
+        partition = self.balance.wheel.partition
         walk = self.balance.walk
         prepare = (self.preconditioner or self._renew(state)).apply
 
         def product(y: np.ndarray) -> np.ndarray:
             self.products += 1
             x = prepare(y.reshape(flat))
-            own = x[deal.sectors].reshape(*change.shape[:2], 1)
-            forces = deal.join((change @ own).reshape(-1, *shape[1:]))
+            own = x[partition.sectors].reshape(*change.shape[:2], 1)
+            forces = partition.join((change @ own).reshape(-1, *shape[1:]))
             if walk is not None and state.rates is not None:
                 steps = walk.steps(x.reshape(shape))
                 forces = forces + np.einsum("zsndk,sz->sndk", state.rates, steps)

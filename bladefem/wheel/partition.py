@@ -17,7 +17,7 @@ from ..util.communicator import Communicator
 
 
 @dataclass(frozen=True)
-class Deal:
+class Partition:
     """The part of this rank in a wheel of N sectors."""
 
     count: int

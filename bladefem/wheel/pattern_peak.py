@@ -44,7 +44,7 @@ class ComparedPeaks:
     # (W,) amplification with held means [1]
     held_factor: RealArray
     # (W,) True where that with free ones is known
-    free: BooleanArray
+    mean_released: BooleanArray
 
 
 def compared_peaks(heights: np.ndarray) -> ComparedPeaks:

@@ -17,7 +17,7 @@ from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, full_newton, newton_wheel
 from .tuned import tuned_displacements
-from .walking import WheelWalk, slipping_dampers, walking_motions
+from .walking import WheelWalk, slipping_dampers, unheld_motions
 
 TUNED_PATTERN = Pattern()
 # modal damping ratios within which a solved neighbour is the best start: resonances of a mistuned
@@ -119,7 +119,7 @@ def solve_wheel(
     balance = WheelBalance(
         wheel, flex, elements, first, stuck, samples, most_products=most_products
     )
-    motions = walking_motions(wheel)
+    motions = unheld_motions(wheel)
     if motions.shape[2]:
         found = _walking(balance, motions, start, options)
         if found is not None:

@@ -63,7 +63,7 @@ class WheelWalk:
         return still
 
 
-def walking_motions(wheel: Wheel) -> RealArray:
+def unheld_motions(wheel: Wheel) -> RealArray:
     """(n, d, z) motions of a damper's contacts that no normal spring resists; z = 0 where there is
     none, the means are held, or a friction law knows the position.
     """
@@ -88,7 +88,7 @@ def with_free_means(wheel: Wheel) -> Wheel | None:
     resists.
     """
     free = replace(wheel, coupled=True)
-    return free if walking_motions(free).shape[2] else None
+    return free if unheld_motions(free).shape[2] else None
 
 
 def _rigid_motions(wheel: Wheel) -> np.ndarray:
