@@ -115,7 +115,9 @@ def factorise(
         core = (
             A.core.core()
             if A.core is not None
-            else interior.eliminate_interior(entries(A.A), A.rim, definite, shared=A.shared)
+            else interior.eliminate_interior(
+                entries(A.A), A.rim, definite=definite, shared=A.shared
+            )
         )
         if springs is not None and A.shared is not None:
             springs = whole_part(A.shared, springs[:, None])[:, 0]
@@ -128,7 +130,7 @@ def factorise(
         added.array = np.repeat(springs, 2) if doubled else springs
         matrix.setDiagonal(added, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
-    return Factor(factorise_matrix(matrix, definite, on_disk=on_disk), doubled)
+    return Factor(factorise_matrix(matrix, definite=definite, on_disk=on_disk), doubled)
 
 
 def release(A: Matrix, factor: Factor) -> None:
