@@ -127,19 +127,18 @@ def all_diameters(
     count: int,
     diameters: Sequence[int] | None = None,
     direct: bool = False,
-    prove: bool = True,
     clamp: str | None = "clamp",
     progress: Progress = without_progress,
     solver: Eigensolver = SLEPC,
     kept: KeptPairs | None = None,
 ) -> list[ModeSet]:
-    """The lowest modes in each nodal diameter.
+    """The lowest modes in each nodal diameter, counted by inertia below the highest gap that all of
+    them share.
 
     Args:
         body: a body with cut faces (held at ``clamp``), or its transformation.
         diameters: 0 to N/2 when left out.
         direct: solve every nodal diameter from scratch.
-        prove: count the eigenvalues below the highest common gap by inertia.
         progress: shows which nodal diameter is at work.
         kept: more modes are solved, more exactly, and kept here for a reduction.
 
@@ -158,11 +157,10 @@ def all_diameters(
         eigenpairs(t, solved, wanted, direct, tolerance, solver), "nodal diameters", len(wanted)
     )
     found = {p.nodal_diameter: p if kept is not None else _bare(p, count) for p in steps}
-    if prove:
-        if isinstance(body, Body) and kept is None and t.opened is not None:
-            # nobody else has them: the count takes their memory
-            t.opened.elimination.release()
-        found = _check_inertia(t, found, solved, tolerance)
+    if isinstance(body, Body) and kept is None and t.opened is not None:
+        # nobody else has them: the count takes their memory
+        t.opened.elimination.release()
+    found = _check_inertia(t, found, solved, tolerance)
     if kept is not None:
         kept.pairs.update(found)
     sets = {}

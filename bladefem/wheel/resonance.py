@@ -45,8 +45,6 @@ class WheelPeak:
     sizes: np.ndarray
     # points that were not solved, which the peak leaves out
     unsolved: int
-    # predicted gain of height that was not looked for
-    gain: float
 
     @property
     def closed_in(self) -> bool:
@@ -99,7 +97,6 @@ def find_wheel_peak(
         raise InputError(f"grid of {len(grid)} frequencies: expected at least 3, ascending")
     omegas = [float(w) for w in grid]
     sizes = [respond(w) for w in omegas]
-    gain = 0.0
     for _ in range(MAX_ADDED_POINTS + 1):
         order = np.argsort(omegas)
         w = np.array(omegas)[order]
@@ -120,7 +117,6 @@ def find_wheel_peak(
         w,
         a,
         int((~solved).sum()),
-        float(gain),
     )
 
 

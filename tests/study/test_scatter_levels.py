@@ -74,7 +74,7 @@ def test_a_free_maximum_beside_a_lost_point_does_not_count(monkeypatch):
     held = replace(free, coupled=False)
     grid = resonance() * np.linspace(0.98, 1.02, 5)
     omegas, sizes = np.array([0.9, 1.0, 1.1]), np.array([[1.0], [2.0], [1.5]])
-    closed = WheelPeak(1.0, 2.0, 0, sizes[1], omegas, sizes, 0, 0.0)
+    closed = WheelPeak(1.0, 2.0, 0, sizes[1], omegas, sizes, 0)
     lost = replace(closed, sizes=np.array([[1.0], [2.0], [np.nan]]), unsolved=1)
     for peak, known in ((closed, True), (lost, False)):
         again = LocalPeak(peak, None, 0.0, 3)
@@ -163,7 +163,7 @@ def test_like_is_compared_with_like():
 
 def peak_of(height):
     none = np.zeros(0)
-    return PatternPeak(WheelPeak(1.0, height, 0, none, none, none, 0, 0.0))
+    return PatternPeak(WheelPeak(1.0, height, 0, none, none, none, 0))
 
 
 def test_a_law_that_is_wrong_by_a_factor_is_calibrated():
