@@ -31,19 +31,17 @@ from geometry.mesh import Mesh
 
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
-from ..fem.body import Body, assemble
-from ..fem.constraint import constrain, restrict_load
-from ..fem.flexibility import Flexibility, compliance, flexible
+from ..fem.body import Body
+from ..fem.constraint import restrict_load
+from ..fem.flexibility import Flexibility, compliance
 from ..fem.linalg import inner_products
 from ..fem.loads import body_mass, centrifugal
-from ..scene.tables import Materials
 from ..scene.units import newtons
 from ..util.arrays import RealArray
-from ..util.communicator import Communicator
 from .as_array import as_float_array
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
-from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
+from .patch import initial_gap, normal_ports, port_matrix, rigid_ports
 
 # gaps over elastic displacements beyond which a load is too light to be solved for
 MAX_GAP_OVER_DISPLACEMENT = 1e4
@@ -196,27 +194,6 @@ def _check_load(
         )
     if damper_mass is not None and not 0 < damper_mass < np.inf:
         raise InputError(f"damper_mass is {damper_mass} kg, expected a positive, finite one")
-
-
-def solve_mesh_seating(
-    mesh: Mesh,
-    material: Materials,
-    speed: float,
-    clearance: float = 0.0,
-    normal: float | None = None,
-    comm: Communicator | None = None,
-) -> list[PressureMap]:
-    """Everything from the mesh to the pressure maps of "this" and "next" in one call
-    (``solve_seating`` tells the arguments).
-
-    Assembles and factorises both bodies; keep the ContactProblem of ``contact_problem`` where more
-    states follow.
-    """
-    patches = [make_patch(mesh, name) for name in ("this", "next")]
-    diameter = 0 if "cyclic" in mesh.pairs else None
-    blade = flexible(constrain(assemble(mesh, "blade", material.blade, comm), "clamp", diameter))
-    damper = flexible(constrain(assemble(mesh, "damper", material.damper, comm), None))
-    return solve_seating(contact_problem(mesh, patches, blade, damper, clearance), speed, normal)
 
 
 def spin_axis(mesh: Mesh) -> tuple[float, float, float]:

@@ -96,17 +96,21 @@ def evaluate(
     kernel: str = "vector",
     walk: np.ndarray | None = None,
 ) -> Forces:
-    """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
-    ``samples`` instants.
+    """Harmonics of the contact forces, sampled; the error falls as samples^-2.
 
-    load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of
-    the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
-    is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
-    kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
-    times as slow and always in double precision. walk (n, tangents) [m], where given, is how far
-    the tangential motion goes on in each period; the mean displacement that way then has no
-    influence. The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D
-    element was not periodic after ``cycles`` periods or the motion is not finite.
+    ``Forces.converged`` is False, with the reason, when a 2-D element was not periodic after
+    ``cycles`` periods or the motion is not finite.
+
+    Args:
+        w: (n, d, 2H+1) coefficients of the relative motion [m].
+        samples: instants of a period at which the forces are taken.
+        load: (n, samples) prescribed part of the normal load N(t) [N] in place of the constant n0.
+        precision: that in which the derivative of 2-D elements is summed: "single" is faster and
+            leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
+        kernel: that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
+            times as slow and always in double precision.
+        walk: (n, tangents) how far the tangential motion goes on in each period [m]; the mean
+            displacement that way then has no influence.
 
     Raises:
         InputError: shapes that do not fit, or too few samples (at least 4H+4).

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import blades, rocking, seat
+from systems import blades, friction_oscillator, rocking, seat
 
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import damper_cycle
@@ -17,7 +17,7 @@ from bladefem.time.shooting import (
     periodic_solution,
     probe_harmonics,
 )
-from bladefem.time.system import damper_on_platforms, friction_oscillator
+from bladefem.time.system import damper_on_platforms
 
 OMEGA = 2 * np.pi * 1340
 

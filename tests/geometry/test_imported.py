@@ -7,13 +7,13 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from mesh_seating import solve_mesh_seating
 from structured import box, sector
 from writers import write_bdf, write_cdb, write_inp, write_step
 
 import bladefem
 from bladefem.cli.main import main
 from bladefem.contact.resultants import resultant
-from bladefem.contact.seating import solve_mesh_seating
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
