@@ -65,13 +65,13 @@ class ContactProblem:
     flexibility: RealArray
     # (n,) gap before anything moves [m]
     clearance: RealArray
-    # (n,) gap opened by the blade's centrifugal displacement, for unit rotation
+    # (n,) gap opened by the blade's centrifugal displacement, for unit rotation [m s^2]
     blade_swell: RealArray
-    # (n,) gap opened by the damper's deformation under its load, for unit rotation
+    # (n,) gap opened by the damper's deformation under its load, for unit rotation [m s^2]
     damper_swell: RealArray
-    # (n, d) gap opened by unit rigid motions of the damper; rotations per length
+    # (n, d) gap opened by unit rigid motions of the damper [1]; rotations times a length
     rigid: RealArray
-    # (d,) centrifugal load on the damper, for unit rotation
+    # (d,) centrifugal load on the damper along these motions, for unit rotation [N s^2]
     load: RealArray
     # of the damper as meshed [kg]
     mass: float
@@ -216,7 +216,7 @@ def counting_sense(mesh: Mesh) -> int:
 
 
 def _fitted(problem: ContactProblem) -> ContactProblem:
-    """The same bodies with faces that fit each other whatever the rotation."""
+    """The problem with faces that fit each other whatever the rotation."""
     none = np.zeros_like(problem.clearance)
     return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
 

@@ -58,7 +58,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Iterated:
-    """What an iteration returns, converged or not."""
+    """Result of an iteration, converged or not."""
 
     method: str
     # (H, n) platform motion [m]

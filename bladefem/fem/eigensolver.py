@@ -344,8 +344,8 @@ def _rough_pairs(
     X: np.ndarray,
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the space of the iteration holds in addition to the converged vectors, by Rayleigh and
-    Ritz.
+    """Eigenvalues [rad^2/s^2] and vectors that the space of the iteration holds in addition to the
+    converged ones, ``count`` at most, by Rayleigh and Ritz.
     """
     con = pencil.con
     MX = apply_block(con.M, X)

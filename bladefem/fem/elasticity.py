@@ -150,7 +150,9 @@ def stress_of(
 
 
 def _with_point_axes(values: np.ndarray, temperature: np.ndarray | None, axes: int) -> np.ndarray:
-    """The same with the axes of the temperatures before its own last ``axes``."""
+    """Values repeated at each temperature: the axes of the temperatures, then their own last
+    ``axes``.
+    """
     if temperature is None:
         return values
     return np.broadcast_to(values, (*temperature.shape, *values.shape[values.ndim - axes :]))
@@ -186,7 +188,7 @@ def _engineering_constants(
 
 
 def _turn_stiffness(C: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """The same stiffness (..., 6, 6) in axes in which the material's own are the columns of R."""
+    """(..., 6, 6) stiffness C [Pa] turned from the material's axes, which are the columns of R."""
     full = np.empty((*C.shape[:-2], 3, 3, 3, 3))
     for i, (a, b) in enumerate(STIFFNESS_PAIRS):
         for j, (c, d) in enumerate(STIFFNESS_PAIRS):

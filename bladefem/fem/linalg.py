@@ -155,7 +155,9 @@ def solve_block(factor: Factor, B: np.ndarray) -> np.ndarray:
 
 
 def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]:
-    """The same for several matrices at once: nodal diameters that share a core share its sweeps."""
+    """A^-1 B (n_own, k) of several matrices at once: nodal diameters that share a core share its
+    sweeps.
+    """
     rims = [(f.parts, B) for f, B in systems if isinstance(f.parts, interior.Rim)]
     if len(rims) == len(systems) and all(rim.core is rims[0][0].core for rim, _ in rims):
         return interior.solve_together(rims)

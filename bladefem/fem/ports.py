@@ -135,7 +135,7 @@ def port_models(
 
 @dataclass(frozen=True)
 class _Ports:
-    """What all nodal diameters are reduced with."""
+    """Ports and number of modes with which every nodal diameter is reduced."""
 
     P: sp.spmatrix
     names: dict[str, slice]
@@ -209,8 +209,8 @@ def _interior_flexibility(
     P: sp.spmatrix,
     load: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the interior of an open sector gives: its flexibility at the ports (p, p), and the
-    ports' loads as the rim feels them (nb, p); a static load is the last column.
+    """(p, p) flexibility of an open sector's interior at the ports [m/N], and (nb, p) the ports'
+    loads as the rim feels them; a static load is the last column.
     """
     columns = [P] if load is None else [P, sp.csc_matrix(load.reshape(-1, 1))]
     F = sp.csc_matrix(opened.T.T @ sp.hstack(columns))

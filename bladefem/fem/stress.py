@@ -58,7 +58,7 @@ class GaussStress:
 
 @dataclass(frozen=True)
 class _Strain:
-    """What the gradient of a displacement says of the strain: see ``gauss_stress``."""
+    """How strain follows from the gradient of a displacement: see ``gauss_stress``."""
 
     large: bool
     heated: bool
@@ -114,7 +114,7 @@ def _stress_of_shapes(
 
 
 def _gauss_stress_of(body: Body, by_shape: list[tuple[OwnCells, list[np.ndarray]]]) -> GaussStress:
-    """What was found by shape, in the order of the body's cells."""
+    """Places, volumes and stresses by shape, put into the order of the body's cells."""
     width = max(len(best_points(some.word)[0]) for some, _ in by_shape)
     starts = dict(zip(body.material, np.cumsum([0, *_piece_counts(body)])[:-1], strict=True))
     columns: list[np.ndarray] = []
@@ -163,8 +163,8 @@ def _all_cells(
 
 
 def _for_pieces(own: OwnCells, found: list[np.ndarray], width: int) -> list[np.ndarray]:
-    """What was found in cells (nc, q, ...), for their pieces (np, width, ...): points are repeated
-    up to the width, and their volumes shared.
+    """Places, volumes and stresses of pieces (np, width, ...) from those of their cells
+    (nc, q, ...): points are repeated up to the width, and their volumes shared.
     """
     places, volume, stress = found
     again = np.arange(width) % volume.shape[1]

@@ -40,7 +40,9 @@ def _vector_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F
 
 
 def _plain_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
-    """The same by the plain kernel."""
+    """Fill forces, shares and cycles of 2-D elements by the plain kernel; returns their Jacobian
+    (n, d, K, d K).
+    """
     n, d, K = w.shape
     J = np.empty((n, d, K, d * K))
     tab = trigonometric_tables(harmonics_of(w), samples)
@@ -169,7 +171,9 @@ def _evaluate_laws(
     kernel: str,
     ramp: np.ndarray,
 ) -> Forces:
-    """The same for elements of several laws, law after law; Coulomb's with its kernels."""
+    """Harmonics of the contact forces of elements of several laws, law after law; Coulomb's by its
+    kernels.
+    """
     n, d, K = w.shape
     # raises where the samples are too few
     trigonometric_tables(harmonics_of(w), samples)

@@ -29,7 +29,8 @@ NEGLIGIBLE_STIFFNESS_SHARE = 1e-12
 
 @dataclass(frozen=True)
 class DiameterParts:
-    """What stays at all frequencies; P ports, k modes of both bodies.
+    """Modes and residual flexibility by nodal diameter, the same at all frequencies; P ports,
+    k modes of both bodies.
 
     Ports are in the order contact, blade, modes of the damper, load, probe.
     """

@@ -46,7 +46,8 @@ class ScatteredLaw:
         after: np.ndarray,
         factors: Mapping[str, np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `DamperLaw.forces`, for dampers with factors (k,) of their parameters.
+        """Forces of dampers whose parameters have factors (k,), and their derivatives, as
+        `DamperLaw.forces` gives them.
 
         Loads scale exactly: a contact under a share of the load does that share at that share of
         the motion. Other parameters count to first order.
@@ -256,8 +257,8 @@ def _find_peaks(
     wheels: LawWheels,
     band: tuple[float, float],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of each wheel: height [m] of the highest blade, its number, where [rad/s], points not solved
-    and points; by even steps, then by parabolas of 1 / height^2 at the highest point.
+    """(B,) height [m] of the highest blade of each wheel, its number, where [rad/s], points not
+    solved and points; by even steps, then by parabolas of 1 / height^2 at the highest point.
     """
     total, count = wheels.deviation.shape
     omega = np.repeat(np.linspace(*band, FIRST_LOOK_POINTS)[None], total, axis=0)

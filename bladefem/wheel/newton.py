@@ -94,7 +94,7 @@ class WheelState:
 
 @dataclass(frozen=True)
 class WheelNewton:
-    """Where Newton ended."""
+    """The last state of a run of Newton's method, and why it ended there."""
 
     state: WheelState
     iterations: int
@@ -248,7 +248,9 @@ class _Steps:
         return found, not failed
 
     def _choose_kind(self) -> None:
-        """Where the present kind took long, one that was not tried or that took least."""
+        """Take another kind of preconditioner where the present one took long: one that was not
+        tried, or the one that took least.
+        """
         taken = self.took.get(self.kind, 0)
         if taken <= MANY_PRODUCTS:
             return

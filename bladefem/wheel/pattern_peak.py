@@ -15,7 +15,7 @@ from .resonance import WheelPeak
 
 @dataclass(frozen=True)
 class PatternPeak:
-    """What a search for the highest blade found."""
+    """The highest blade of a pattern, as a search found it."""
 
     # over the band, with held means where these may be free
     held: WheelPeak

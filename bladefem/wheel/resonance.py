@@ -121,7 +121,9 @@ def find_wheel_peak(
 
 
 def _next_frequency(w: np.ndarray, a: np.ndarray) -> tuple[float | None, float]:
-    """Where the highest maximum of any blade is predicted, and its gain over the highest point."""
+    """Circular frequency [rad/s] at which the highest maximum of any blade is predicted, and its
+    relative gain over the highest point.
+    """
     if len(w) < 3:
         return None, 0.0
     y = 1 / np.maximum(a, np.finfo(float).tiny) ** 2

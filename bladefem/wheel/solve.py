@@ -353,7 +353,7 @@ def free_wheel(
 
 
 def without_contact(wheel: Wheel) -> Wheel:
-    """The same wheel with elements that carry nothing, and no damper; made once."""
+    """The wheel with elements that carry nothing, and no damper; made once."""
     if "free" not in wheel.kept:
         e = wheel.elements
         nothing = np.zeros(len(e.kt))

@@ -138,7 +138,7 @@ class Amplification:
 
     @property
     def released_change(self) -> np.ndarray:
-        """As `held_factor`: relative change of the amplification by free means."""
+        """Relative change of the amplification by free means, in the shape of `held_factor` [1]."""
         whole = self.whole if self.checked.shape[1] else self.factor
         return whole / self.held_factor - 1
 
@@ -153,15 +153,15 @@ class Amplification:
         return np.where(np.isnan(self.tuned_held), 0.0, changes)
 
     def quantile(self, load: int, share: float) -> Quantile:
-        """Of the amplification under the load with a number: the interval is that of the sample,
-        widened by what checked wheels are off the calibrated law.
+        """Quantile of the amplification under the load with a number [1]; its interval is that of
+        the sample, widened by what checked wheels are off the calibrated law.
         """
         found = quantile_interval(self.factor[load], share)
         low, high = self.calibration_bounds[load]
         return Quantile(found.value, float(low * found.low), float(high * found.high))
 
     def quantiles(self, share: float) -> list[Quantile]:
-        """Of the amplification under each load."""
+        """Quantile of the amplification under each load [1]."""
         return [self.quantile(i, share) for i in range(len(self.loads))]
 
 
