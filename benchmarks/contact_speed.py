@@ -39,7 +39,7 @@ from scipy.spatial import cKDTree
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "tests" / name) for name in ("contact", "fem")]
 
-import test_lcp as half_space  # noqa: E402
+import test_complementarity as half_space  # noqa: E402
 from structured import box  # noqa: E402
 
 from bladefem.contact.complementarity import solve_lcp  # noqa: E402

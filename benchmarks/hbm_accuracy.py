@@ -77,7 +77,7 @@ def shooting(problem: Problem, omega: float, near: Solution) -> complex:
         found = periodic_solution(system, omega, start, samples=8192)
         if not found.converged:
             raise RuntimeError(found.reason)
-        path, kt = found.flow, problem.elements.kt
+        path, kt = found.trajectory, problem.elements.kt
         moved = abs(path.w - path.force / kt - found.start.z).max(axis=0) > 1e-9 * abs(path.w).max()
         off = np.where(moved, 0.0, path.force.mean(axis=0) - near.f[:, -1, 0])
         if abs(off).max() < 1e-10 * abs(path.force).max():

@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 import bladefem
-from bladefem.damper.loops import Drive, ratio_table, spectrum, steady
+from bladefem.damper.loops import FoundationMotion, ratio_table, spectrum, steady
 from bladefem.report.zmass import draw_motions
 from bladefem.scene.toml import vary
 from bladefem.study.kinds.zmass import mass_on_foundation, press_mass, steady_motions
@@ -102,7 +102,7 @@ print(
 # %%
 for stroke in (2e-3, 1.2e-3, 0.8e-3):  # m
     found = {
-        r: steady(body, Drive(r, amplitude=(stroke, 0.0)), steps // 2, most=60)
+        r: steady(body, FoundationMotion(r, amplitude=(stroke, 0.0)), steps // 2, most=60)
         for r in ratios[1:16]
     }
     broken = {str(r): s.loops for r, s in found.items() if s.loops != r.denominator}

@@ -12,11 +12,11 @@ from bladefem.errors import InputError, suggestion
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.support import area_springs, held_letters
 
+from .parameters import MAX_CELLS
+
 if TYPE_CHECKING:
     from bladefem.scene.tables import Scene
 
-# cells; as finalise_mesh.MAX_CELLS, which counts again once the volumes are known
-MAX_CELLS = 3e6
 # faces at which a damper touches two blades
 DAMPER_FACES = ("seat_right", "damper_left", "seat_left", "damper_right")
 

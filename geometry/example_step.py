@@ -10,8 +10,8 @@ from .fillet import with_fillet
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
 from .profile import sector_profile
 from .root import root_slots
-from .sector import NO_SHROUD, PLAIN, blade_solid
-from .sector_check import check_sector
+from .sector import blade_solid
+from .sector_check import NO_SHROUD, PLAIN, check_sector
 from .session import gmsh_session
 from .shroud import shroud_block
 

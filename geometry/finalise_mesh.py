@@ -15,11 +15,9 @@ from .curving import second_order
 from .extract_arrays import Groups, extract_mesh
 from .matching import match_faces, snap_slaves
 from .mesh import Mesh, Sector
-from .parameters import MeshSize
+from .parameters import MAX_CELLS, MeshSize
 from .quality import edge_of_middle, quality_report, shape_quality, straighten_cells
 
-# cells; far beyond what one machine solves
-MAX_CELLS = 3e6
 # shape quality that asks for a second round of optimisation
 POOR_QUALITY = 0.1
 # shape quality of a tetrahedron that is refused

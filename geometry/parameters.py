@@ -15,6 +15,8 @@ from .damper_shapes import SHAPES
 from .quantity import quantity
 
 DEG = pi / 180
+# cells of a mesh; far beyond what one machine solves
+MAX_CELLS = 3e6
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud,
 from .profile import Profile, sector_profile
 from .root import root_slots
 from .section import FILLET_ANGLE, section_outline
-from .sector_check import check_sector
+from .sector_check import NO_SHROUD, PLAIN, check_sector
 from .sector_names import (
     damper_moved_inwards,
     edge_curves,
@@ -44,8 +44,6 @@ from .sizing import (
     set_sizes,
 )
 
-PLAIN = Root()
-NO_SHROUD = Shroud()
 SEATS = ("seat_left", "seat_right", "damper_left", "damper_right")
 
 

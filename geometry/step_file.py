@@ -24,7 +24,7 @@ from bladefem.errors import InputError, missing_file
 from .curving import second_order
 from .draw import boundary_centres, tie_meshes
 from .finalise_mesh import check_count
-from .fitted_wedge import fit_wedge
+from .fitted_wedge import Named, fit_wedge
 from .imported import check_extent, mesh_of_raw
 from .mesh import Mesh
 from .parameters import MeshSize, Wedge
@@ -32,8 +32,6 @@ from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
 from .session import gmsh_session, gmsh_step
 
-# (dimension, name) to entities
-Named = dict[tuple[int, str], list[int]]
 CONTACT_FACES = ("seat_left", "seat_right", "damper_left", "damper_right")
 # what to do about a file that gmsh cannot read
 STEP_REMEDY = "expected a STEP file of solids; export it anew from CAD"

@@ -114,7 +114,7 @@ def solve_lcp(
 
 
 def _unbalanced_part(missing: np.ndarray, force: np.ndarray) -> float:
-    """What is missing in the balance, relative to the largest force."""
+    """Largest force missing in the balance over the largest force [1]."""
     return float(np.abs(missing).max(initial=0.0) / (np.abs(force).max() + 1e-300))
 
 

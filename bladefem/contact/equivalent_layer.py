@@ -162,7 +162,7 @@ def _fitted(
 def _root(
     above: Callable[[np.ndarray], np.ndarray], low: np.ndarray, high: np.ndarray
 ) -> np.ndarray:
-    """Where a condition turns true between two ends, by halving."""
+    """Values at which a condition turns true between two ends, in their shape, by halving."""
     for _ in range(HALVINGS):
         middle = (low + high) / 2
         beyond = above(middle)

@@ -356,5 +356,5 @@ def _moved_shares(patch: Patch, G: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def _members(G: Sequence[sp.csr_matrix]) -> list[sp.csr_matrix]:
-    """The same groups with ones instead of shares: sums instead of means."""
+    """Matrices that sum over the groups of nodes whose means G takes: ones in place of shares."""
     return [sp.csr_matrix((np.ones_like(g.data), g.indices, g.indptr), shape=g.shape) for g in G]

@@ -11,7 +11,7 @@ from ..data import PressureMap
 
 @dataclass(frozen=True)
 class Resultant:
-    """What a face carries, as the damper feels it, in the blade's axes."""
+    """Force and moment of a face on the damper, in the blade's axes."""
 
     # (3,) [N]
     force: np.ndarray

@@ -31,19 +31,17 @@ from geometry.mesh import Mesh
 
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
-from ..fem.body import Body, assemble
-from ..fem.constraint import constrain, restrict_load
-from ..fem.flexibility import Flexibility, compliance, flexible
+from ..fem.body import Body
+from ..fem.constraint import restrict_load
+from ..fem.flexibility import Flexibility, compliance
 from ..fem.linalg import inner_products
 from ..fem.loads import body_mass, centrifugal
-from ..scene.tables import Materials
 from ..scene.units import newtons
 from ..util.arrays import RealArray
-from ..util.communicator import Communicator
 from .as_array import as_float_array
 from .complementarity import LCPSolution, held_directions, solve_lcp
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
-from .patch import initial_gap, make_patch, normal_ports, port_matrix, rigid_ports
+from .patch import initial_gap, normal_ports, port_matrix, rigid_ports
 
 # gaps over elastic displacements beyond which a load is too light to be solved for
 MAX_GAP_OVER_DISPLACEMENT = 1e4
@@ -67,13 +65,13 @@ class ContactProblem:
     flexibility: RealArray
     # (n,) gap before anything moves [m]
     clearance: RealArray
-    # (n,) gap opened by the blade's centrifugal displacement, for unit rotation
+    # (n,) gap opened by the blade's centrifugal displacement, for unit rotation [m s^2]
     blade_swell: RealArray
-    # (n,) gap opened by the damper's deformation under its load, for unit rotation
+    # (n,) gap opened by the damper's deformation under its load, for unit rotation [m s^2]
     damper_swell: RealArray
-    # (n, d) gap opened by unit rigid motions of the damper; rotations per length
+    # (n, d) gap opened by unit rigid motions of the damper [1]; rotations times a length
     rigid: RealArray
-    # (d,) centrifugal load on the damper, for unit rotation
+    # (d,) centrifugal load on the damper along these motions, for unit rotation [N s^2]
     load: RealArray
     # of the damper as meshed [kg]
     mass: float
@@ -198,27 +196,6 @@ def _check_load(
         raise InputError(f"damper_mass is {damper_mass} kg, expected a positive, finite one")
 
 
-def solve_mesh_seating(
-    mesh: Mesh,
-    material: Materials,
-    speed: float,
-    clearance: float = 0.0,
-    normal: float | None = None,
-    comm: Communicator | None = None,
-) -> list[PressureMap]:
-    """Everything from the mesh to the pressure maps of "this" and "next" in one call
-    (``solve_seating`` tells the arguments).
-
-    Assembles and factorises both bodies; keep the ContactProblem of ``contact_problem`` where more
-    states follow.
-    """
-    patches = [make_patch(mesh, name) for name in ("this", "next")]
-    diameter = 0 if "cyclic" in mesh.pairs else None
-    blade = flexible(constrain(assemble(mesh, "blade", material.blade, comm), "clamp", diameter))
-    damper = flexible(constrain(assemble(mesh, "damper", material.damper, comm), None))
-    return solve_seating(contact_problem(mesh, patches, blade, damper, clearance), speed, normal)
-
-
 def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
     """The engine axis z; for an endless row of plane blades the y axis, so that the pull is along x
     only.
@@ -239,7 +216,7 @@ def counting_sense(mesh: Mesh) -> int:
 
 
 def _fitted(problem: ContactProblem) -> ContactProblem:
-    """The same bodies with faces that fit each other whatever the rotation."""
+    """The problem with faces that fit each other whatever the rotation."""
     none = np.zeros_like(problem.clearance)
     return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
 

@@ -20,7 +20,7 @@ from bladefem.errors import InputError
 from bladefem.hbm.solution import probe_motion
 from bladefem.util.newton import Outcome, StepError, halve_step, iterate_newton
 
-from .paper import DamperResponse, Platform, balance, damper_response, equivalent, residual
+from .paper import DamperResponse, PlatformSide, balance, damper_response, equivalent, residual
 
 # growth over the free motion at which an iteration is given up
 DIVERGED_GROWTH = 1e4
@@ -58,7 +58,7 @@ class Rules:
 
 @dataclass(frozen=True)
 class Iterated:
-    """What an iteration returns, converged or not."""
+    """Result of an iteration, converged or not."""
 
     method: str
     # (H, n) platform motion [m]
@@ -90,7 +90,7 @@ class _Map:
 
     def __init__(
         self,
-        side: Platform,
+        side: PlatformSide,
         rules: Rules,
     ):
         self.side = side
@@ -127,7 +127,7 @@ class _Map:
 
 
 def iterate(
-    side: Platform,
+    side: PlatformSide,
     method: str = "amplitude",
     rules: Rules | None = None,
     start: np.ndarray | None = None,

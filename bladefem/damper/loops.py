@@ -21,7 +21,7 @@ from .zmass import MassOnFoundation, Motion, ellipse, march, pulsating_load
 
 
 @dataclass(frozen=True)
-class Drive:
+class FoundationMotion:
     """Foundation motion and normal load of Eq. 30, with an optional second direction."""
 
     # load frequency over foundation frequency, fp / fb
@@ -75,7 +75,7 @@ class Steady:
 
 def steady(
     body: MassOnFoundation,
-    drive: Drive,
+    drive: FoundationMotion,
     steps: int = 2000,
     most: int = 200,
     tolerance: float = 1e-7,
@@ -150,7 +150,7 @@ def ratio_table(
     """
     rows: list[dict[str, float | str]] = []
     for ratio in ratios:
-        result = steady(body, Drive(Fraction(ratio)), steps)
+        result = steady(body, FoundationMotion(Fraction(ratio)), steps)
         rows.append(
             {
                 "ratio": str(ratio),

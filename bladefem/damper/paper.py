@@ -34,7 +34,7 @@ from .explicit import damper_cycle, stable_steps
 
 
 @dataclass(frozen=True)
-class Platform:
+class PlatformSide:
     """The blade side at one frequency, harmonics 1..H, n contact dofs, r independent platform
     motions.
     """
@@ -72,7 +72,7 @@ def platform(
     model: ReducedModel,
     omega: float,
     harmonics: int,
-) -> Platform:
+) -> PlatformSide:
     """Flexibility and free motion of the platforms.
 
     Raises:
@@ -104,11 +104,13 @@ def platform(
         )
     rows = _independent_rows(np.column_stack([*G, *[f[:, None] for f in free]]))
     T = [np.linalg.lstsq(g[rows].T, g.T, rcond=1e-10)[0].T for g in G]
-    return Platform(model, omega, np.array(G, complex), np.array(free, complex), np.array(T), rows)
+    return PlatformSide(
+        model, omega, np.array(G, complex), np.array(free, complex), np.array(T), rows
+    )
 
 
 def damper_response(
-    side: Platform,
+    side: PlatformSide,
     u: np.ndarray,
     how: str = "shooting",
     start: State | None = None,
@@ -143,7 +145,7 @@ def damper_response(
         raise InputError(f"how = '{how}': expected 'march' or 'shooting'")
     solution = periodic_solution(system, side.omega, start, samples=max(256, 16 * H))
     return DamperResponse(
-        _harmonic_lines(solution.flow.force, H),
+        _harmonic_lines(solution.trajectory.force, H),
         solution.start,
         solution.residual,
         solution.periods,
@@ -169,7 +171,7 @@ def equivalent(
     return np.nan_to_num(fit.stiffness.T + 1j * h * omega * fit.damping.T)
 
 
-def balance(side: Platform, stiffness: np.ndarray) -> np.ndarray:
+def balance(side: PlatformSide, stiffness: np.ndarray) -> np.ndarray:
     """Platform motion (H, n) with the equivalent stiffness (H, n) on the contact dofs [m]."""
     n = side.free.shape[1]
     return np.array(
@@ -181,7 +183,7 @@ def balance(side: Platform, stiffness: np.ndarray) -> np.ndarray:
 
 
 def residual(
-    side: Platform,
+    side: PlatformSide,
     u: np.ndarray,
     force: np.ndarray,
 ) -> np.ndarray:

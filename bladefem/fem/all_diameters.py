@@ -74,7 +74,7 @@ VECTOR_TOLERANCE = 5e-6
 
 @dataclass(frozen=True)
 class _Space:
-    """What the vectors of some nodal diameters span."""
+    """The space that the vectors of some nodal diameters span, and the matrices on it."""
 
     # (n_own, at least m) memory of W, with room for more
     store: np.ndarray
@@ -127,19 +127,18 @@ def all_diameters(
     count: int,
     diameters: Sequence[int] | None = None,
     direct: bool = False,
-    prove: bool = True,
     clamp: str | None = "clamp",
     progress: Progress = without_progress,
     solver: Eigensolver = SLEPC,
     kept: KeptPairs | None = None,
 ) -> list[ModeSet]:
-    """The lowest modes in each nodal diameter.
+    """The lowest modes in each nodal diameter, counted by inertia below the highest gap that all of
+    them share.
 
     Args:
         body: a body with cut faces (held at ``clamp``), or its transformation.
         diameters: 0 to N/2 when left out.
         direct: solve every nodal diameter from scratch.
-        prove: count the eigenvalues below the highest common gap by inertia.
         progress: shows which nodal diameter is at work.
         kept: more modes are solved, more exactly, and kept here for a reduction.
 
@@ -158,11 +157,10 @@ def all_diameters(
         eigenpairs(t, solved, wanted, direct, tolerance, solver), "nodal diameters", len(wanted)
     )
     found = {p.nodal_diameter: p if kept is not None else _bare(p, count) for p in steps}
-    if prove:
-        if isinstance(body, Body) and kept is None and t.opened is not None:
-            # nobody else has them: the count takes their memory
-            t.opened.elimination.release()
-        found = _check_inertia(t, found, solved, tolerance)
+    if isinstance(body, Body) and kept is None and t.opened is not None:
+        # nobody else has them: the count takes their memory
+        t.opened.elimination.release()
+    found = _check_inertia(t, found, solved, tolerance)
     if kept is not None:
         kept.pairs.update(found)
     sets = {}
@@ -273,7 +271,8 @@ def _bare(found: Eigenpairs, count: int) -> Eigenpairs:
 
 
 def sector_span(t: Transformation, blocks: list[np.ndarray], P: sp.spmatrix) -> SectorSpan:
-    """What vectors of some nodal diameters span, for the ports of all others (collective).
+    """The space that vectors of some nodal diameters span, with its matrices and motions of the
+    ports, for the reduction of all others (collective).
 
     Args:
         blocks: (n_own, k) vectors of each of them, as this rank's unknowns.
@@ -296,7 +295,9 @@ def _first_pairs(
     count: int,
     copied: bool,
 ) -> Eigenpairs:
-    """Those wanted and the guards; a copy where the others' memory is needed for something else."""
+    """The lowest eigenpairs: ``count`` of them and the guards; a copy where the memory of the
+    others is needed for something else.
+    """
     few = slice(0, count + GUARD_MODES)
     return replace(
         found, lam=found.lam[few], X=found.X[:, few].copy(order="F") if copied else found.X
@@ -304,7 +305,9 @@ def _first_pairs(
 
 
 def _diameter_order(order: list[int]) -> list[int]:
-    """Those that guess well between them, then the others."""
+    """Nodal diameters in the order in which they are solved: first a few, between which the
+    vectors of the others are guessed well.
+    """
     first = [round(part * (len(order) - 1)) for part in FIRST_DIAMETER_PLACES] if order else []
     return [order[i] for i in dict.fromkeys([*first, *range(len(order))])]
 
@@ -506,7 +509,7 @@ def _list_eigenvalues(found: dict[int, Eigenpairs]) -> dict[int, np.ndarray]:
 
 @dataclass(frozen=True)
 class Count:
-    """What the inertia says of one nodal diameter."""
+    """Number of eigenvalues of one nodal diameter below a shift, by inertia."""
 
     # [rad^2/s^2]
     shift: float

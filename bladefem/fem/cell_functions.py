@@ -13,7 +13,7 @@ from itertools import product
 
 import numpy as np
 
-from geometry.topology import CORNERS, EDGES, FAMILY, NODES, QUADS
+from geometry.topology import CORNERS, FAMILY, NODES
 
 from ..util.arrays import RealArray
 from . import shape_functions as shape
@@ -46,13 +46,7 @@ def reference_nodes(word: str) -> RealArray:
 
 def straight_nodes(word: str, corner: RealArray) -> RealArray:
     """(k, d) nodes of a straight cell by its corners; quadrilaterals are parallelograms."""
-    family = FAMILY[word]
-    if order_of(word) == 1:
-        return corner
-    groups = [*EDGES[family], *QUADS.get(family, [])]
-    middle = [corner[list(group)].mean(axis=0) for group in groups]
-    centre = [corner.mean(axis=0)] if family == "hexahedron" else []
-    return np.array([*corner, *middle, *centre])
+    return corner if order_of(word) == 1 else shape.second_order_nodes(FAMILY[word], corner)
 
 
 def tabulate(word: str, at: RealArray) -> tuple[RealArray, RealArray]:

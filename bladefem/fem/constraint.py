@@ -34,7 +34,7 @@ from .supports import held_directions, polar_elimination
 
 @dataclass(frozen=True)
 class Transformation:
-    """What serves every nodal diameter: the two parts of T and the projected matrices."""
+    """The parts that all nodal diameters share: the two of T, and the projected matrices."""
 
     body: Body
     # T0 (n_points*dim, n_free) in mesh numbering, the same on every rank

@@ -147,6 +147,7 @@ def face_map(C: sp.csr_matrix) -> FaceMap:
 def eliminate_interior(
     A: sp.csr_matrix,
     rim: np.ndarray,
+    *,
     definite: bool = True,
     order: np.ndarray | None = None,
     keep: bool = True,
@@ -167,7 +168,10 @@ def eliminate_interior(
     A.sort_indices()
     matrix = shared_matrix(A.shape, A.indptr, A.indices, A.data)
     factor = _factorise_together(
-        lambda: factorise_matrix(matrix, definite, rim, order, keep, on_disk), shared
+        lambda: factorise_matrix(
+            matrix, definite=definite, schur=rim, order=order, keep=keep, on_disk=on_disk
+        ),
+        shared,
     )
     matrix.destroy()
     inner = np.setdiff1d(np.arange(A.shape[0]), rim)

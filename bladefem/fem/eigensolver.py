@@ -24,7 +24,13 @@ from ..errors import InputError, NotSolvedError, suggestion
 from .compat import PETSc, SLEPc, option_used
 from .constraint import Constrained
 from .lanczos import lowest_eigenpairs, orthonormal
-from .linalg import apply_block, inner_products, linear_combinations, subtract_product
+from .linalg import (
+    apply_block,
+    hermitian_part,
+    inner_products,
+    linear_combinations,
+    subtract_product,
+)
 from .memory import give_back
 
 # options that belong to SLEPc's solver and its spectral transformation
@@ -338,8 +344,8 @@ def _rough_pairs(
     X: np.ndarray,
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the space of the iteration holds in addition to the converged vectors, by Rayleigh and
-    Ritz.
+    """Eigenvalues [rad^2/s^2] and vectors that the space of the iteration holds in addition to the
+    converged ones, ``count`` at most, by Rayleigh and Ritz.
     """
     con = pencil.con
     MX = apply_block(con.M, X)
@@ -348,7 +354,7 @@ def _rough_pairs(
     basis = subtract_product(basis, [X], inner_products(con.body.comm, MX, basis))
     rest, _, _ = orthonormal(con, [X], [MX], basis, 1.0)
     lam, Z = np.linalg.eigh(
-        _hermitian_part(inner_products(con.body.comm, rest, apply_block(con.K, rest)))
+        hermitian_part(inner_products(con.body.comm, rest, apply_block(con.K, rest)))
     )
     return lam[:count], linear_combinations(rest, np.ascontiguousarray(Z[:, :count]))
 
@@ -447,19 +453,15 @@ def _purify_vectors(
     if not MQ.shape[1]:
         return np.zeros(0), MQ
     Y = inverse(MQ)
-    theta, S = np.linalg.eigh(_hermitian_part(inner_products(con.body.comm, MQ, Y)))
+    theta, S = np.linalg.eigh(hermitian_part(inner_products(con.body.comm, MQ, Y)))
     theta = theta[::-1][:wanted]
     good = theta > 0
     del MQ
     V = linear_combinations(Y, np.ascontiguousarray((S[:, ::-1][:, :wanted] / theta)[:, good]))
     del Y
     MV = apply_block(con.M, V)
-    gram = _hermitian_part(inner_products(con.body.comm, V, MV))
+    gram = hermitian_part(inner_products(con.body.comm, V, MV))
     # nearly the identity: its inverse root keeps each vector where it is
     size, Z = np.linalg.eigh(gram)
     root = (Z / np.sqrt(size)) @ Z.conj().T
     return 1 / theta[good], linear_combinations(V, np.ascontiguousarray(root))
-
-
-def _hermitian_part(A: np.ndarray) -> np.ndarray:
-    return (A + A.conj().T) / 2

@@ -31,7 +31,9 @@ from .temperature import (
 
 # stress from strain, both (dim, dim) expressions of ufl
 Law = Callable[[Any], Any]
-VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
+# axes of the six components in Voigt's order, of stiffness matrices: shear yz, zx, xy; stresses
+# are written in the order of stress.OUTPUT_PAIRS
+STIFFNESS_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (2, 0), (0, 1))
 
 
 def is_isotropic(material: Material) -> bool:
@@ -117,7 +119,7 @@ def elastic_law(
             C[i, j] = C[j, i] = form_coefficient(domain, matrices[..., i, j], degree)
 
     def law(strain: Any) -> Any:
-        e = [strain[a, b] * (1 if a == b else 2) for a, b in VOIGT_PAIRS]
+        e = [strain[a, b] * (1 if a == b else 2) for a, b in STIFFNESS_PAIRS]
         s = [sum(C[i, j] * e[j] for j in range(6)) for i in range(6)]
         return ufl.as_tensor([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
 
@@ -138,17 +140,19 @@ def stress_of(
         constants = lame_parameters(material, dim, plane, temperature)[..., None, None, :]
         trace = np.trace(strain, axis1=-2, axis2=-1)[..., None, None]
         return 2 * constants[..., 1] * strain + constants[..., 0] * trace * np.eye(dim)
-    e = np.stack([strain[..., a, b] * (1 if a == b else 2) for a, b in VOIGT_PAIRS], axis=-1)
+    e = np.stack([strain[..., a, b] * (1 if a == b else 2) for a, b in STIFFNESS_PAIRS], axis=-1)
     C = stiffness(material, temperature)
     s = e @ C if C.ndim == 2 else (e[..., None, :] @ C)[..., 0, :]
     stress = np.empty_like(strain)
-    for i, (a, b) in enumerate(VOIGT_PAIRS):
+    for i, (a, b) in enumerate(STIFFNESS_PAIRS):
         stress[..., a, b] = stress[..., b, a] = s[..., i]
     return stress
 
 
 def _with_point_axes(values: np.ndarray, temperature: np.ndarray | None, axes: int) -> np.ndarray:
-    """The same with the axes of the temperatures before its own last ``axes``."""
+    """Values repeated at each temperature: the axes of the temperatures, then their own last
+    ``axes``.
+    """
     if temperature is None:
         return values
     return np.broadcast_to(values, (*temperature.shape, *values.shape[values.ndim - axes :]))
@@ -184,12 +188,15 @@ def _engineering_constants(
 
 
 def _turn_stiffness(C: np.ndarray, R: np.ndarray) -> np.ndarray:
-    """The same stiffness (..., 6, 6) in axes in which the material's own are the columns of R."""
+    """(..., 6, 6) stiffness C [Pa] turned from the material's axes, which are the columns of R."""
     full = np.empty((*C.shape[:-2], 3, 3, 3, 3))
-    for i, (a, b) in enumerate(VOIGT_PAIRS):
-        for j, (c, d) in enumerate(VOIGT_PAIRS):
+    for i, (a, b) in enumerate(STIFFNESS_PAIRS):
+        for j, (c, d) in enumerate(STIFFNESS_PAIRS):
             for k, m in ((a, b), (b, a)):
                 full[..., k, m, c, d] = full[..., k, m, d, c] = C[..., i, j]
     turned = np.einsum("ia,jb,kc,ld,...abcd->...ijkl", R, R, R, R, full, optimize=True)
-    rows = [np.stack([turned[..., a, b, c, d] for c, d in VOIGT_PAIRS], -1) for a, b in VOIGT_PAIRS]
+    rows = [
+        np.stack([turned[..., a, b, c, d] for c, d in STIFFNESS_PAIRS], -1)
+        for a, b in STIFFNESS_PAIRS
+    ]
     return np.stack(rows, axis=-2)

@@ -34,8 +34,6 @@ class ForcedMotion:
 
     # (n_points, dim, k) complex [m]
     displacement: np.ndarray
-    # terms of the inertia series that were added
-    terms: int
 
 
 def forced_motion(
@@ -80,7 +78,7 @@ def forced_motion(
         size = _column_norms(comm, term) / np.maximum(_column_norms(comm, u), np.finfo(float).tiny)
         open_ends = (size >= SERIES_TOLERANCE) & (omega != 0)
         if not open_ends.any():
-            return ForcedMotion(expand_to_mesh(con, u), count)
+            return ForcedMotion(expand_to_mesh(con, u))
         growing = open_ends & (size > before)
         if count > 2 and growing.any():
             open_ends = growing

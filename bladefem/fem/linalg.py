@@ -115,7 +115,9 @@ def factorise(
         core = (
             A.core.core()
             if A.core is not None
-            else interior.eliminate_interior(entries(A.A), A.rim, definite, shared=A.shared)
+            else interior.eliminate_interior(
+                entries(A.A), A.rim, definite=definite, shared=A.shared
+            )
         )
         if springs is not None and A.shared is not None:
             springs = whole_part(A.shared, springs[:, None])[:, 0]
@@ -128,7 +130,7 @@ def factorise(
         added.array = np.repeat(springs, 2) if doubled else springs
         matrix.setDiagonal(added, addv=PETSc.InsertMode.ADD_VALUES)
         matrix.assemble()
-    return Factor(factorise_matrix(matrix, definite, on_disk=on_disk), doubled)
+    return Factor(factorise_matrix(matrix, definite=definite, on_disk=on_disk), doubled)
 
 
 def release(A: Matrix, factor: Factor) -> None:
@@ -153,7 +155,9 @@ def solve_block(factor: Factor, B: np.ndarray) -> np.ndarray:
 
 
 def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]:
-    """The same for several matrices at once: nodal diameters that share a core share its sweeps."""
+    """A^-1 B (n_own, k) of several matrices at once: nodal diameters that share a core share its
+    sweeps.
+    """
     rims = [(f.parts, B) for f, B in systems if isinstance(f.parts, interior.Rim)]
     if len(rims) == len(systems) and all(rim.core is rims[0][0].core for rim, _ in rims):
         return interior.solve_together(rims)
@@ -268,6 +272,11 @@ def recombine(W: np.ndarray, C: np.ndarray) -> np.ndarray:
         rows = slice(first, first + ROWS_AT_A_TIME)
         few[rows] = W[rows] @ C
     return few
+
+
+def hermitian_part(A: np.ndarray) -> np.ndarray:
+    """(A + A^H) / 2, (k, k): what rounding leaves of symmetry is removed."""
+    return (A + A.conj().T) / 2
 
 
 def inertia(A: Matrix) -> int:

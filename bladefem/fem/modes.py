@@ -242,7 +242,9 @@ def _rotation_probe(con: Constrained, width: int) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def _random_vectors(rows: int, width: int) -> np.ndarray:
-    """The same for all nodal diameters, one after the other; not to be written to."""
+    """(rows, width) normally distributed numbers, kept for the nodal diameters that follow; not to
+    be written to.
+    """
     found = np.random.default_rng(20).standard_normal((rows, width))
     found.flags.writeable = False
     return found

@@ -53,6 +53,7 @@ class Factorised:
 
 def factorise_matrix(
     A: PETSc.Mat,
+    *,
     definite: bool,
     schur: np.ndarray | None = None,
     order: np.ndarray | None = None,

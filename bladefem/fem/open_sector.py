@@ -44,7 +44,7 @@ class Opened:
 
     @property
     def shared(self) -> SharedBoundary | None:
-        """What joins the parts of several ranks."""
+        """The boundary that joins the parts of several ranks; None on one rank."""
         return self.elimination.shared
 
     @property

@@ -21,7 +21,7 @@ from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .gyroscopic import Spin, constrained_coupling
-from .linalg import apply_block, inner_products
+from .linalg import apply_block, hermitian_part, inner_products
 from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
 from .open_sector import Opened
 from .separators import reduce_load, separator_solve
@@ -135,7 +135,7 @@ def port_models(
 
 @dataclass(frozen=True)
 class _Ports:
-    """What all nodal diameters are reduced with."""
+    """Ports and number of modes with which every nodal diameter is reduced."""
 
     P: sp.spmatrix
     names: dict[str, slice]
@@ -209,8 +209,8 @@ def _interior_flexibility(
     P: sp.spmatrix,
     load: np.ndarray | None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What the interior of an open sector gives: its flexibility at the ports (p, p), and the
-    ports' loads as the rim feels them (nb, p); a static load is the last column.
+    """(p, p) flexibility of an open sector's interior at the ports [m/N], and (nb, p) the ports'
+    loads as the rim feels them; a static load is the last column.
     """
     columns = [P] if load is None else [P, sp.csc_matrix(load.reshape(-1, 1))]
     F = sp.csc_matrix(opened.T.T @ sp.hstack(columns))
@@ -240,7 +240,7 @@ def _closed_flexibility(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The flexibility (p, p) with the cut faces joined, and its last column's real part."""
     g = rim.faces.C.conj().T @ shared[1]
-    G = _hermitian_part(shared[0] + g.conj().T @ face_solve(rim, g))
+    G = hermitian_part(shared[0] + g.conj().T @ face_solve(rim, g))
     return G, G[:-1, -1].real
 
 
@@ -268,7 +268,7 @@ def _residual_flexibility(
 ) -> np.ndarray:
     """Static flexibility less that of the elastic modes kept."""
     elastic = lam > 0
-    return _hermitian_part(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
+    return hermitian_part(G - shapes[:, elastic] / lam[elastic] @ shapes[:, elastic].conj().T)
 
 
 def _craig_bampton(
@@ -287,13 +287,13 @@ def _craig_bampton(
     _, inner = elastic_pairs(flex, count, inverse=fixed, solver=solver)
     V = np.concatenate([flex.R, X, inner], axis=1)
     V = V / np.sqrt(np.abs(inner_products(comm, V, apply_block(flex.con.M, V)).diagonal()))
-    mass = _hermitian_part(inner_products(comm, V, apply_block(flex.con.M, V)))
-    stiff = _hermitian_part(inner_products(comm, V, apply_block(flex.con.K, V)))
+    mass = hermitian_part(inner_products(comm, V, apply_block(flex.con.M, V)))
+    stiff = hermitian_part(inner_products(comm, V, apply_block(flex.con.K, V)))
     size, Q = np.linalg.eigh(mass)
     # ports that repeat each other
     keep = size > 1e-12 * size[-1]
     W = Q[:, keep] / np.sqrt(size[keep])
-    lam, Z = eigh(_hermitian_part(W.conj().T @ stiff @ W))
+    lam, Z = eigh(hermitian_part(W.conj().T @ stiff @ W))
     lam[: flex.R.shape[1]] = 0.0
     return (
         np.sqrt(np.maximum(lam, 0)),
@@ -314,7 +314,7 @@ def _fixed_inverse(
     """
     comm = flex.con.body.comm
     R = flex.R
-    G = _hermitian_part(inner_products(comm, F, X))
+    G = hermitian_part(inner_products(comm, F, X))
     FR = inner_products(comm, F, R)
     saddle = np.linalg.pinv(
         np.block([[G, -FR], [FR.conj().T, np.zeros((R.shape[1],) * 2)]]), rcond=1e-11
@@ -326,7 +326,3 @@ def _fixed_inverse(
         return U - X @ both[: F.shape[1]] + R @ both[F.shape[1] :]
 
     return inverse
-
-
-def _hermitian_part(A: np.ndarray) -> np.ndarray:
-    return (A + A.conj().T) / 2

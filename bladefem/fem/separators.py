@@ -19,7 +19,7 @@ from .subdomains import Cut
 
 @dataclass(frozen=True)
 class Separators:
-    """What is between parts, eliminated."""
+    """The unknowns between the parts of several ranks, eliminated."""
 
     cut: Cut
     # (ns, ns) lower Cholesky factor of S_ss; None where only the count is wanted

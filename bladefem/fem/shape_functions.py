@@ -67,11 +67,16 @@ def reference_nodes(cell_type: str) -> np.ndarray:
     """(k, d) reference coordinates of the nodes, unit cell from 0 to 1."""
     shape, degree = SHAPES[cell_type]
     corner = np.array(_CORNERS[shape], float)
-    if degree == 1:
-        return corner
-    groups = [*EDGES[shape], *QUADS.get(shape, [])]
-    middle = [corner[list(group)].mean(0) for group in groups]
-    centre = [corner.mean(0)] if shape == "hexahedron" else []
+    return corner if degree == 1 else second_order_nodes(shape, corner)
+
+
+def second_order_nodes(family: str, corner: np.ndarray) -> np.ndarray:
+    """(k, d) nodes of a straight second-order cell by its corners (c, d): these, then the middles
+    of edges, of quadrilaterals and of a hexahedron.
+    """
+    groups = [*EDGES[family], *QUADS.get(family, [])]
+    middle = [corner[list(group)].mean(axis=0) for group in groups]
+    centre = [corner.mean(axis=0)] if family == "hexahedron" else []
     return np.array([*corner, *middle, *centre])
 
 

@@ -29,7 +29,9 @@ from .cell_functions import (
 from .elasticity import lame_parameters, stress_of
 from .temperature import point_temperatures, strain_tensor_at
 
-VOIGT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+# axes of the six components as stresses are written: shear xy, yz, zx; stiffness matrices have the
+# order of elasticity.STIFFNESS_PAIRS
+OUTPUT_PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
 # cells at a time
 CELLS_PER_BLOCK = 20000
 # of a period, for principal stresses of complex fields
@@ -54,9 +56,22 @@ class GaussStress:
     stress: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Strain:
+    """How strain follows from the gradient of a displacement: see ``gauss_stress``."""
+
+    large: bool
+    heated: bool
+
+
+# small strain of a motion about the static state
+VIBRATION = _Strain(large=False, heated=False)
+
+
 def gauss_stress(
     body: Body,
     u: np.ndarray,
+    *,
     large: bool = False,
     heated: bool = False,
 ) -> GaussStress:
@@ -73,33 +88,33 @@ def gauss_stress(
     Raises:
         InputError: the field does not fit the mesh, or a complex one with large displacements.
     """
-    return _gauss_stress_of(body, _stress_of_shapes(body, u, large, heated))
+    return _gauss_stress_of(body, _stress_of_shapes(body, u, _Strain(large, heated)))
 
 
 def gauss_and_nodal_stress(
     body: Body,
     u: np.ndarray,
+    *,
     large: bool = False,
     heated: bool = False,
 ) -> tuple[GaussStress, np.ndarray]:
     """``gauss_stress`` and ``nodal_stress`` of one field, in half the time of both."""
-    found = _stress_of_shapes(body, u, large, heated)
+    found = _stress_of_shapes(body, u, _Strain(large, heated))
     return _gauss_stress_of(body, found), _nodal_stress_of(body, found)
 
 
 def _stress_of_shapes(
     body: Body,
     u: np.ndarray,
-    large: bool,
-    heated: bool,
+    kind: _Strain,
 ) -> list[tuple[OwnCells, list[np.ndarray]]]:
     """Cells of each material and shape with places, volumes and stresses at their Gauss points."""
-    _check_field(body, u, large)
-    return [(own, _all_cells(body, u, own, large, heated)) for own in solved_cells(body)]
+    _check_field(body, u, kind)
+    return [(own, _all_cells(body, u, own, kind)) for own in solved_cells(body)]
 
 
 def _gauss_stress_of(body: Body, by_shape: list[tuple[OwnCells, list[np.ndarray]]]) -> GaussStress:
-    """What was found by shape, in the order of the body's cells."""
+    """Places, volumes and stresses by shape, put into the order of the body's cells."""
     width = max(len(best_points(some.word)[0]) for some, _ in by_shape)
     starts = dict(zip(body.material, np.cumsum([0, *_piece_counts(body)])[:-1], strict=True))
     columns: list[np.ndarray] = []
@@ -122,13 +137,13 @@ def _piece_counts(body: Body) -> list[int]:
     return [len(body.mesh.bodies[name]) for name in body.material]
 
 
-def _check_field(body: Body, u: np.ndarray, large: bool) -> None:
+def _check_field(body: Body, u: np.ndarray, kind: _Strain) -> None:
     mesh = body.mesh
     if np.shape(u)[0] != len(mesh.points) or np.shape(u)[1] < body.dim:
         raise InputError(
             f"displacement of shape {np.shape(u)}, expected ({len(mesh.points)}, {body.dim})"
         )
-    if large and np.iscomplexobj(u):
+    if kind.large and np.iscomplexobj(u):
         raise InputError("displacement is complex, expected a real one for large displacements")
     if not np.isfinite(u).all():
         raise InputError("displacement has values that are not finite")
@@ -138,19 +153,18 @@ def _all_cells(
     body: Body,
     u: np.ndarray,
     own: OwnCells,
-    large: bool,
-    heated: bool,
+    kind: _Strain,
 ) -> list[np.ndarray]:
     """Places, volumes and stresses at the Gauss points of all cells of a shape, some at a time."""
     blocks = np.array_split(own.cells, len(own.cells) // CELLS_PER_BLOCK + 1)
     u = np.asarray(u)[:, : body.dim]
-    parts = [_of_cells(body, u, own.name, own.word, some, large, heated) for some in blocks]
+    parts = [_of_cells(body, u, own.name, own.word, some, kind) for some in blocks]
     return [np.concatenate(column) for column in zip(*parts, strict=True)]
 
 
 def _for_pieces(own: OwnCells, found: list[np.ndarray], width: int) -> list[np.ndarray]:
-    """What was found in cells (nc, q, ...), for their pieces (np, width, ...): points are repeated
-    up to the width, and their volumes shared.
+    """Places, volumes and stresses of pieces (np, width, ...) from those of their cells
+    (nc, q, ...): points are repeated up to the width, and their volumes shared.
     """
     places, volume, stress = found
     again = np.arange(width) % volume.shape[1]
@@ -165,6 +179,7 @@ def _for_pieces(own: OwnCells, found: list[np.ndarray], width: int) -> list[np.n
 def nodal_stress(
     body: Body,
     u: np.ndarray,
+    *,
     large: bool = False,
     heated: bool = False,
 ) -> np.ndarray:
@@ -174,7 +189,7 @@ def nodal_stress(
     A node between two materials takes the mean of the material with the larger von Mises stress
     there.
     """
-    return _nodal_stress_of(body, _stress_of_shapes(body, u, large, heated))
+    return _nodal_stress_of(body, _stress_of_shapes(body, u, _Strain(large, heated)))
 
 
 def _nodal_stress_of(body: Body, by_shape: list[tuple[OwnCells, list[np.ndarray]]]) -> np.ndarray:
@@ -210,13 +225,13 @@ def stress_jumps(
     """(n_points,) largest von Mises stress of the differences between the cells at a node and the
     recovered stress there [Pa].
     """
-    _check_field(body, u, False)
+    _check_field(body, u, VIBRATION)
     u = np.asarray(u)[:, : body.dim]
     jumps = np.zeros(len(body.mesh.points))
     for own in solved_cells(body):
         matrix = extrapolation_matrix(own.word)
         for cells in np.array_split(own.cells, len(own.cells) // CELLS_PER_BLOCK + 1):
-            *_, stress = _of_cells(body, u, own.name, own.word, cells, False)
+            *_, stress = _of_cells(body, u, own.name, own.word, cells, VIBRATION)
             at_nodes = matrix @ stress
             np.maximum.at(jumps, cells, von_mises(at_nodes - recovered[cells]))
     return jumps
@@ -248,7 +263,9 @@ def patch_stress(
         some = o.cells[np.isin(o.cells, near[o.name]).any(axis=1)]
         if not len(some):
             continue
-        at, _, stress = _of_cells(body, np.asarray(u)[:, : body.dim], o.name, o.word, some, False)
+        at, _, stress = _of_cells(
+            body, np.asarray(u)[:, : body.dim], o.name, o.word, some, VIBRATION
+        )
         places.append(at.reshape(-1, 3)[:, : body.dim])
         stresses.append(stress.reshape(-1, 6))
         at_node.append(np.repeat((some == node).any(axis=1), at.shape[1]))
@@ -327,7 +344,7 @@ def _mises_form(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def _stress_tensor(stress: np.ndarray) -> np.ndarray:
     out = np.empty((*stress.shape[:-1], 3, 3), stress.dtype)
-    for i, (a, b) in enumerate(VOIGT_PAIRS):
+    for i, (a, b) in enumerate(OUTPUT_PAIRS):
         out[..., a, b] = out[..., b, a] = stress[..., i]
     return out
 
@@ -338,8 +355,7 @@ def _of_cells(
     name: str,
     word: str,
     cells: np.ndarray,
-    large: bool,
-    heated: bool = False,
+    kind: _Strain,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places, volumes and stresses at the Gauss points of some cells of one material."""
     mesh = body.mesh
@@ -353,19 +369,19 @@ def _of_cells(
     volume = np.abs(np.linalg.det(tangents)) * w * (mesh.depth if d == 2 else 1.0)
     slope = (turned @ u[cells][:, None]).swapaxes(2, 3) @ np.linalg.inv(tangents)
     strain = (slope + slope.swapaxes(2, 3)) / 2
-    if large:
+    if kind.large:
         strain = strain + slope.swapaxes(2, 3) @ slope / 2
     temperature = point_temperatures(body.heat, cells, values)
-    if heated and body.heat is not None and temperature is not None:
+    if kind.heated and body.heat is not None and temperature is not None:
         thermal = strain_tensor_at(body.material[name], body.heat, temperature, d)
         # Green's strain of free expansion, as in the nonlinear preload
-        strain = strain - (thermal + thermal @ thermal / 2 if large else thermal)
+        strain = strain - (thermal + thermal @ thermal / 2 if kind.large else thermal)
     stress = stress_of(body.material[name], strain, body.plane, temperature)
     across = None
     if d == 2 and body.plane == "strain":
         lam = lame_parameters(body.material[name], d, body.plane)[..., 0]
         across = lam * np.trace(strain, axis1=2, axis2=3)
-    if large:
+    if kind.large:
         F = np.eye(d) + slope
         J = np.linalg.det(F)
         stress = F @ stress @ F.swapaxes(2, 3) / J[..., None, None]
@@ -419,7 +435,7 @@ def element_stress(
 def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)
-    for i, (a, b) in enumerate(VOIGT_PAIRS):
+    for i, (a, b) in enumerate(OUTPUT_PAIRS):
         if max(a, b) < d:
             out[..., i] = stress[..., a, b]
     if across is not None:

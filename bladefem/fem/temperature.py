@@ -99,8 +99,7 @@ def evaluate_materials(
     temperature: RealArray | None,
     compute: Callable[[Material, RealArray | None], RealArray],
 ) -> RealArray:
-    """What ``compute`` finds for the material and temperatures of each cell, one array over the
-    cells.
+    """(nc, ...) values that ``compute`` gives for the material and temperatures of each cell.
 
     Args:
         compute: from temperatures (...) to values (..., *axes of one point); without temperatures

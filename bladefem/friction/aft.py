@@ -40,7 +40,9 @@ def _vector_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F
 
 
 def _plain_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
-    """The same by the plain kernel."""
+    """Fill forces, shares and cycles of 2-D elements by the plain kernel; returns their Jacobian
+    (n, d, K, d K).
+    """
     n, d, K = w.shape
     J = np.empty((n, d, K, d * K))
     tab = trigonometric_tables(harmonics_of(w), samples)
@@ -96,17 +98,21 @@ def evaluate(
     kernel: str = "vector",
     walk: np.ndarray | None = None,
 ) -> Forces:
-    """Harmonics of the contact forces for relative motion w (n, d, 2H+1) [m], sampled at
-    ``samples`` instants.
+    """Harmonics of the contact forces, sampled; the error falls as samples^-2.
 
-    load (n, samples) [N], where given, is the prescribed part of the normal load N(t) in place of
-    the constant n0. precision is that in which the derivative of 2-D elements is summed: "single"
-    is faster and leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
-    kernel is that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
-    times as slow and always in double precision. walk (n, tangents) [m], where given, is how far
-    the tangential motion goes on in each period; the mean displacement that way then has no
-    influence. The error falls as samples^-2. Forces.converged is False, with the reason, when a 2-D
-    element was not periodic after ``cycles`` periods or the motion is not finite.
+    ``Forces.converged`` is False, with the reason, when a 2-D element was not periodic after
+    ``cycles`` periods or the motion is not finite.
+
+    Args:
+        w: (n, d, 2H+1) coefficients of the relative motion [m].
+        samples: instants of a period at which the forces are taken.
+        load: (n, samples) prescribed part of the normal load N(t) [N] in place of the constant n0.
+        precision: that in which the derivative of 2-D elements is summed: "single" is faster and
+            leaves about 1e-7 of it in error, which is enough for Newton; forces are the same.
+        kernel: that of 2-D elements: "vector", or "plain", the readable definition of it, some 50
+            times as slow and always in double precision.
+        walk: (n, tangents) how far the tangential motion goes on in each period [m]; the mean
+            displacement that way then has no influence.
 
     Raises:
         InputError: shapes that do not fit, or too few samples (at least 4H+4).
@@ -165,7 +171,9 @@ def _evaluate_laws(
     kernel: str,
     ramp: np.ndarray,
 ) -> Forces:
-    """The same for elements of several laws, law after law; Coulomb's with its kernels."""
+    """Harmonics of the contact forces of elements of several laws, law after law; Coulomb's by its
+    kernels.
+    """
     n, d, K = w.shape
     # raises where the samples are too few
     trigonometric_tables(harmonics_of(w), samples)

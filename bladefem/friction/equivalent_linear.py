@@ -60,8 +60,8 @@ def from_harmonics(
     f: np.ndarray,
     omega: float,
 ) -> Approximation:
-    """The same from coefficients u, f (..., 2H+1) [mean, cos 1, sin 1, ...] (Eq. 16, factor k in
-    both sums).
+    """Least squares over one period from coefficients u, f (..., 2H+1) [mean, cos 1, sin 1, ...]
+    (Eq. 16, factor k in both sums); omega in rad/s.
     """
     u = np.asarray(u, dtype=float)
     f = np.asarray(f, dtype=float)

@@ -59,14 +59,19 @@ def evaluate_exact(
     load: np.ndarray | None = None,
     brackets: int | None = None,
 ) -> Forces:
-    """Harmonics of the contact forces of 1-D elements for relative motion w (n, 2, 2H+1) [m], exact
-    to rounding.
+    """Harmonics of the contact forces of 1-D elements, exact to rounding.
 
-    load (n, 2H+1) [N], where given, holds the coefficients of a prescribed normal load in place of
-    the constant n0. brackets is the number of intervals of a period searched for transitions, 12
-    (H+1) when left out. Raises InputError for shapes that do not fit and fewer than 4H+4 brackets.
-    Forces.converged is False where a period has more than 512 transitions, a bracket more than 25,
-    or the motion is not finite.
+    ``Forces.converged`` is False where a period has more than 512 transitions, a bracket more than
+    25, or the motion is not finite.
+
+    Args:
+        w: (n, 2, 2H+1) coefficients of the relative motion [m].
+        load: (n, 2H+1) coefficients of a prescribed normal load [N] in place of the constant n0.
+        brackets: intervals of a period searched for transitions, 12 (H+1) when left out.
+
+    Raises:
+        InputError: shapes that do not fit, more than one tangent, a law that is not Coulomb's, or
+            fewer than 4H+4 brackets.
     """
     w, nodes = check_motion(elements, w)
     n, d, K = w.shape
@@ -107,26 +112,6 @@ def evaluate_exact(
         reason == PERIODIC,
         reason,
     )
-
-
-def transitions(
-    elements: Elements,
-    w: np.ndarray,
-    brackets: int | None = None,
-) -> list[tuple[float, float, int]]:
-    """Stretches (start, end, state) of the steady period of a single 1-D element, w (1, 2, 2H+1);
-    for pictures.
-    """
-    w, nodes = check_motion(elements, w)
-    K = w.shape[2]
-    base = np.zeros(K)
-    base[0] = nodes[0, 3]
-    spans = np.empty((MOST_EVENTS, 5))
-    el = Node(*nodes[0])
-    count, _, _, _ = _steady_stretches(
-        _event_polynomials(w[0], base, el), brackets or 12 * (K // 2 + 1), spans
-    )
-    return [(float(a), float(b), int(state)) for a, b, state, _, _ in spans[: max(count, 0)]]
 
 
 @njit(**INNER_KERNEL)

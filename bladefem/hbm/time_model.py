@@ -101,10 +101,10 @@ def shooting_start(balance: Balance) -> np.ndarray:
     if not solution.converged:
         raise NotSolvedError(solution.reason)
     readings = np.stack([system.R, system.W], axis=1)[:, 2 - model.directions :]
-    lines = np.fft.rfft(solution.flow.q @ readings.reshape(-1, system.W.shape[1]).T, axis=0)[
+    lines = np.fft.rfft(solution.trajectory.q @ readings.reshape(-1, system.W.shape[1]).T, axis=0)[
         : H + 1
     ]
-    lines *= np.where(np.arange(H + 1) == 0, 1, 2)[:, None] / len(solution.flow.q)
+    lines *= np.where(np.arange(H + 1) == 0, 1, 2)[:, None] / len(solution.trajectory.q)
     return to_real(lines.T).reshape(*model.springs.shape, 2 * H + 1)
 
 

@@ -11,7 +11,7 @@ import pandas as pd
 
 from bladefem.io.stage_cache import write_table, write_text
 
-from ..scene.units import plain_number
+from ..scene.units import RPM, plain_number
 
 
 class Column(NamedTuple):
@@ -27,7 +27,6 @@ class Column(NamedTuple):
     digits: int = 5
 
 
-RPM = 60 / (2 * np.pi)
 COLUMNS = {
     "load": Column("normal load", "N"),
     "load_low": Column("load, low end", "N"),

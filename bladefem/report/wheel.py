@@ -193,8 +193,8 @@ def _free_columns(found: Amplification, load: int) -> dict[str, float]:
         return {}
     return {
         "tuned_amplitude_held": found.tuned_held[load],
-        "free_change": abs(found.free_change[load]).max(initial=0.0),
-        "kept_held": int(np.count_nonzero(~found.free[load])),
+        "free_change": abs(found.released_change[load]).max(initial=0.0),
+        "kept_held": int(np.count_nonzero(~found.mean_released[load])),
     }
 
 
@@ -432,7 +432,7 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
     for i, held in enumerate(found.tuned_held):
         if np.isnan(held):
             continue
-        known = found.free[i]
+        known = found.mean_released[i]
         if not found.is_known[i]:
             # said by `_comparison_sentences`
             continue
@@ -442,7 +442,7 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
                 "balance with free ones was found"
             )
             continue
-        change = 100 * found.free_change[i][known]
+        change = 100 * found.released_change[i][known]
         kept = np.count_nonzero(~known)
         lost = f"; {kept} of these wheels keep their amplification with held ones" if kept else ""
         said.append(

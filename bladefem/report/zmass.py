@@ -12,7 +12,7 @@ from time import perf_counter
 import numpy as np
 import pandas as pd
 
-from bladefem.damper.loops import Drive, Steady, spectrum
+from bladefem.damper.loops import FoundationMotion, Steady, spectrum
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.io.stage_cache import on_root, write_results, write_table
 from bladefem.scene.tables import Scene
@@ -41,7 +41,7 @@ class MassRun:
     folder: Path
     pressed: Pressed
     body: MassOnFoundation
-    motions: list[tuple[Drive, Steady]]
+    motions: list[tuple[FoundationMotion, Steady]]
     # stage to seconds
     timings: dict[str, float]
     messages: list[str]
@@ -70,7 +70,7 @@ def report_zmass(
     return result
 
 
-def motion_table(found: Sequence[tuple[Drive, Steady]]) -> pd.DataFrame:
+def motion_table(found: Sequence[tuple[FoundationMotion, Steady]]) -> pd.DataFrame:
     """One row a frequency ratio: loops, drift [m/s], turning speed [rad/s], amplitude at the
     foundation's frequency.
     """
@@ -103,7 +103,7 @@ def known_drift(result: Steady) -> np.ndarray:
     return np.where(abs(result.drift) > result.residual * speed, result.drift, 0.0)
 
 
-def motion_headlines(found: Sequence[tuple[Drive, Steady]]) -> list[Headline]:
+def motion_headlines(found: Sequence[tuple[FoundationMotion, Steady]]) -> list[Headline]:
     """The amplitude under each frequency of the load, and how far the mass walks."""
     numbers = []
     for (drive, result), (_, row) in zip(found, motion_table(found).iterrows(), strict=True):
@@ -124,7 +124,7 @@ def motion_headlines(found: Sequence[tuple[Drive, Steady]]) -> list[Headline]:
 
 
 def draw_motions(
-    found: list[tuple[Drive, Steady]],
+    found: list[tuple[FoundationMotion, Steady]],
     loops: Path,
     spectra: Path,
 ) -> None:

@@ -15,6 +15,8 @@ from numbers import Real
 
 from ..errors import InputError
 
+# from rad/s to revolutions a minute
+RPM = 60 / (2 * pi)
 # unit: (factor to SI, exponents of kg, m, s, rad, K)
 _UNITS = {
     "m": (1.0, (0, 1, 0, 0, 0)),

@@ -37,8 +37,8 @@ class State:
 
 
 @dataclass(frozen=True)
-class Flow:
-    """One period, or several."""
+class Trajectory:
+    """The motion over one period, or several."""
 
     # at the end
     state: State
@@ -59,7 +59,7 @@ class Flow:
 
     @property
     def monodromy(self) -> np.ndarray:
-        """``tangent`` of a flow that was asked for it."""
+        """``tangent`` of a trajectory that was asked for it."""
         if self.tangent is None:
             raise RuntimeError("the flow was integrated without its derivative")
         return self.tangent
@@ -98,7 +98,7 @@ def integrate_periods(
     samples: int = 256,
     periods: int = 1,
     tangent: bool = False,
-) -> Flow:
+) -> Trajectory:
     """Integrate over whole periods from t = 0, exactly up to rounding.
 
     Args:
@@ -139,7 +139,7 @@ def integrate_periods(
     y = np.r_[start.q, start.v, start.z]
     events, code = _integrate_steps(arrays, y, T, history, omega, (samples, parts, order))
     end = State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy())
-    return Flow(
+    return Trajectory(
         end,
         history[:, :d],
         history[:, d : 2 * d],

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..util.newton import halve_step, iterate_newton
-from .event_integrator import Flow, State, integrate_periods, stuck_start
+from .event_integrator import State, Trajectory, integrate_periods, stuck_start
 from .system import System
 
 # step share below which periods are marched instead
@@ -30,7 +30,7 @@ class Periodic:
     # base circular frequency [rad/s]
     omega: float
     # one period from the solution, with its tangent
-    flow: Flow
+    trajectory: Trajectory
     # state at t = 0
     start: State
     # change over the period over the size of the motion [1]
@@ -63,7 +63,7 @@ def periodic_solution(
     Args:
         tolerance: accepted change over one period, relative to the size of the motion.
         most: largest number of Newton steps.
-        samples: equal instants a period in the returned flow.
+        samples: equal instants a period in the returned trajectory.
     """
     shooting = _Shooting(system, omega, samples)
     run = iterate_newton(
@@ -74,13 +74,15 @@ def periodic_solution(
         most,
     )
     end = run.state
-    if end.flow.reason != "done":
-        reason = end.flow.reason
+    if end.trajectory.reason != "done":
+        reason = end.trajectory.reason
     elif run.converged:
         reason = "periodic"
     else:
         reason = f"change {run.error:.1e} over a period after {run.iterations} Newton steps"
-    return Periodic(omega, end.flow, end.start, run.error, run.iterations, shooting.periods, reason)
+    return Periodic(
+        omega, end.trajectory, end.start, run.error, run.iterations, shooting.periods, reason
+    )
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,7 @@ class _Guess:
     """A state at the start of a period, and what becomes of it."""
 
     start: State
-    flow: Flow
+    trajectory: Trajectory
     # of the unknowns
     scale: np.ndarray
     # change over the period over the size of the motion [1]
@@ -112,17 +114,17 @@ class _Shooting:
     def integrate_from(self, start: State) -> _Guess:
         """One period with its tangent."""
         self.periods += 1
-        flow = integrate_periods(self.system, self.omega, start, self.samples, tangent=True)
+        trajectory = integrate_periods(self.system, self.omega, start, self.samples, tangent=True)
         scale = _unknown_scales(self.system, self.omega, start)
-        return _Guess(start, flow, scale, _period_residual(flow, start, scale))
+        return _Guess(start, trajectory, scale, _period_residual(trajectory, start, scale))
 
     def advance_guess(self, guess: _Guess) -> _Guess:
         """After a Newton step that lowers the residual, else after some periods of marching."""
-        move = _newton_step(guess.flow, guess.start, guess.scale)
+        move = _newton_step(guess.trajectory, guess.start, guess.scale)
         better = halve_step(
             lambda share: self.integrate_from(_shift_state(guess.start, share * move)),
             lambda trial, _: (
-                _period_residual(trial.flow, trial.start, guess.scale) < 0.9 * guess.residual
+                _period_residual(trial.trajectory, trial.start, guess.scale) < 0.9 * guess.residual
             ),
             SHORTEST_STEP_SHARE,
         )
@@ -130,7 +132,7 @@ class _Shooting:
             return better
         self.periods += MARCHED_PERIODS
         marched = integrate_periods(
-            self.system, self.omega, guess.flow.state, self.samples, MARCHED_PERIODS
+            self.system, self.omega, guess.trajectory.state, self.samples, MARCHED_PERIODS
         )
         return self.integrate_from(marched.state)
 
@@ -141,7 +143,7 @@ def floquet_multipliers(solution: Periodic) -> np.ndarray:
     One multiplier equals one for each element that sticks through the whole period: a neutral shift
     of its slider.
     """
-    values = np.linalg.eigvals(solution.flow.monodromy)
+    values = np.linalg.eigvals(solution.trajectory.monodromy)
     return values[np.argsort(-np.abs(values))]
 
 
@@ -151,7 +153,7 @@ def probe_harmonics(
     highest: int,
 ) -> np.ndarray:
     """Complex harmonics 0..highest of the probe (k, highest + 1) [m], Re(c e^{j h w t})."""
-    return _fourier_rows(solution.flow.q @ system.probe.T, highest)
+    return _fourier_rows(solution.trajectory.q @ system.probe.T, highest)
 
 
 def _fourier_rows(signal: np.ndarray, highest: int) -> np.ndarray:
@@ -178,7 +180,7 @@ def _pack_state(state: State) -> np.ndarray:
 
 
 def _period_residual(
-    now: Flow,
+    now: Trajectory,
     state: State,
     scale: np.ndarray,
 ) -> float:
@@ -190,7 +192,7 @@ def _period_residual(
 
 
 def _newton_step(
-    now: Flow,
+    now: Trajectory,
     state: State,
     scale: np.ndarray,
 ) -> np.ndarray:

@@ -235,28 +235,3 @@ def damper_on_platforms(
         np.zeros((n, 1)),
         np.full((1, 1), mass**-0.5),
     )
-
-
-def friction_oscillator(
-    omega: float,
-    ratio: float,
-    kt: float,
-    limit: float,
-    force: complex,
-) -> System:
-    """One unit mass on a spring, with one friction element to the ground: the smallest system of
-    its kind.
-    """
-    zero = np.zeros((1, 3))
-    return System(
-        np.array([omega**2]),
-        np.array([[2 * ratio * omega]]),
-        np.ones((1, 1)),
-        np.array([kt]),
-        np.ones(1),
-        np.array([[0.0, force.real, -force.imag]]),
-        zero,
-        np.array([[limit, 0, 0]]),
-        np.zeros((1, 1)),
-        np.ones((1, 1)),
-    )

@@ -13,12 +13,11 @@ import numpy as np
 from ..study.backbone import Backbone
 from ..util.percent import percent
 from .response import load_colours, load_name
-from .style import canvas, log_axis
+from .style import MICRO, canvas, log_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MICRO = 1e6
 # smallest damping shown over the largest
 MIN_DAMPING_SHARE = 1e-3
 # amplitudes below this share of the highest resonance are left out of the response

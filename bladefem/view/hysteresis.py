@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 import matplotlib
 import numpy as np
 
-from .style import COLOURS, canvas
+from .style import COLOURS, MICRO, canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-MICRO = 1e6
 
 
 def loop_energy(displacement: np.ndarray, force: np.ndarray) -> float:

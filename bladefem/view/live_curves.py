@@ -13,9 +13,8 @@ from ..scene.units import newtons
 from ..util.percent import percent
 from .optimum import exact_optimum
 from .response import FOLLOWED, MARCHED, load_colours, load_name, pieces_of, smooth_curve
-from .style import COLOURS, FAILED_COLOUR
+from .style import COLOURS, FAILED_COLOUR, MICRO
 
-MICRO = 1e6
 # significant digits of numbers on the page
 SIGNIFICANT_DIGITS = 7
 SYMBOLS = ("circle", "diamond", "triangle-up", "square")

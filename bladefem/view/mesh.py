@@ -350,7 +350,7 @@ def photograph_mesh(
 
 
 def damper_pulled_inwards(mesh: Mesh, share: float = 0.07) -> Mesh:
-    """The same mesh with the damper moved inwards by a share of the height, so that the contact
+    """The mesh with the damper moved inwards by a share of the height, so that the contact
     faces can be seen.
     """
     nodes = [cells.ravel() for name, cells in mesh.bodies.items() if name.startswith("damper")]

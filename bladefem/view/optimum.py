@@ -17,12 +17,11 @@ import pandas as pd
 from ..scene.units import newton_range, newtons
 from ..util.arrays import BooleanArray
 from .response import load_name
-from .style import COLOURS, FAILED_COLOUR, canvas, log_axis
+from .style import COLOURS, FAILED_COLOUR, MICRO, canvas, log_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MICRO = 1e6
 # downwards, of the amplitude
 LONGEST_BAR = 0.9
 

@@ -11,13 +11,11 @@ from geometry.contact_pairs import SEAT_RATIO
 from geometry.parameters import HertzPair, Punch
 
 from .dimensions import draw_length, draw_note, draw_outline
+from .parts import DAMPER_COLOUR, MM
 from .style import COLOURS, canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-MM = 1e3
-DAMPER_COLOUR = "#e3cfa4"
 
 
 def draw_hertz(hertz: HertzPair, file: str | Path | None = None) -> object:

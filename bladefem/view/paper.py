@@ -16,9 +16,8 @@ from bladefem.damper.zmass import Footprint
 from bladefem.data import PressureMap
 
 from ..scene.units import newtons
-from .style import COLOURS, canvas, log_axis
+from .style import COLOURS, MICRO, canvas, log_axis
 
-MICRO = 1e6
 MILLI = 1e3
 LIMIT_LABEL = "friction limit of a seat [N]"
 

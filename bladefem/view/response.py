@@ -15,12 +15,11 @@ import pandas as pd
 from scipy.interpolate import PchipInterpolator
 
 from ..scene.units import newtons
-from .style import FAILED_COLOUR, canvas, log_axis
+from .style import FAILED_COLOUR, MICRO, canvas, log_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-MICRO = 1e6
 # methods of a row that gives the resonance in place of the balances of its curve
 MARCHED = "march in time"
 FOLLOWED = "followed to the stiff layer"

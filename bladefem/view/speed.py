@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
+from ..scene.units import RPM
 from .style import COLOURS, FAILED_COLOUR, canvas
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-RPM = 60 / (2 * np.pi)
 # not as many as colours, so that a pair comes again late
 MARKERS = "osD^vPX*<>h"
 

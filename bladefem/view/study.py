@@ -9,12 +9,10 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from .style import COLOURS, canvas, log_axis
+from .style import COLOURS, MICRO, canvas, log_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-MICRO = 1e6
 
 
 def draw_study(

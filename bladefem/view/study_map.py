@@ -9,9 +9,8 @@ import numpy as np
 import pandas as pd
 
 from ..scene.units import newtons
-from .style import COLOURS, canvas, log_axis
+from .style import COLOURS, MICRO, canvas, log_axis
 
-MICRO = 1e6
 # luminance below which white letters are read better
 DARK_LUMINANCE = 0.5
 

@@ -32,6 +32,8 @@ PNG_OPTIONS = {"compress_level": 4}
 # mark of images that are renderings
 PHOTOGRAPH = "photograph"
 FAILED_COLOUR = "#d62728"
+# from metres to micrometres
+MICRO = 1e6
 RENDER_OPTIONS = {"show_scalar_bar": False, "ambient": 0.42, "diffuse": 0.62, "specular": 0.05}
 
 STYLE: dict[str, Any] = {

@@ -10,7 +10,7 @@ a blade by the motion of the blade k places ahead: c_d = sum_k L_k e^{j 2 pi d k
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,37 +57,6 @@ def with_flow(body: PortModel, influence: np.ndarray) -> PortModel:
     return replace(
         body, omega=np.sqrt(squared), damping=damping, self_excited=bool((rate < 0).any())
     )
-
-
-def influence_of_distance(
-    count: int,
-    modes: int,
-    mode: int,
-    coefficients: Mapping[int, complex],
-) -> np.ndarray:
-    """(N, modes) `Wheel.influence` from influence coefficients of one mode.
-
-    Args:
-        coefficients: places ahead (0: the blade itself, -1: the one before) to complex stiffness
-            [1/s^2].
-
-    Raises:
-        InputError: a distance that the wheel does not have.
-    """
-    if not 0 <= mode < modes:
-        raise InputError(f"mode {mode}: expected a number from 0 to {modes - 1}")
-    d = np.arange(count)
-    found = np.zeros((count, modes), dtype=complex)
-    for distance, value in coefficients.items():
-        if int(distance) != distance or 2 * abs(distance) > count:
-            raise InputError(f"distance {distance}: expected whole places, at most half the wheel")
-        found[:, mode] += value * np.exp(2j * np.pi * d * distance / count)
-    return found
-
-
-def aerodynamic_damping(influence: np.ndarray, omega: np.ndarray) -> np.ndarray:
-    """(N, modes) damping ratios by aerodynamic stiffnesses of modes with frequencies omega."""
-    return influence.imag / (2 * omega**2)
 
 
 def limit_cycles(points: Sequence[NonlinearMode], damping: float) -> list[LimitCycle]:

@@ -20,8 +20,8 @@ from ..errors import NotSolvedError
 from ..hbm.linear.bodies import Damping
 from ..hbm.linear.woodbury import frequency_independent_parts
 from ..util.arrays import ComplexArray, RealArray, RealOrComplex
-from .deal import Deal
 from .model import Wheel
+from .partition import Partition
 
 # rigid motions that the contact springs resist less than this, relatively, are left out
 NEGLIGIBLE_STIFFNESS_SHARE = 1e-12
@@ -29,12 +29,13 @@ NEGLIGIBLE_STIFFNESS_SHARE = 1e-12
 
 @dataclass(frozen=True)
 class DiameterParts:
-    """What stays at all frequencies; P ports, k modes of both bodies.
+    """Modes and residual flexibility by nodal diameter, the same at all frequencies; P ports,
+    k modes of both bodies.
 
     Ports are in the order contact, blade, modes of the damper, load, probe.
     """
 
-    deal: Deal
+    partition: Partition
     # (D, P, P) residual flexibility with contact springs, of the D nodal diameters among 0..N/2
     # that this rank has [m/N]
     A: ComplexArray
@@ -69,8 +70,8 @@ def diameter_parts(wheel: Wheel) -> DiameterParts:
 
 
 def _made_parts(wheel: Wheel) -> DiameterParts:
-    deal = wheel.deal
-    own = range(deal.half.start, deal.half.stop)
+    partition = wheel.partition
+    own = range(partition.half.start, partition.half.stop)
     diameters = [wheel.sectors[d] for d in own]
     most = max(len(body.omega) for body in wheel.sectors.values())
     sizes = _port_sizes(wheel)
@@ -90,10 +91,10 @@ def _made_parts(wheel: Wheel) -> DiameterParts:
             for i, d in enumerate(own)
         ]
     ).reshape(N.shape)
-    U, N, mean = (deal.join(part) for part in (U, N, mean))
+    U, N, mean = (partition.join(part) for part in (U, N, mean))
     slices = [slice(int(e - s), int(e)) for s, e in zip(sizes, ends, strict=True)]
     return DiameterParts(
-        deal,
+        partition,
         A,
         _all_diameters(U, count),
         _all_diameters(N, count),
@@ -283,19 +284,19 @@ def ring_product(blocks: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def residual_product(
-    deal: Deal,
+    partition: Partition,
     A: np.ndarray,
     f: np.ndarray,
 ) -> np.ndarray:
     """(own, P, K) A_d f_d of this rank's nodal diameters from its A (D, P, P) and f (N, P, K)."""
-    forward, backward = deal.diameters
+    forward, backward = partition.diameters
     K = f.shape[2]
     # both ways of a wave at once: each A is read from memory only once
     both = np.zeros((len(A), f.shape[1], 2 * K), dtype=complex)
     both[:, :, :K] = f[forward]
-    both[deal.paired, :, K:] = f[backward][::-1].conj()
+    both[partition.paired, :, K:] = f[backward][::-1].conj()
     moved = A @ both
-    return np.concatenate([moved[:, :, :K], moved[deal.paired, :, K:][::-1].conj()])
+    return np.concatenate([moved[:, :, :K], moved[partition.paired, :, K:][::-1].conj()])
 
 
 def modal_forces(
@@ -306,7 +307,7 @@ def modal_forces(
     """(own, k, H+1) forces on the modes by forces f (N, columns, H+1) at some ports."""
     found = [
         (parts.U[some, columns].swapaxes(1, 2) @ f[some].conj()).conj()
-        for some in parts.deal.diameters
+        for some in parts.partition.diameters
     ]
     return np.concatenate(found)
 
@@ -317,7 +318,7 @@ def modal_motion(
     rows: slice,
 ) -> np.ndarray:
     """(own, rows, H+1) motions at some ports by motions of the modes q (own, k, H+1)."""
-    forward, backward = parts.deal.diameters
+    forward, backward = parts.partition.diameters
     first = forward.stop - forward.start
     return np.concatenate([parts.U[forward, rows] @ q[:first], parts.U[backward, rows] @ q[first:]])
 
@@ -332,7 +333,7 @@ def tuned_product(
     """(own, rows, H+1) motions of the tuned wheel in this rank's nodal diameters, by forces f (N,
     columns, H+1) in all.
     """
-    modal = ring_product(parts.deal.own(T), modal_forces(parts, f, columns))
+    modal = ring_product(parts.partition.own(T), modal_forces(parts, f, columns))
     out = modal_motion(parts, modal, rows)
-    out += residual_product(parts.deal, parts.A[:, rows, columns], f)
+    out += residual_product(parts.partition, parts.A[:, rows, columns], f)
     return out

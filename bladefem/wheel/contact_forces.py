@@ -59,23 +59,23 @@ def contact_forces(
         walk: (N n, tangents) how far the contacts go on in each period, which needs samples [m].
     """
     count, n, d, K = w.shape
-    deal = wheel.deal
+    partition = wheel.partition
     missing = 1 + elements.tangents - d
     flat = w.copy()
     flat[..., 0] += wheel.offset(elements, start)
-    flat = flat[deal.sectors].reshape(-1, d, K)
+    flat = flat[partition.sectors].reshape(-1, d, K)
     if missing:
         flat = np.concatenate([np.zeros((len(flat), missing, K)), flat], axis=1)
     own = elements
-    if deal.ranks > 1:
-        rows = np.arange(count * n).reshape(count, n)[deal.sectors].ravel()
+    if partition.ranks > 1:
+        rows = np.arange(count * n).reshape(count, n)[partition.sectors].ravel()
         own = select_elements(elements, rows)
         walk = None if walk is None else walk[rows]
     if samples:
         found = evaluate(own, flat, samples, jacobian, precision="single", walk=walk)
     else:
         found = evaluate_exact(own, flat)
-    f = deal.join(found.f[:, missing:].reshape(-1, n, d, K))
+    f = partition.join(found.f[:, missing:].reshape(-1, n, d, K))
     p = f - wheel.springs[:, :, None] * w
     p[..., 0] -= wheel.preload(elements)
     change = None
@@ -84,14 +84,14 @@ def contact_forces(
         diagonal = np.arange(d * K)
         blocks[:, :, diagonal, diagonal] -= np.repeat(wheel.springs, K, axis=1)
         change = blocks.reshape(-1, d * K, d * K)
-    reasons = deal.gather("" if found.converged else found.reason)
+    reasons = partition.gather("" if found.converged else found.reason)
     failed = next(filter(None, reasons), "")
     return ContactForces(
         f,
         p,
         change,
-        deal.join(found.shares.reshape(-1, n, 3)),
-        deal.join(found.dissipated.reshape(-1, n)),
+        partition.join(found.shares.reshape(-1, n, 3)),
+        partition.join(found.dissipated.reshape(-1, n)),
         not failed,
         failed or found.reason,
     )

@@ -44,11 +44,11 @@ class CoupledPreconditioner:
     def apply(self, r: np.ndarray) -> np.ndarray:
         """The approximate inverse times real coefficients r (N, m, K)."""
         parts = self.flex.parts
-        deal = parts.deal
-        own = r[deal.sectors].reshape(*self.change.shape[:2], 1)
-        forces = deal.join((self.change @ own).reshape(-1, *r.shape[1:]))
+        partition = parts.partition
+        own = r[partition.sectors].reshape(*self.change.shape[:2], 1)
+        forces = partition.join((self.change @ own).reshape(-1, *r.shape[1:]))
         push = modal_forces(parts, to_diameters(to_complex(forces)), parts.contact)
-        push = deal.join_diameters(push)
+        push = partition.join_diameters(push)
         wanted = push[:, self.modes, self.harmonics].ravel()
         right = np.concatenate([wanted.real, wanted.imag])
         real, imaginary = np.split(
@@ -56,8 +56,8 @@ class CoupledPreconditioner:
         )
         modal = np.zeros_like(push)
         modal[:, self.modes, self.harmonics] = (real + 1j * imaginary).reshape(len(push), -1)
-        moved = modal_motion(parts, deal.own(modal), parts.contact)
-        return r - to_real(from_diameters(deal.join_diameters(moved)))
+        moved = modal_motion(parts, partition.own(modal), parts.contact)
+        return r - to_real(from_diameters(partition.join_diameters(moved)))
 
 
 def make_coupled_preconditioner(
@@ -136,15 +136,15 @@ def _shape_basis(U: np.ndarray) -> RealArray:
 
 def _in_basis(flex: WheelFlexibility, change: np.ndarray, basis: np.ndarray) -> ComplexArray:
     """(N, K, K, r, r) C of each damper, forces of harmonics -H..H by the displacements of each."""
-    deal = flex.parts.deal
-    own = len(range(deal.count)[deal.sectors])
+    partition = flex.parts.partition
+    own = len(range(partition.count)[partition.sectors])
     K = 2 * flex.T.shape[1] - 1
     d = change.shape[1] // K
     n = len(basis) // d
     V = basis.reshape(n, d, -1)
     split = change.reshape(own, n, d, K, d, K)
     half = np.einsum("sndaeb,nej->sndabj", split, V, optimize=True)
-    found = deal.join(np.einsum("ndi,sndabj->sabij", V, half, optimize=True))
+    found = partition.join(np.einsum("ndi,sndabj->sabij", V, half, optimize=True))
     to, back = two_sided_maps(K // 2)
     return np.einsum("ap,spqij,qb->sabij", to, found, back, optimize=True)
 

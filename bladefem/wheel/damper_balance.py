@@ -17,7 +17,7 @@ from ..data import Elements
 from ..friction.aft import evaluate
 from ..friction.law_table import select_elements
 from ..util.arrays import BooleanArray, ComplexArray, RealArray
-from .family import Family
+from .family import ModeFamily
 from .model import Pattern, Wheel
 
 # Newton steps, and the relative residual at the end
@@ -59,7 +59,7 @@ class DamperMotion:
         return DamperMotion(displacement, force, residual)
 
 
-def stuck_displacements(wheel: Wheel, family: Family, imposed: np.ndarray) -> ComplexArray:
+def stuck_displacements(wheel: Wheel, family: ModeFamily, imposed: np.ndarray) -> ComplexArray:
     """(B, m, H) displacements with all contacts sticking, for imposed ones (B, m) [m]."""
     springs = wheel.springs.ravel()
     first = np.linalg.solve(np.eye(len(springs)) + family.flexibility[0] * springs, imposed.T).T
@@ -77,7 +77,7 @@ def with_harmonics(displacement: np.ndarray, harmonics: int) -> ComplexArray:
 def solve_damper(
     wheel: Wheel,
     e: Elements,
-    family: Family,
+    family: ModeFamily,
     imposed: np.ndarray,
     start: np.ndarray,
     samples: int,
@@ -119,7 +119,7 @@ def solve_damper(
 
 
 def _residual(
-    family: Family,
+    family: ModeFamily,
     w: np.ndarray,
     force: np.ndarray,
     imposed: np.ndarray,

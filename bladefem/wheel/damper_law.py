@@ -25,7 +25,7 @@ from ..errors import InputError, NotSolvedError
 from ..friction.law_table import select_elements
 from ..util.arrays import ComplexArray, RealArray
 from .damper_balance import DamperMotion, solve_damper, stuck_displacements
-from .family import Family
+from .family import ModeFamily
 from .law_kernel import GHOST_POINTS, evaluate_law
 from .model import Wheel
 
@@ -60,7 +60,7 @@ class DamperLaw:
 
 def damper_law(
     wheel: Wheel,
-    family: Family,
+    family: ModeFamily,
     sizes: tuple[float, float],
     samples: int,
     elements: Elements | None = None,
@@ -108,7 +108,7 @@ def law_harmonics(displacements: int, wanted: int) -> int:
     return max(1, min(wanted, MOST_UNKNOWNS // (2 * displacements)))
 
 
-def pairs_of_motions(family: Family) -> ComplexArray:
+def pairs_of_motions(family: ModeFamily) -> ComplexArray:
     """(B, m) displacements of the contacts by all pairs of amplitudes of size 1 in the table."""
     ratio = np.linspace(0, np.pi / 2, TABLE_RATIOS)
     phase = 2 * np.pi * np.arange(TABLE_PHASES) / TABLE_PHASES
@@ -118,7 +118,7 @@ def pairs_of_motions(family: Family) -> ComplexArray:
     return np.asarray(np.outer(before, family.before) + np.outer(after, family.after))
 
 
-def forces_on_blades(family: Family, found: DamperMotion) -> ComplexArray:
+def forces_on_blades(family: ModeFamily, found: DamperMotion) -> ComplexArray:
     """(2, B) first harmonics of the modal forces on the blade before the damper and after it."""
     force = found.force[:, :, 0]
     return np.array([force @ family.before, force @ family.after])
@@ -127,7 +127,7 @@ def forces_on_blades(family: Family, found: DamperMotion) -> ComplexArray:
 def _one_size(
     wheel: Wheel,
     e: Elements,
-    family: Family,
+    family: ModeFamily,
     imposed: np.ndarray,
     starts: tuple[np.ndarray, np.ndarray],
     samples: int,

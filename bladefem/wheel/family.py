@@ -17,7 +17,7 @@ from .tuned import travelling_order
 
 
 @dataclass(frozen=True)
-class Family:
+class ModeFamily:
     """One family of modes of the tuned wheel, in coordinates a of the blade readings; N sectors."""
 
     # (N,) nodal diameters 0..N-1: circular frequency [rad/s], viscous damping [1/s], loss term
@@ -44,7 +44,7 @@ class Family:
     at: float
 
 
-def family_of_modes(wheel: Wheel, omega: float, mode: int = 0, harmonics: int = 1) -> Family:
+def family_of_modes(wheel: Wheel, omega: float, mode: int = 0, harmonics: int = 1) -> ModeFamily:
     """The family of one mode of the order's nodal diameter: in all others the mode whose blade
     moves most alike.
 
@@ -85,7 +85,7 @@ def family_of_modes(wheel: Wheel, omega: float, mode: int = 0, harmonics: int = 
     flexibility += [
         _contact_flexibility(wheel, h * order % count, h * omega) for h in range(2, harmonics + 1)
     ]
-    return Family(
+    return ModeFamily(
         values["omega"],
         values["viscous"],
         values["hysteretic"],

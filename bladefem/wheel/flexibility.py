@@ -60,10 +60,10 @@ class WheelFlexibility:
         out = tuned_product(parts, self.T, f, rows, columns)
         if len(self.factors):
             read = tuned_product(parts, self.T, f, self.deviating, columns)
-            y = from_diameters(parts.deal.join_diameters(read))
+            y = from_diameters(parts.partition.join_diameters(read))
             z = to_diameters(self.deviation_forces(y))
             out -= tuned_product(parts, self.T, z, rows, self.deviating)
-        out = parts.deal.join_diameters(out)
+        out = parts.partition.join_diameters(out)
         if not self.coupled:
             out[:, :, 0] = 0.0
         return from_diameters(out)
@@ -141,7 +141,7 @@ def _reading_matrix(
     count = len(T)
     U = parts.U[:, rows]
     blocks = U @ T[:, h] @ U.conj().swapaxes(1, 2)
-    half = parts.deal.join(parts.A[:, rows, rows])
+    half = parts.partition.join(parts.A[:, rows, rows])
     blocks += np.concatenate([half, half[count - len(half) : 0 : -1].conj()])
     by_distance = np.fft.ifft(blocks, axis=0)
     sectors = np.arange(count)

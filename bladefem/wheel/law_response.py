@@ -17,8 +17,9 @@ import numpy as np
 from ..util.arrays import RealArray
 from ..util.curve_extremum import parabola_at_middle
 from .damper_law import DamperLaw
-from .family import Family
+from .family import ModeFamily
 from .model import Pattern
+from .resonance import SAME_POINT
 from .statistics import Amplification, no_checks
 
 # wheels solved together: matrices of 72 x 72 numbers
@@ -29,8 +30,6 @@ MAX_HALVINGS = 6
 # frequencies of the first look, and times that the highest point is closed in on
 FIRST_LOOK_POINTS = 61
 PEAK_ROUNDS = 4
-# relative distance of points that are the same
-SAME_POINT = 1e-7
 
 
 @dataclass(frozen=True)
@@ -47,7 +46,8 @@ class ScatteredLaw:
         after: np.ndarray,
         factors: Mapping[str, np.ndarray],
     ) -> tuple[np.ndarray, np.ndarray]:
-        """As `DamperLaw.forces`, for dampers with factors (k,) of their parameters.
+        """Forces of dampers whose parameters have factors (k,), and their derivatives, as
+        `DamperLaw.forces` gives them.
 
         Loads scale exactly: a contact under a share of the load does that share at that share of
         the motion. Other parameters count to first order.
@@ -69,10 +69,10 @@ class ScatteredLaw:
 class LawWheels:
     """A batch of wheels; B wheels of N blades."""
 
-    family: Family
+    family: ModeFamily
     law: ScatteredLaw
     # (B, N) dynamic stiffness of each blade's deviation in the family's reading at the frequency
-    # `Family.at` [1/s^2]
+    # `ModeFamily.at` [1/s^2]
     deviation: RealArray
     # parameter to factors (B, N) of each damper
     factors: Mapping[str, RealArray]
@@ -93,11 +93,11 @@ class LawWheels:
 
 
 def pattern_deviations(
-    patterns: Sequence[Pattern], family: Family, count: int
+    patterns: Sequence[Pattern], family: ModeFamily, count: int
 ) -> tuple[np.ndarray, np.ndarray | None]:
     """(B, N) dynamic stiffness of the deviations in the family's reading at the frequency
-    `Family.at`, to whose forces all other modes of the blade give way, and their mass there; None
-    where no mass deviates.
+    `ModeFamily.at`, to whose forces all other modes of the blade give way, and their mass there;
+    None where no mass deviates.
     """
     y = family.readings
     found = np.zeros((len(patterns), count))
@@ -166,7 +166,7 @@ def _solve_batch(
     return a, _error(z, r, a) <= RESIDUAL_TOLERANCE
 
 
-def _impedance(family: Family, omega: np.ndarray) -> np.ndarray:
+def _impedance(family: ModeFamily, omega: np.ndarray) -> np.ndarray:
     """(B, N) of the nodal diameters, over the squared readings."""
     w = omega[:, None]
     z = family.omega**2 - w**2 + 1j * (w * family.viscous + family.hysteretic)
@@ -257,8 +257,8 @@ def _find_peaks(
     wheels: LawWheels,
     band: tuple[float, float],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of each wheel: height [m] of the highest blade, its number, where [rad/s], points not solved
-    and points; by even steps, then by parabolas of 1 / height^2 at the highest point.
+    """(B,) height [m] of the highest blade of each wheel, its number, where [rad/s], points not
+    solved and points; by even steps, then by parabolas of 1 / height^2 at the highest point.
     """
     total, count = wheels.deviation.shape
     omega = np.repeat(np.linspace(*band, FIRST_LOOK_POINTS)[None], total, axis=0)
@@ -286,7 +286,7 @@ def _find_peaks(
     )
 
 
-def _sizes(family: Family, a: np.ndarray) -> np.ndarray:
+def _sizes(family: ModeFamily, a: np.ndarray) -> np.ndarray:
     """(..., N) amplitudes at the probes of the blades [m]."""
     return abs(np.fft.ifft(np.fft.fft(a, axis=-1) * family.probe, axis=-1))
 

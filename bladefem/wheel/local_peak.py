@@ -94,7 +94,7 @@ class LocalBalances:
 
 
 def _walk_alike(one: WheelSolution, other: WheelSolution) -> bool:
-    """The same dampers walk, some of them."""
+    """True where some dampers walk, and the same ones in both solutions."""
     if one.walk is None or other.walk is None:
         return False
     return bool((one.walk.dampers == other.walk.dampers).all())

@@ -20,7 +20,7 @@ from ..reduction.assemble import pair_model
 from ..util.arrays import RealArray, RealOrComplex
 from ..util.communicator import Communicator
 from .aerodynamics import with_flow
-from .deal import Deal
+from .partition import Partition
 
 
 @dataclass(frozen=True)
@@ -122,9 +122,9 @@ class Wheel:
         _check_wheel(self)
 
     @cached_property
-    def deal(self) -> Deal:
+    def partition(self) -> Partition:
         """The part of this rank."""
-        return Deal(self.count, self.comm)
+        return Partition(self.count, self.comm)
 
     @cached_property
     def nodes(self) -> int:

@@ -43,8 +43,6 @@ TRIAL_TOLERANCE = 0.1
 FEW_COEFFICIENTS = 3
 # reduction of the residual by one step that needs no further test
 QUADRATIC_REDUCTION = 1e-2
-# weight of the mean in the residual that the line search lowers
-MEAN_WEIGHT = 1e-2
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-8
 # full steps: at most; error over the lowest one, and error, from which they diverge
@@ -96,7 +94,7 @@ class WheelState:
 
 @dataclass(frozen=True)
 class WheelNewton:
-    """Where Newton ended."""
+    """The last state of a run of Newton's method, and why it ended there."""
 
     state: WheelState
     iterations: int
@@ -106,17 +104,13 @@ class WheelNewton:
     reason: str
 
 
-def evaluate_wheel(
-    balance: WheelBalance,
-    w: np.ndarray,
-    jacobian: bool = True,
-) -> WheelState:
+def evaluate_wheel(balance: WheelBalance, w: np.ndarray) -> WheelState:
     """Forces and residual at w (N, n, d, K)."""
     walk = balance.walk
     ramp = None if walk is None else walk.ramp(walk.steps(w))
-    forces = _forces(balance, w, jacobian, ramp)
+    forces = _forces(balance, w, True, ramp)
     rates = None
-    if walk is not None and jacobian:
+    if walk is not None:
         rates = walk_rates(walk, w, forces.f, lambda moved: _forces(balance, w, False, moved).f)
     residual = w - balance.stuck + contact_motions(balance.flex, forces.p)
     return WheelState(w, forces, residual, _error(w, residual, balance.stuck), rates)
@@ -131,8 +125,9 @@ def _forces(
 
 
 def _error(w: np.ndarray, residual: np.ndarray, stuck: np.ndarray) -> float:
-    """Of the mean over the displacements, of the motion over the motion: means of dampers that
-    drift are larger by orders, and would hide a motion that is not found.
+    """Relative residual; that of the means is over the displacements, that of the motion over the
+    motion: means of dampers that drift are larger by orders, and would hide a motion that is not
+    found.
     """
     tiny = np.finfo(float).tiny
     mean = np.linalg.norm(residual[..., 0])
@@ -153,20 +148,16 @@ def newton_wheel(
     balance: WheelBalance,
     w: np.ndarray,
     options: Options,
-    merit: str = "step",
 ) -> WheelNewton:
-    """Solve the balance from the displacements w (N, n, d, K).
-
-    Args:
-        merit: what the line search lowers: "step", the step that the last derivative would take
-            next, which does not depend on how the equations are scaled (Deuflhard, Newton Methods
-            for Nonlinear Problems, 2004, Sect. 3.3), or "residual", which costs no more solves.
+    """Solve the balance from the displacements w (N, n, d, K), by a line search that lowers the
+    step which the last derivative would take next: it does not depend on how the equations are
+    scaled (Deuflhard, Newton Methods for Nonlinear Problems, 2004, Sect. 3.3).
     """
     steps = _Steps(balance)
     run = iterate_newton(
         evaluate_wheel(balance, w),
         _error_of_state,
-        lambda state: _line_search(balance, state, steps, merit),
+        lambda state: _line_search(balance, state, steps),
         options.tolerance,
         options.iterations,
     )
@@ -257,7 +248,9 @@ class _Steps:
         return found, not failed
 
     def _choose_kind(self) -> None:
-        """Where the present kind took long, one that was not tried or that took least."""
+        """Take another kind of preconditioner where the present one took long: one that was not
+        tried, or the one that took least.
+        """
         taken = self.took.get(self.kind, 0)
         if taken <= MANY_PRODUCTS:
             return
@@ -303,15 +296,15 @@ class _Steps:
         shape = state.residual.shape
         flat = (shape[0], -1, shape[3])
         change = state.forces.jacobian
-        deal = self.balance.wheel.deal
+        partition = self.balance.wheel.partition
         walk = self.balance.walk
         prepare = (self.preconditioner or self._renew(state)).apply
 
         def product(y: np.ndarray) -> np.ndarray:
             self.products += 1
             x = prepare(y.reshape(flat))
-            own = x[deal.sectors].reshape(*change.shape[:2], 1)
-            forces = deal.join((change @ own).reshape(-1, *shape[1:]))
+            own = x[partition.sectors].reshape(*change.shape[:2], 1)
+            forces = partition.join((change @ own).reshape(-1, *shape[1:]))
             if walk is not None and state.rates is not None:
                 steps = walk.steps(x.reshape(shape))
                 forces = forces + np.einsum("zsndk,sz->sndk", state.rates, steps)
@@ -337,9 +330,9 @@ def _line_search(
     balance: WheelBalance,
     state: WheelState,
     steps: _Steps,
-    merit: str,
 ) -> WheelState | None:
-    """The first halving of the step that lowers the merit, or None where it stalls.
+    """The state after the first halving of the step from which the next one is shorter, or None
+    where there is none.
 
     Raises:
         StepError: the step is not finite, or GMRES did not converge and the step leads nowhere.
@@ -348,28 +341,17 @@ def _line_search(
     if not np.isfinite(step).all():
         raise StepError(Outcome.SINGULAR, "the Newton step is not finite")
     before = np.linalg.norm(step)
-    weighted = _moving_first(state.residual)
 
-    def lowers_merit(trial: WheelState, share: float) -> bool:
+    def comes_closer(trial: WheelState, share: float) -> bool:
         if trial.error <= QUADRATIC_REDUCTION * state.error:
             return True
-        if merit == "residual":
-            return bool(_moving_first(trial.residual) <= (1 - 1e-4 * share) * weighted)
         return bool(steps.next_length(state, trial.residual) <= (1 - 0.25 * share) * before)
 
     better = halve_step(
         lambda share: evaluate_wheel(balance, state.w - share * step),
-        lowers_merit,
+        comes_closer,
         SHORTEST_STEP_SHARE,
     )
     if better is None and not solved:
         raise StepError(Outcome.SINGULAR, f"GMRES did not converge at residual {state.error:.1e}")
     return better
-
-
-def _moving_first(residual: np.ndarray) -> float:
-    """Size of a residual in which the mean counts little: dampers that slip throughout drift far on
-    nearly no force.
-    """
-    mean = np.linalg.norm(residual[..., 0])
-    return float(np.hypot(np.linalg.norm(residual[..., 1:]), MEAN_WEIGHT * mean))

@@ -48,7 +48,7 @@ class BladeDeviations:
 
 
 def frequency_deviations(values: np.ndarray) -> BladeDeviations:
-    """Those of frequencies (N, q) alone."""
+    """Deviations of the blade-alone frequencies (N, q) [1], with nominal stiffness and mass."""
     return BladeDeviations(values, np.zeros_like(values), np.zeros_like(values))
 
 
@@ -121,7 +121,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
 
 
 def _quantity(name: str) -> str:
-    """What a column deviates in: a word of its name, be it followed by a unit.
+    """The quantity that deviates in a column: a word of its name, be it followed by a unit.
 
     Raises:
         InputError: a word is nearly stiffness or mass; as a frequency it would be another wheel.

@@ -15,7 +15,7 @@ from .resonance import WheelPeak
 
 @dataclass(frozen=True)
 class PatternPeak:
-    """What a search for the highest blade found."""
+    """The highest blade of a pattern, as a search found it."""
 
     # over the band, with held means where these may be free
     held: WheelPeak
@@ -44,7 +44,7 @@ class ComparedPeaks:
     # (W,) amplification with held means [1]
     held_factor: RealArray
     # (W,) True where that with free ones is known
-    free: BooleanArray
+    mean_released: BooleanArray
 
 
 def compared_peaks(heights: np.ndarray) -> ComparedPeaks:

@@ -43,16 +43,16 @@ class Preconditioner:
         """The approximate inverse times real coefficients r (N, m, K)."""
         parts = self.flex.parts
         amplitudes = to_complex(r)
-        deal = parts.deal
+        partition = parts.partition
         push = modal_forces(parts, to_diameters(self.forces(amplitudes)), parts.contact)
-        push = deal.join_diameters(push)
+        push = partition.join_diameters(push)
         modal = (self.by_diameter @ push.swapaxes(1, 2)[..., None])[..., 0].swapaxes(1, 2)
         for h, (kept, factors) in self.dense.items():
             found = linalg.lu_solve(factors, push[:, kept, h].ravel(), check_finite=False)
             modal[:, :, h] = 0.0
             modal[:, kept, h] = found.reshape(len(push), -1)
-        moved = modal_motion(parts, deal.own(modal), parts.contact)
-        return r - to_real(from_diameters(deal.join_diameters(moved)))
+        moved = modal_motion(parts, partition.own(modal), parts.contact)
+        return r - to_real(from_diameters(partition.join_diameters(moved)))
 
     def forces(self, amplitudes: np.ndarray) -> np.ndarray:
         """(N, m, H+1) forces of C by displacements (N, m, H+1)."""
@@ -70,9 +70,9 @@ def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Precondit
     harmonics = flex.T.shape[1]
     count = len(flex.T)
     parts = flex.parts
-    deal = parts.deal
-    C = deal.join(_harmonic_part(change, harmonics), axis=1)
-    U = deal.own(parts.U[:, parts.contact])
+    partition = parts.partition
+    C = partition.join(_harmonic_part(change, harmonics), axis=1)
+    U = partition.own(parts.U[:, parts.contact])
     by_diameter = np.zeros_like(flex.T)
     dense = {}
     for h in range(harmonics):
@@ -85,8 +85,10 @@ def make_preconditioner(flex: WheelFlexibility, change: np.ndarray) -> Precondit
         mean = C[h].reshape(count, -1, *C.shape[2:]).mean(axis=0)
         moved = (mean @ U.reshape(len(U), *mean.shape[:2], U.shape[2])).reshape(U.shape)
         stiff = U.conj().swapaxes(1, 2) @ moved
-        T = deal.own(flex.T[:, h])
-        by_diameter[:, h] = deal.join_diameters(T @ np.linalg.inv(np.eye(T.shape[1]) + stiff @ T))
+        T = partition.own(flex.T[:, h])
+        by_diameter[:, h] = partition.join_diameters(
+            T @ np.linalg.inv(np.eye(T.shape[1]) + stiff @ T)
+        )
     return Preconditioner(flex, C, by_diameter, dense)
 
 
@@ -120,7 +122,7 @@ def _dense_factors(
     k = len(kept)
     U = parts.U[:, parts.contact][:, :, kept]
     turned = U.conj().swapaxes(1, 2)
-    shifts = range(count)[parts.deal.sectors]
+    shifts = range(count)[parts.partition.sectors]
     spectrum = np.fft.fft(C, axis=0) / count
     readings = parts.U[:, flex.deviating][:, :, kept]
     deviations = np.fft.fft(flex.E[h], axis=0) / count if len(flex.factors) else None
@@ -137,7 +139,7 @@ def _dense_factors(
             block += tuned
         blocks[i] = block
     system = np.empty((count, k, count, k), dtype=complex)
-    for shift, block in enumerate(parts.deal.join(blocks)):
+    for shift, block in enumerate(parts.partition.join(blocks)):
         system[(diameters + shift) % count, :, diameters] = block
     return linalg.lu_factor(
         system.reshape(count * k, count * k), overwrite_a=True, check_finite=False

@@ -45,8 +45,6 @@ class WheelPeak:
     sizes: np.ndarray
     # points that were not solved, which the peak leaves out
     unsolved: int
-    # predicted gain of height that was not looked for
-    gain: float
 
     @property
     def closed_in(self) -> bool:
@@ -99,7 +97,6 @@ def find_wheel_peak(
         raise InputError(f"grid of {len(grid)} frequencies: expected at least 3, ascending")
     omegas = [float(w) for w in grid]
     sizes = [respond(w) for w in omegas]
-    gain = 0.0
     for _ in range(MAX_ADDED_POINTS + 1):
         order = np.argsort(omegas)
         w = np.array(omegas)[order]
@@ -120,12 +117,13 @@ def find_wheel_peak(
         w,
         a,
         int((~solved).sum()),
-        float(gain),
     )
 
 
 def _next_frequency(w: np.ndarray, a: np.ndarray) -> tuple[float | None, float]:
-    """Where the highest maximum of any blade is predicted, and its gain over the highest point."""
+    """Circular frequency [rad/s] at which the highest maximum of any blade is predicted, and its
+    relative gain over the highest point.
+    """
     if len(w) < 3:
         return None, 0.0
     y = 1 / np.maximum(a, np.finfo(float).tiny) ** 2

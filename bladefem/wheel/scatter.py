@@ -54,7 +54,7 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Draws:
-    """What was drawn for W wheels of N sectors."""
+    """Random deviations of W wheels of N sectors."""
 
     # (W, N) relative deviations of the blades, in the unit of their pattern
     blades: RealArray

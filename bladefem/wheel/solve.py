@@ -11,12 +11,13 @@ from ..data import Elements
 from ..errors import InputError, NotSolvedError
 from ..friction.fourier import to_complex, to_real
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
+from ..hbm.solver.walking import WALK_SAMPLES
 from ..util.arrays import ComplexArray, RealArray
 from .flexibility import WheelFlexibility, wheel_flexibility
 from .model import Pattern, Wheel, pattern_elements
 from .newton import WheelBalance, WheelNewton, evaluate_wheel, full_newton, newton_wheel
 from .tuned import tuned_displacements
-from .walking import WheelWalk, slipping_dampers, walking_motions
+from .walking import WheelWalk, slipping_dampers, unheld_motions
 
 TUNED_PATTERN = Pattern()
 # modal damping ratios within which a solved neighbour is the best start: resonances of a mistuned
@@ -35,8 +36,6 @@ HOMOTOPY_POINTS = 60
 WALK_ROUNDS = 10
 UNDECIDED_SHARE = 0.3
 MOST_UNDECIDED = 2
-# samples for each harmonic of a walk where transitions were to be located exactly
-WALK_SAMPLES = 64
 
 
 @dataclass(frozen=True)
@@ -120,7 +119,7 @@ def solve_wheel(
     balance = WheelBalance(
         wheel, flex, elements, first, stuck, samples, most_products=most_products
     )
-    motions = walking_motions(wheel)
+    motions = unheld_motions(wheel)
     if motions.shape[2]:
         found = _walking(balance, motions, start, options)
         if found is not None:
@@ -354,7 +353,7 @@ def free_wheel(
 
 
 def without_contact(wheel: Wheel) -> Wheel:
-    """The same wheel with elements that carry nothing, and no damper; made once."""
+    """The wheel with elements that carry nothing, and no damper; made once."""
     if "free" not in wheel.kept:
         e = wheel.elements
         nothing = np.zeros(len(e.kt))

@@ -100,7 +100,7 @@ class Amplification:
     # (L, C) of the wheels that were checked, (L, W) where all are whole: amplification with held
     # means of both, and whether the one with free means is known, which then counts
     held_factor: RealArray = field(default_factory=lambda: np.zeros((0, 0)))
-    free: BooleanArray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
+    mean_released: BooleanArray = field(default_factory=lambda: np.zeros((0, 0), dtype=bool))
 
     @property
     def check_errors(self) -> np.ndarray:
@@ -137,31 +137,31 @@ class Amplification:
         return self.peak / self.tuned[:, None]
 
     @property
-    def free_change(self) -> np.ndarray:
-        """As `held_factor`: relative change of the amplification by free means."""
+    def released_change(self) -> np.ndarray:
+        """Relative change of the amplification by free means, in the shape of `held_factor` [1]."""
         whole = self.whole if self.checked.shape[1] else self.factor
         return whole / self.held_factor - 1
 
     @property
-    def free_effect(self) -> np.ndarray:
+    def released_effect(self) -> np.ndarray:
         """(L,) largest relative change of an amplitude by free means, of the tuned wheel and of
         those solved in full; zero where means are held.
         """
         tuned = (self.tuned / self.tuned_held)[:, None]
-        others = tuned * np.where(self.free, 1 + self.free_change, 1.0)
+        others = tuned * np.where(self.mean_released, 1 + self.released_change, 1.0)
         changes = abs(np.hstack([tuned, others]) - 1).max(axis=1)
         return np.where(np.isnan(self.tuned_held), 0.0, changes)
 
     def quantile(self, load: int, share: float) -> Quantile:
-        """Of the amplification under the load with a number: the interval is that of the sample,
-        widened by what checked wheels are off the calibrated law.
+        """Quantile of the amplification under the load with a number [1]; its interval is that of
+        the sample, widened by what checked wheels are off the calibrated law.
         """
         found = quantile_interval(self.factor[load], share)
         low, high = self.calibration_bounds[load]
         return Quantile(found.value, float(low * found.low), float(high * found.high))
 
     def quantiles(self, share: float) -> list[Quantile]:
-        """Of the amplification under each load."""
+        """Quantile of the amplification under each load [1]."""
         return [self.quantile(i, share) for i in range(len(self.loads))]
 
 
@@ -245,7 +245,7 @@ def _statistics_of_load(
         *no_checks(1),
         tuned_held=np.array([compared.tuned_held]),
         held_factor=compared.held_factor[None],
-        free=compared.free[None],
+        mean_released=compared.mean_released[None],
     )
 
 
@@ -275,7 +275,7 @@ def unknown_statistics(load: float, tuned: PatternPeak, wheels: int, checks: int
         law_harmonics=np.zeros(1 if checks else 0, dtype=int),
         tuned_held=np.array([asked]),
         held_factor=np.ones((1, checks or wheels)),
-        free=np.zeros((1, checks or wheels), dtype=bool),
+        mean_released=np.zeros((1, checks or wheels), dtype=bool),
     )
 
 

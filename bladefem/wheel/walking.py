@@ -17,6 +17,7 @@ import numpy as np
 
 from ..data import PortModel, RigidBody
 from ..friction.law_table import forgets_position
+from ..hbm.solver.residual import WALK_DIFFERENCE
 from ..hbm.solver.walking import UNRESISTED_NORMAL, unresisted
 from ..util.arrays import BooleanArray, RealArray
 from .by_diameter import diameter_parts
@@ -27,8 +28,6 @@ from .model import Wheel
 UNRESISTED_SHARE = 1e-12
 # springs on rigid motions over those of the contacts, in preconditioners
 HOLDING_SHARE = 0.3
-# of the size of the motion: step of the walk by which forces are differenced
-WALK_DIFFERENCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ class WheelWalk:
         return still
 
 
-def walking_motions(wheel: Wheel) -> RealArray:
+def unheld_motions(wheel: Wheel) -> RealArray:
     """(n, d, z) motions of a damper's contacts that no normal spring resists; z = 0 where there is
     none, the means are held, or a friction law knows the position.
     """
@@ -89,7 +88,7 @@ def with_free_means(wheel: Wheel) -> Wheel | None:
     resists.
     """
     free = replace(wheel, coupled=True)
-    return free if walking_motions(free).shape[2] else None
+    return free if unheld_motions(free).shape[2] else None
 
 
 def _rigid_motions(wheel: Wheel) -> np.ndarray:

@@ -45,29 +45,30 @@ class WavePreconditioner:
         """The approximate inverse times real coefficients r (N, m, K)."""
         flex = self.flex
         parts = flex.parts
-        deal = parts.deal
+        partition = parts.partition
         if self.of_contacts:
             return to_real(from_diameters(self._solved(to_diameters(to_complex(r)))))
-        own = r[deal.sectors].reshape(*self.change.shape[:2], 1)
-        forces = deal.join((self.change @ own).reshape(-1, *r.shape[1:]))
+        own = r[partition.sectors].reshape(*self.change.shape[:2], 1)
+        forces = partition.join((self.change @ own).reshape(-1, *r.shape[1:]))
         push = modal_forces(parts, to_diameters(to_complex(forces)), parts.contact)
-        found = self._solved(deal.join_diameters(push))
-        modal = ring_product(deal.own(flex.T), deal.own(found))
-        moved = deal.join_diameters(modal_motion(parts, modal, parts.contact))
+        found = self._solved(partition.join_diameters(push))
+        modal = ring_product(partition.own(flex.T), partition.own(found))
+        moved = partition.join_diameters(modal_motion(parts, modal, parts.contact))
         return r - to_real(from_diameters(moved))
 
     def _solved(self, push: np.ndarray) -> np.ndarray:
         """(N, k, H+1) by diameters that the waves make of push (N, k, H+1)."""
-        deal = self.flex.parts.deal
+        partition = self.flex.parts.partition
         count, _, harmonics = push.shape
         waves = _to_waves(push, self.order)
         forward = np.empty((len(self.factors), *waves.shape[1:]), dtype=complex)
-        for i, (d, factors) in enumerate(zip(range(count)[deal.half], self.factors, strict=True)):
+        own = range(count)[partition.half]
+        for i, (d, factors) in enumerate(zip(own, self.factors, strict=True)):
             solved = linalg.lu_solve(factors, waves[d].ravel(), check_finite=False)
             forward[i] = solved.reshape(waves.shape[1:])
         # wave -d is the conjugate of wave d, harmonic -h of harmonic h
-        backward = forward[deal.paired][::-1, ::-1].conj()
-        joined = deal.join_diameters(np.concatenate([forward, backward]))
+        backward = forward[partition.paired][::-1, ::-1].conj()
+        joined = partition.join_diameters(np.concatenate([forward, backward]))
         return _from_waves(joined, self.order, harmonics)
 
 
@@ -83,7 +84,7 @@ def make_wave_preconditioner(
         order: engine order of harmonic 1, with which all harmonics travel.
     """
     parts = flex.parts
-    deal = parts.deal
+    partition = parts.partition
     count, harmonics, k, _ = flex.T.shape
     K = 2 * harmonics - 1
     if K * k > MAX_WAVE_UNKNOWNS:
@@ -95,7 +96,7 @@ def make_wave_preconditioner(
     of_contacts = K * n * d <= MAX_CONTACT_UNKNOWNS
     A = _contact_flexibility(flex) if of_contacts else None
     factors = []
-    for wave in range(count)[deal.half]:
+    for wave in range(count)[partition.half]:
         diameters = (wave + order * hs) % count
         shapes = U[diameters]
         T = np.where(
@@ -123,7 +124,7 @@ def make_wave_preconditioner(
 def _contact_flexibility(flex: WheelFlexibility) -> np.ndarray:
     """(N, m, m) residual flexibility among the contacts in all diameters."""
     parts = flex.parts
-    half = parts.deal.join(parts.A[:, parts.contact, parts.contact])
+    half = parts.partition.join(parts.A[:, parts.contact, parts.contact])
     return np.concatenate([half, half[len(flex.T) - len(half) : 0 : -1].conj()])
 
 
@@ -157,9 +158,9 @@ def _averaged(
     """(K, n, dK, d) complex C of one damper averaged in the wave's frame: forces of harmonics
     -H..H, by the displacements of each of them.
     """
-    deal = flex.parts.deal
+    partition = flex.parts.partition
     H = K // 2
-    sectors = np.arange(deal.count)[deal.sectors]
+    sectors = np.arange(partition.count)[partition.sectors]
     d = change.shape[1] // K
     n = len(change) // max(len(sectors), 1)
     split = change.reshape(len(sectors), n, d, K, d, K)
@@ -167,9 +168,9 @@ def _averaged(
     hs = np.arange(K) - H
     total = np.zeros((n, d, K, d, K), dtype=complex)
     for sector, own in zip(sectors, split, strict=True):
-        turn = np.exp(-2j * np.pi * order * sector * hs / deal.count)
+        turn = np.exp(-2j * np.pi * order * sector * hs / partition.count)
         total += _turned(own, turn, to, back)
-    total = deal.join(total[None]).sum(axis=0) / deal.count
+    total = partition.join(total[None]).sum(axis=0) / partition.count
     return total.transpose(4, 0, 1, 2, 3).reshape(K, n, d * K, d)
 
 

@@ -325,13 +325,13 @@ def test_indicator_of_a_kink_and_of_a_parabola(kink):
     """Exact for the largest error of one kink in the cell; four times that of a smooth force."""
     axes = [np.linspace(0, 1, 6), np.linspace(0, 1, 3)]
     bent = state_table(lambda x, y: np.array([abs(x - kink), 1.0]), axes)
-    force, told = interpolate_states(bent, (0.5, 0.0))
-    assert told == pytest.approx((kink - 0.4) * (0.6 - kink) * 2 / 0.2, abs=1e-15)
+    force, error = interpolate_states(bent, (0.5, 0.0))
+    assert error == pytest.approx((kink - 0.4) * (0.6 - kink) * 2 / 0.2, abs=1e-15)
     if kink == 0.5:
-        assert told == pytest.approx(force[0])
+        assert error == pytest.approx(force[0])
     curved = state_table(lambda x, y: np.array([x**2, 1.0]), axes)
-    force, told = interpolate_states(curved, (0.5, 0.0))
-    assert told == pytest.approx(4 * (force[0] - 0.25))
+    force, error = interpolate_states(curved, (0.5, 0.0))
+    assert error == pytest.approx(4 * (force[0] - 0.25))
 
 
 def test_table_is_exact_on_its_points(problem):

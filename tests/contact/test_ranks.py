@@ -4,10 +4,10 @@ communicator.
 
 import numpy as np
 import pytest
+from mesh_seating import solve_mesh_seating
 from test_seat import ALPHA, SPEED
 from wedge import wedge_mesh
 
-from bladefem.contact.seating import solve_mesh_seating
 from bladefem.fem.compat import MPI
 from bladefem.scene.tables import Materials
 

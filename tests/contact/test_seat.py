@@ -10,12 +10,12 @@ from wedge import wedge_mesh
 
 import bladefem
 from bladefem.contact.patch import make_patch
-from bladefem.contact.seating import contact_problem, solve_mesh_seating, solve_seating
+from bladefem.contact.seating import contact_problem, solve_seating
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import flexible
-from bladefem.scene.tables import Material, Materials
+from bladefem.scene.tables import Material
 from bladefem.study.pipeline.damper_contact import contact_patches
 
 ALPHA = np.radians(40)
@@ -144,12 +144,6 @@ def test_warm_start_gives_the_same(solid):
     first = solve_seating(solid, SPEED)
     cold, warm = solve_seating(solid, 0.9 * SPEED), solve_seating(solid, 0.9 * SPEED, start=first)
     for a, b in zip(cold, warm, strict=True):
-        assert np.abs(a.force - b.force).max() < 1e-11 * a.force.max()
-
-
-def test_one_call_equals_the_stages(solid):
-    maps = solve_mesh_seating(wedge_mesh(ALPHA), Materials(), SPEED)
-    for a, b in zip(maps, solve_seating(solid, SPEED), strict=True):
         assert np.abs(a.force - b.force).max() < 1e-11 * a.force.max()
 
 

@@ -57,3 +57,24 @@ def rocking(load=10.0, force=2.0):
         np.ones((1, 1)),
         R,
     )
+
+
+def friction_oscillator(omega, ratio, kt, limit, force):
+    """One unit mass on a spring, with one friction element to the ground: the smallest system of
+    its kind.
+
+    omega: of the mass on its spring [rad/s]; ratio: of its damping; kt: contact stiffness [N/m];
+    limit: of the friction force [N]; force: complex amplitude of the excitation [N].
+    """
+    return System(
+        np.array([omega**2]),
+        np.array([[2 * ratio * omega]]),
+        np.ones((1, 1)),
+        np.array([kt]),
+        np.ones(1),
+        np.array([[0.0, force.real, -force.imag]]),
+        np.zeros((1, 3)),
+        np.array([[limit, 0, 0]]),
+        np.zeros((1, 1)),
+        np.ones((1, 1)),
+    )

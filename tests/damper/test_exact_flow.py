@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from systems import blades, rocking, seat
+from systems import blades, friction_oscillator, rocking, seat
 
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import damper_cycle
@@ -17,7 +17,7 @@ from bladefem.time.shooting import (
     periodic_solution,
     probe_harmonics,
 )
-from bladefem.time.system import damper_on_platforms, friction_oscillator
+from bladefem.time.system import damper_on_platforms
 
 OMEGA = 2 * np.pi * 1340
 
@@ -142,7 +142,7 @@ def period_work(solution, system):
     By the trapezoidal rule on the samples, which is spectrally accurate for smooth parts and second
     order for kinks.
     """
-    path = solution.flow
+    path = solution.trajectory
     t = np.arange(len(path.q)) / len(path.q)
     angles = 2 * np.pi * np.outer(np.arange(1, system.coefficients // 2 + 1), t)
     basis = np.ones((system.coefficients, len(t)))
@@ -180,7 +180,7 @@ def test_damper_on_moving_platforms_by_two_ways():
     system = damper_on_platforms(motion, seat(1e6, 5.0), 0.06)
     exact, cycle = periodic_solution(system, OMEGA), damper_cycle(system, OMEGA, 1024)
     assert cycle.reason == exact.reason == "periodic"
-    assert fourier(cycle.force) == pytest.approx(fourier(exact.flow.force), rel=1e-4)
+    assert fourier(cycle.force) == pytest.approx(fourier(exact.trajectory.force), rel=1e-4)
 
 
 def test_three_solutions_where_the_normal_load_follows_the_motion():

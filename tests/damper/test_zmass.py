@@ -8,7 +8,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from bladefem.damper.loops import Drive, count_loops, ratio_table, spectrum, steady
+from bladefem.damper.loops import FoundationMotion, count_loops, ratio_table, spectrum, steady
 from bladefem.damper.zmass import (
     Footprint,
     MassOnFoundation,
@@ -73,12 +73,12 @@ def test_march_agrees_with_the_plain_twin():
 @pytest.mark.parametrize(("ratio", "loops"), [("0", 1), ("1/4", 4), ("1/2", 2), ("2", 1)])
 def test_loops_of_the_paper(ratio, loops):
     assert (
-        steady(PAPER, Drive(Fraction(ratio)), 1000).loops == loops
+        steady(PAPER, FoundationMotion(Fraction(ratio)), 1000).loops == loops
     )  # Fig. 10: fp = 0, 25, 50, 200 Hz
 
 
 def test_drift_at_50_hz():
-    result = steady(PAPER, Drive(Fraction(1, 2)), 2000)
+    result = steady(PAPER, FoundationMotion(Fraction(1, 2)), 2000)
     assert result.drift[0] == pytest.approx(0.105, rel=0.01)  # 0.10574 m/s
     assert result.reason == "periodic"
 
@@ -86,18 +86,20 @@ def test_drift_at_50_hz():
 @pytest.mark.parametrize(("ratio", "drift"), [("1/2", 0.10509), ("1", -0.6307), ("2", 0.0)])
 def test_drift_of_an_independent_prototype(ratio, drift):
     """F16; 1 %: the prototype shared stiffness and load out differently."""
-    assert steady(PAPER, Drive(Fraction(ratio)), 2000).drift[0] == pytest.approx(
+    assert steady(PAPER, FoundationMotion(Fraction(ratio)), 2000).drift[0] == pytest.approx(
         drift, rel=0.01, abs=1e-6
     )
 
 
 def test_drift_at_25_hz_needs_fine_steps():
     """1e-3 m/s is what is left of velocities of 3 m/s, hence 8000 steps a cycle and 2 %."""
-    assert steady(PAPER, Drive(Fraction(1, 4)), 8000).drift[0] == pytest.approx(1.0255e-3, rel=0.02)
+    assert steady(PAPER, FoundationMotion(Fraction(1, 4)), 8000).drift[0] == pytest.approx(
+        1.0255e-3, rel=0.02
+    )
 
 
 def test_amplitude_under_constant_load():
-    frequency, lines = spectrum(steady(PAPER, Drive(Fraction(0)), 1000))
+    frequency, lines = spectrum(steady(PAPER, FoundationMotion(Fraction(0)), 1000))
     assert frequency[0] == pytest.approx(100)
     assert lines[0, 0] == pytest.approx(1.382e-3, rel=1e-3)  # F02
 
@@ -123,14 +125,14 @@ def test_rule_of_the_denominator_fails_near_sticking():
     of 5.
     """
     found = {
-        r: steady(PAPER, Drive(Fraction(r), amplitude=(1.2e-3, 0.0)), 1000).loops
+        r: steady(PAPER, FoundationMotion(Fraction(r), amplitude=(1.2e-3, 0.0)), 1000).loops
         for r in ("1/4", "1/3", "2/5")
     }
     assert found == {"1/4": 2, "1/3": 2, "2/5": 3}
 
 
 def test_symmetric_pressure_does_not_turn_the_mass_and_skewed_pressure_does():
-    drive = Drive(Fraction(0), amplitude=(0.005, 0.003))
+    drive = FoundationMotion(Fraction(0), amplitude=(0.005, 0.003))
     even = steady(PAPER, drive, 500, most=20).motion
     skew = steady(
         replace(PAPER, footprint=skewed(z_footprint(), (0.5, 0.3))), drive, 500, most=20
@@ -181,7 +183,7 @@ def test_undamped_sticking_mass_is_reported_not_periodic():
     """F08: below the slip limit nothing damps the start; the march says so instead of returning a
     cycle.
     """
-    result = steady(PAPER, Drive(Fraction(0), amplitude=(5e-4, 0.0)), 500, most=30)
+    result = steady(PAPER, FoundationMotion(Fraction(0), amplitude=(5e-4, 0.0)), 500, most=30)
     assert result.reason.startswith("not periodic after 30 periods")
     assert result.residual > 1e-3
 

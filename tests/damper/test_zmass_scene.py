@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bladefem.cli.main import main
-from bladefem.damper.loops import Drive, steady
+from bladefem.damper.loops import FoundationMotion, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
@@ -95,7 +95,7 @@ def test_pull_balances_mean_friction_while_the_mass_slips():
     along it.
     """
     body = MassOnFoundation(footprint=Footprint(np.zeros((1, 2)), np.ones(1)))
-    result = steady(body, Drive(Fraction(0), pull=(2.0, 0.0)), 1000)
+    result = steady(body, FoundationMotion(Fraction(0), pull=(2.0, 0.0)), 1000)
     assert result.reason == "periodic"
     assert result.motion.force[:, 0].mean() == pytest.approx(-2.0, rel=1e-6)
     assert result.drift[0] > 0.1

@@ -35,7 +35,7 @@ def test_out_of_memory(bar, monkeypatch):
 def test_estimate_exceeded(bar, monkeypatch):
     """Where the room by MUMPS's estimate is too little, as on some small matrices, it gets more."""
     load = np.ones(bar.K.size[0])[:, None]
-    usual = mumps.solve_matrix(mumps.factorise_matrix(bar.K, True), load)
+    usual = mumps.solve_matrix(mumps.factorise_matrix(bar.K, definite=True), load)
     given = []
     real = mumps._set_controls
     monkeypatch.setattr(
@@ -44,7 +44,7 @@ def test_estimate_exceeded(bar, monkeypatch):
         lambda F, percent, *rest: given.append(percent) or real(F, percent, *rest),
     )
     monkeypatch.setattr(mumps, "EXACT_MEMORY_PERCENTS", (-95, 40))
-    again = mumps.solve_matrix(mumps.factorise_matrix(bar.K, True), load)
+    again = mumps.solve_matrix(mumps.factorise_matrix(bar.K, definite=True), load)
     assert given == [-95, 40]
     np.testing.assert_array_equal(again, usual)
 

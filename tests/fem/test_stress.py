@@ -128,7 +128,7 @@ def test_rotating_ring_keeps_its_hoop_stress():
     speed = 200.0
 
     def hoop(u, large=False):
-        found = gauss_stress(body, u, large)
+        found = gauss_stress(body, u, large=large)
         return (principal_stresses(found.stress)[..., 0] * found.volume).sum() / found.volume.sum()
 
     linear = hoop(speed**2 * unit_speed_displacement(flexible(in_step(body, None))))

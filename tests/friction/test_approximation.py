@@ -24,7 +24,7 @@ OMEGA = 3.0
 
 
 def work(u: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """(n,) work of f (n, K) on u (n, K) in one period, as the kernels tell it (Eq. 12)."""
+    """(n,) work of f (n, K) on u (n, K) in one period, as the kernels give it (Eq. 12)."""
     return dissipated_energy(np.stack([0 * f, f], axis=1), np.stack([0 * u, u], axis=1))
 
 

@@ -4,8 +4,6 @@ import numpy as np
 
 from geometry.topology import EDGES
 
-A, B = (5 - np.sqrt(5)) / 20, (5 + 3 * np.sqrt(5)) / 20
-TETS = np.array([[B, A, A, A], [A, B, A, A], [A, A, B, A], [A, A, A, B]])  # degree 2
 KEAST = [
     (np.array([[0.25] * 4]), -4 / 5),  # degree 3
     (np.full((4, 4), 1 / 6) + np.eye(4) / 3, 9 / 20),

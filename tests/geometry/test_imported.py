@@ -7,13 +7,13 @@ from dataclasses import replace
 import meshio
 import numpy as np
 import pytest
+from mesh_seating import solve_mesh_seating
 from structured import box, sector
 from writers import write_bdf, write_cdb, write_inp, write_step
 
 import bladefem
 from bladefem.cli.main import main
 from bladefem.contact.resultants import resultant
-from bladefem.contact.seating import solve_mesh_seating
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
@@ -30,8 +30,6 @@ from geometry.profile import turn_about_axis
 from geometry.sector import wedge_sector
 from geometry.session import gmsh_session
 from geometry.step_file import read_step
-
-PAIRS = {"cyclic", "this", "next"}
 
 
 def same(found, mesh, tolerance=1e-12):

@@ -65,9 +65,9 @@ def test_sets_with_alike_names_are_taken(tmp_path):
     deck.write_text("\n".join(decks.flat_deck(decks.Model(m.points, m.blocks, sets, {}), {})))
     look = look_at(deck)
     assert look.alike == {"clamp": "PART-1.CLAMP", "seat_left": "N_SEAT_LEFT"}
-    told = tomllib.loads(starting_scene(look))["imported"]["names"]
-    assert told[:2] == ["clamp = PART-1.CLAMP", "seat_left = N_SEAT_LEFT"]
-    assert [name.split(" ")[0] for name in told[2:]] == ["cyclic_low", "cyclic_high"]
+    names = tomllib.loads(starting_scene(look))["imported"]["names"]
+    assert names[:2] == ["clamp = PART-1.CLAMP", "seat_left = N_SEAT_LEFT"]
+    assert [name.split(" ")[0] for name in names[2:]] == ["cyclic_low", "cyclic_high"]
     missing = [sentence.split(":")[0] for sentence in look.missing]
     assert missing == ["tip_mid", "seat_right", "damper"]
 

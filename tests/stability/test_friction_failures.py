@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from bladefem.damper.explicit import damper_cycle, explicit_march, stable_steps
-from bladefem.damper.loops import Drive, steady
+from bladefem.damper.loops import FoundationMotion, steady
 from bladefem.damper.zmass import MassOnFoundation, march
 from bladefem.data import Elements
 from bladefem.errors import InputError
@@ -236,7 +236,10 @@ def test_F16_velocity_and_force_repeat_where_the_displacement_drifts():
     """Mass dragged by a vibrating floor under pulsating load at fp / fb = 1: drift, yet (v, f) is
     periodic.
     """
-    body, found = MassOnFoundation(), steady(MassOnFoundation(), Drive(Fraction(1)), 2000)
+    body, found = (
+        MassOnFoundation(),
+        steady(MassOnFoundation(), FoundationMotion(Fraction(1)), 2000),
+    )
     assert found.reason == "periodic"
     assert found.drift[0] == pytest.approx(-0.6307, rel=0.01)
     last = found.motion

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from systems import friction_oscillator
 
 from bladefem.damper.accelerate import Rules, iterate
 from bladefem.damper.direct import contact_step, direct
@@ -22,7 +23,7 @@ from bladefem.study.adaptive.choice import adapted_settings
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.time.shooting import periodic_solution, probe_harmonics
-from bladefem.time.system import blade_ring, damper_on_platforms, friction_oscillator
+from bladefem.time.system import blade_ring, damper_on_platforms
 
 HZ = 2 * np.pi
 

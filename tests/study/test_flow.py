@@ -185,7 +185,8 @@ def test_limit_cycles_of_other_loads_are_scaled(reduced):
         subject._held(reduced, sector, patches, one, flow, -10) for one in (case, other)
     )
     (scaled,) = subject._by_scale(other, [(case, [first])])
-    for name in ("load", "amplitude", "frequency", "largest", "friction"):
+    fields = ("load", "amplitude", "frequency", "stability_limit", "largest_friction_damping")
+    for name in fields:
         assert getattr(scaled, name) == pytest.approx(getattr(direct, name), rel=1e-6)
     assert scaled.amplitude == pytest.approx(2 * first.amplitude)
     stiffer = replace(other, elements=replace(twice, kt=1.1 * e.kt))

@@ -256,7 +256,7 @@ def test_ranks_share_out_the_stresses(monkeypatch):
 
     def counted(body, u, large=False, heated=False):
         done.append(1)
-        return recorded(body, u, large, heated)
+        return recorded(body, u, large=large, heated=heated)
 
     together, alone = (bodies(comm=comm) for comm in (MPI.COMM_WORLD, MPI.COMM_SELF))
     states = stress_states(alone, wheel_modes(alone, 3, [2])[0], 3)

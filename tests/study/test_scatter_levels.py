@@ -55,14 +55,16 @@ def test_wheels_of_the_statistics_walk_as_one_wheel_does():
         for pattern in (Pattern(), *drawn)
     ]
     heights = np.array([one.free.peak.height for one in alone])
-    assert found.free.all()
+    assert found.mean_released.all()
     assert found.tuned[0] == pytest.approx(heights[0], rel=1e-6)
     np.testing.assert_allclose(found.peak[0], heights[1:], rtol=1e-6)
     held_heights = np.array([one.held.height for one in alone])
     assert found.tuned_held[0] == pytest.approx(held_heights[0], rel=1e-6)
     np.testing.assert_allclose(found.held_factor[0], held_heights[1:] / held_heights[0], rtol=1e-6)
     assert abs(found.tuned[0] / found.tuned_held[0] - 1) > 0.005
-    assert found.free_effect[0] == pytest.approx(abs(heights / held_heights - 1).max(), rel=1e-6)
+    assert found.released_effect[0] == pytest.approx(
+        abs(heights / held_heights - 1).max(), rel=1e-6
+    )
     assert any("free mean displacements" in text for text in scatter_sentences(found))
 
 
@@ -72,7 +74,7 @@ def test_a_free_maximum_beside_a_lost_point_does_not_count(monkeypatch):
     held = replace(free, coupled=False)
     grid = resonance() * np.linspace(0.98, 1.02, 5)
     omegas, sizes = np.array([0.9, 1.0, 1.1]), np.array([[1.0], [2.0], [1.5]])
-    closed = WheelPeak(1.0, 2.0, 0, sizes[1], omegas, sizes, 0, 0.0)
+    closed = WheelPeak(1.0, 2.0, 0, sizes[1], omegas, sizes, 0)
     lost = replace(closed, sizes=np.array([[1.0], [2.0], [np.nan]]), unsolved=1)
     for peak, known in ((closed, True), (lost, False)):
         again = LocalPeak(peak, None, 0.0, 3)
@@ -150,10 +152,10 @@ def test_like_is_compared_with_like():
     found = compared_peaks(heights)
     assert found.tuned == 1.9 and found.tuned_held == 2.0
     np.testing.assert_allclose(found.height / found.tuned, [1.5, 2.0])
-    np.testing.assert_array_equal(found.free, [True, False])
+    np.testing.assert_array_equal(found.mean_released, [True, False])
     heights[1, 0] = np.nan
     without = compared_peaks(heights)
-    assert without.tuned == 2.0 and not without.free.any()
+    assert without.tuned == 2.0 and not without.mean_released.any()
     np.testing.assert_array_equal(without.height, [3.0, 4.0])
     heights[2] = 0.0
     assert np.isnan(compared_peaks(heights).tuned_held)
@@ -161,7 +163,7 @@ def test_like_is_compared_with_like():
 
 def peak_of(height):
     none = np.zeros(0)
-    return PatternPeak(WheelPeak(1.0, height, 0, none, none, none, 0, 0.0))
+    return PatternPeak(WheelPeak(1.0, height, 0, none, none, none, 0))
 
 
 def test_a_law_that_is_wrong_by_a_factor_is_calibrated():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bladefem.damper.loops import Drive, Steady, ratio_table, spectrum, steady
+from bladefem.damper.loops import FoundationMotion, Steady, ratio_table, spectrum, steady
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.data import PressureMap
 from bladefem.friction.equivalent_linear import from_series, linear_force
@@ -159,7 +159,8 @@ def _ratios(body: MassOnFoundation) -> Claim:
 def _exceptions(body: MassOnFoundation, stroke: float) -> list[str]:
     """Ratios that break the rule, with their loops."""
     counts = {
-        r: steady(body, Drive(r, amplitude=(stroke, 0.0)), 1000, most=60).loops for r in RATIOS[1:]
+        r: steady(body, FoundationMotion(r, amplitude=(stroke, 0.0)), 1000, most=60).loops
+        for r in RATIOS[1:]
     }
     return [f"{r} ({loops})" for r, loops in counts.items() if loops != r.denominator]
 
@@ -167,7 +168,7 @@ def _exceptions(body: MassOnFoundation, stroke: float) -> list[str]:
 def _lag(body: MassOnFoundation) -> Claim:
     """The load's phase behind the foundation, load at twice its frequency."""
     lags = (0.0, 0.25, 0.5, 0.75)
-    found = [steady(body, Drive(Fraction(2), lag=lag), 2000) for lag in lags]
+    found = [steady(body, FoundationMotion(Fraction(2), lag=lag), 2000) for lag in lags]
     works = [MILLI * _work(result) for result in found]
     swing = max(works) / min(works) - 1
     return Claim(
@@ -226,7 +227,9 @@ def _beside_ellipse(result: Steady) -> float:
 
 def _drift(scene: Scene, seat: PressureMap, results: Mapping[str, Steady]) -> Claim:
     every = steady(
-        mass_on_foundation(vary(scene, contact__points=None), seat), Drive(Fraction(1, 2)), 2000
+        mass_on_foundation(vary(scene, contact__points=None), seat),
+        FoundationMotion(Fraction(1, 2)),
+        2000,
     )
     repeats = all(result.reason == "periodic" for result in results.values())
     still = [name for name, result in results.items() if abs(result.drift[0]) < 1e-6]

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from bladefem.damper.accelerate import Iterated, Rules, iterate
-from bladefem.damper.paper import Platform, platform
+from bladefem.damper.paper import PlatformSide, platform
 from bladefem.hbm.model import ReducedModel
 
 VARIANTS = {
@@ -100,7 +100,7 @@ def write_rows(rows: Iterable[Mapping[str, float | str]], path: str | Path) -> N
             writer.writerow({k: f"{v:.6g}" if isinstance(v, float) else v for k, v in row.items()})
 
 
-def _equilibrium(side: Platform) -> np.ndarray | None:
+def _equilibrium(side: PlatformSide) -> np.ndarray | None:
     """Platform motion of the one-harmonic equilibrium to 1e-6, or None where it was not found."""
     exact = Rules(criterion="residual", tolerance=1e-6, most=200, damper="shooting")
     for method in ("describing", "anderson", "amplitude"):

@@ -23,7 +23,7 @@ from geometry.zmass import z_section
 from ...contact.interface_elements import pair_ratio, stiffnesses_at
 from ...contact.patch import make_patch
 from ...contact.seating import contact_problem, solve_seating
-from ...damper.loops import Drive, Steady, steady
+from ...damper.loops import FoundationMotion, Steady, steady
 from ...damper.zmass import Footprint, MassOnFoundation
 from ...data import PressureMap
 from ...errors import InputError
@@ -108,13 +108,15 @@ def cluster_nodes(
     return label
 
 
-def foundation_drives(scene: Scene) -> list[Drive]:
+def foundation_drives(scene: Scene) -> list[FoundationMotion]:
     """One for each frequency ratio of the scene."""
     base = scene.foundation
     load = mean_load(scene)
     ratios = [Fraction(r).limit_denominator(MAX_DENOMINATOR) for r in base.ratios]
     return [
-        Drive(r, base.frequency, base.amplitude, base.phase, load, base.pulsation, base.pull)
+        FoundationMotion(
+            r, base.frequency, base.amplitude, base.phase, load, base.pulsation, base.pull
+        )
         for r in ratios
     ]
 
@@ -123,7 +125,7 @@ def steady_motions(
     scene: Scene,
     body: MassOnFoundation,
     steps: int = 2000,
-) -> Iterator[tuple[Drive, Steady]]:
+) -> Iterator[tuple[FoundationMotion, Steady]]:
     """The steady motion for each frequency ratio of the scene, to 1e-6: an odd footprint keeps
     turning slowly.
 

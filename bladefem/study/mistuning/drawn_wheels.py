@@ -141,7 +141,7 @@ def drawn_statistics(
         patterns = {drawn.curve.load: drawn.patterns}
         search = _search(drawn, balance, tuned)
         found = scatter_statistics(patterns, lambda _, pattern: search(pattern), comm, progress)
-    error = with_free_change(truncation, found.free_effect[0])
+    error = with_free_change(truncation, found.released_effect[0])
     found = replace(found, harmonics=np.array([balance[0]]), truncation=np.array([error]))
     return with_comparison(found, compared)
 

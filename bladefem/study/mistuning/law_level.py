@@ -13,7 +13,7 @@ from ...scene.units import newtons
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ...wheel.damper_law import DamperLaw, damper_law, law_harmonics, scaled_elements
-from ...wheel.family import Family, family_of_modes
+from ...wheel.family import ModeFamily, family_of_modes
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
 from ...wheel.model import Pattern, Wheel, heavier_damper
 from ...wheel.pattern_peak import PatternPeak, compared_peaks, peak_heights
@@ -64,7 +64,7 @@ def law_level(
 
 def _scattered_law(
     wheel: Wheel,
-    family: Family,
+    family: ModeFamily,
     scatter: Scatter,
     curve: Curve,
     mode: int,
@@ -89,7 +89,7 @@ def _scattered_law(
 
 def changed_law(
     wheel: Wheel,
-    family: Family,
+    family: ModeFamily,
     mode: int,
     sizes: tuple[float, float],
     samples: int,
@@ -151,5 +151,5 @@ def with_checks(
         law=law[None],
         tuned_held=np.array([compared.tuned_held]),
         held_factor=compared.held_factor[None],
-        free=compared.free[None],
+        mean_released=compared.mean_released[None],
     )

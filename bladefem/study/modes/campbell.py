@@ -234,12 +234,12 @@ def _project_speeds(
 ) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
     """Stiffness of each speed, mass and Coriolis matrix on the modes of all three."""
     from ...fem.gyroscopic import own_rows, project_coriolis
-    from ...fem.linalg import apply_block, inner_products
+    from ...fem.linalg import apply_block, hermitian_part, inner_products
 
     comm = at[0].comm
     X = own_rows(at[0], np.concatenate([s.shapes for s in sets]))
-    K = [_hermitian_part(inner_products(comm, X, apply_block(body.K, X))) for body in at]
-    M = _hermitian_part(inner_products(comm, X, apply_block(at[0].M, X)))
+    K = [hermitian_part(inner_products(comm, X, apply_block(body.K, X))) for body in at]
+    M = hermitian_part(inner_products(comm, X, apply_block(at[0].M, X)))
     return K, M, project_coriolis(at[0], X, axis)
 
 
@@ -249,10 +249,12 @@ def _lowest_frequencies(
     count: int,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Lowest frequencies [Hz] and vectors in a basis that may nearly depend on itself."""
+    from ...fem.linalg import hermitian_part
+
     size, Q = np.linalg.eigh(M)
     keep = size > 1e-11 * size[-1]
     W = Q[:, keep] / np.sqrt(size[keep])
-    lam, Z = eigh(_hermitian_part(W.conj().T @ K @ W))
+    lam, Z = eigh(hermitian_part(W.conj().T @ K @ W))
     return np.sqrt(np.maximum(lam[:count], 0)) / (2 * np.pi), W @ Z[:, :count]
 
 
@@ -308,7 +310,3 @@ def _order_interference(
         found(rows, 1, speed, [order]).drop(columns=["nodal_diameter", "wave"])
         for found in (interference_table, crossing_margins)
     )
-
-
-def _hermitian_part(A: np.ndarray) -> np.ndarray:
-    return (A + A.conj().T) / 2

@@ -26,7 +26,7 @@ from ...hbm.ring_march import (
 )
 from ...hbm.solution import Solution, lifts_off, size
 from ...hbm.time_model import time_system
-from ...time.event_integrator import Flow, State, integrate_periods
+from ...time.event_integrator import State, Trajectory, integrate_periods
 from ...util.durations import core_time
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution
@@ -255,7 +255,7 @@ def exact_band(model: ReducedModel, point: Solution) -> KeptBand | None:
         most = min(LONGER_WHILE_WIDENING * periods, MAX_STEPS / per_period)
         widens = _widens(motion[:, None], point)
         if not widens or marched + KEPT_PERIODS > most:
-            spent = float(_work_of_flow(kept) / KEPT_PERIODS)
+            spent = float(_work_of_friction(kept) / KEPT_PERIODS)
             return replace(_band_of(point, motion, marched, spent), widens=widens)
 
 
@@ -434,10 +434,10 @@ def _band_of(point: Solution, motion: np.ndarray, periods: int, friction_work: f
     return KeptBand(point.frequency, *ends, periods, friction_work=friction_work)
 
 
-def _work_of_flow(flow: Flow) -> float:
-    """Work of the friction forces between the samples of a flow, by the trapezoidal rule [J]."""
-    means = (flow.force[1:] + flow.force[:-1]) / 2
-    return float(np.sum(means * np.diff(flow.w, axis=0)))
+def _work_of_friction(path: Trajectory) -> float:
+    """Work of the friction forces along a trajectory, by the trapezoidal rule [J]."""
+    means = (path.force[1:] + path.force[:-1]) / 2
+    return float(np.sum(means * np.diff(path.w, axis=0)))
 
 
 def _unknown_band(point: Solution, reason: str) -> KeptBand:

@@ -1,7 +1,7 @@
 """What each stage depends on, declared once: the key of a stored stage follows from it.
 
 A changed friction coefficient does not redo the mesh. A stage may read no other field of the scene
-than those that it declares; `tests/store/test_stage_inputs.py` watches what each one reads.
+than those that it declares; `tests/io/test_stage_inputs.py` watches what each one reads.
 """
 
 from __future__ import annotations

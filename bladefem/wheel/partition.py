@@ -17,7 +17,7 @@ from ..util.communicator import Communicator
 
 
 @dataclass(frozen=True)
-class Deal:
+class Partition:
     """The part of this rank in a wheel of N sectors."""
 
     count: int
@@ -75,7 +75,7 @@ class Deal:
         return joined
 
     def gather(self, text: str) -> list[str]:
-        """What all ranks say."""
+        """The texts of all ranks, in their order."""
         return [text] if self.comm is None else self.comm.allgather(text)
 
     def join(self, part: np.ndarray, axis: int = 0) -> np.ndarray:
