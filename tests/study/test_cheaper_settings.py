@@ -14,7 +14,8 @@ from bladefem.hbm.reference_blade import reference_model
 from bladefem.study.adaptive import cheaper_settings as cheaper_module
 from bladefem.study.adaptive.cheaper_settings import cheaper_settings
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of
-from bladefem.study.adaptive.resonance_choice import choose_at_peak, peak_from
+from bladefem.study.adaptive.peak_errors import peak_from
+from bladefem.study.adaptive.resonance_choice import choose_at_peak
 from bladefem.study.adaptive.settings import Settings
 
 ACCURACY = 0.05

@@ -17,7 +17,7 @@ from bladefem.study.adaptive import choice_in_time
 from bladefem.study.adaptive import resonance_curve as resonance_curve_module
 from bladefem.study.adaptive.choice_in_time import MarchedBand, choose_in_time, marched_widely
 from bladefem.study.adaptive.family import Family, Member, family_of
-from bladefem.study.adaptive.resonance_choice import PeakErrors
+from bladefem.study.adaptive.peak_errors import PeakErrors
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.error_in_time import Marches

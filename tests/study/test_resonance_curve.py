@@ -26,7 +26,7 @@ from bladefem.study.adaptive import check_points
 from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.family import Family, Member
-from bladefem.study.adaptive.resonance_choice import PeakErrors
+from bladefem.study.adaptive.peak_errors import PeakErrors
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import first_for
 

@@ -11,10 +11,16 @@ from models import single_mass
 
 from bladefem.errors import NotSolvedError
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.study.adaptive import resonance_choice
+from bladefem.study.adaptive import peak_errors, resonance_choice
 from bladefem.study.adaptive.family import Family, Member, family_of
 from bladefem.study.adaptive.resonance_curve import resonance_curve
-from bladefem.study.adaptive.settings import first_for
+from bladefem.study.adaptive.settings import DIRECTIONS, first_for
+
+
+def search_by(monkeypatch, found):
+    """Peaks are those that a stand-in gives, for judging as for choosing."""
+    for module in (peak_errors, resonance_choice):
+        monkeypatch.setattr(module, "peak_from", found)
 
 
 @dataclass(frozen=True)
@@ -49,8 +55,8 @@ def judged(monkeypatch):
                 raise NotSolvedError("too rich")
             return peak_of_settings(new)
 
-        monkeypatch.setattr(resonance_choice, "peak_from", known)
-        return resonance_choice.peak_errors(family, settings, peak_of_settings(settings), 0.05)
+        search_by(monkeypatch, known)
+        return peak_errors.peak_errors(family, settings, peak_of_settings(settings), 0.05)
 
     return errors
 
@@ -74,7 +80,7 @@ def test_where_nothing_is_solved_the_error_stays_unknown(judged):
 def test_the_poorest_model_has_no_poorer_one(name):
     family = family_of(reference_model(points=4, load=1.4))
     settings = replace(first_for(family.modes), **{name: 1})
-    assert resonance_choice.poorer_settings(family, settings, name) is None
+    assert peak_errors.poorer_settings(family, settings, name) is None
 
 
 def peak_with(lift, height=1.0):
@@ -87,7 +93,7 @@ def peak_with(lift, height=1.0):
 @pytest.mark.parametrize(("lift", "least"), [(7, 1), (8, 3)])
 def test_one_harmonic_is_not_enough_where_half_of_the_contacts_lift(lift, least, monkeypatch):
     family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
-    monkeypatch.setattr(resonance_choice, "peak_from", lambda *a, **k: peak_with(lift))
+    search_by(monkeypatch, lambda *a, **k: peak_with(lift))
     settings, _, errors = resonance_choice.choose_at_peak(
         family, first_for(family.modes), peak_with(lift), 0.05
     )
@@ -105,7 +111,7 @@ def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
         tried.append(new)
         return peak_with(4, 1.1 + 0.5 * (new.points != 4) - 0.1 / new.harmonics)
 
-    monkeypatch.setattr(resonance_choice, "peak_from", found)
+    search_by(monkeypatch, found)
     settings, peak, errors = resonance_choice.choose_at_peak(
         family, first_for(family.modes), peak_with(4, 1.0), 0.05, ("points",)
     )
@@ -138,7 +144,7 @@ def test_an_error_that_another_respect_brings_out_is_refined_as_well(monkeypatch
             return peak_with(1, 1.0 if rigid else 1.02)
         return peak_with(1, 1.3 if rigid else 1.7)
 
-    monkeypatch.setattr(resonance_choice, "peak_from", found)
+    search_by(monkeypatch, found)
     chosen, peak, errors = resonance_choice.choose_at_peak(
         family, settings, peak_with(1, 1.0), 0.05
     )
@@ -150,9 +156,9 @@ def test_a_flat_top_does_not_determine_the_frequency(damping):
     """What a shift takes from the height counts where it is less than the weighted shift."""
     # of one mode with omega = height = 1, next to its peak: 1/height^2 = 1 + (shift / damping)^2
     peak = KnownPeak(1.0, 1.0, SimpleNamespace(), bend=2 / damping**2)
-    fall = resonance_choice.fall_beside(peak, 0.01)
+    fall = peak_errors.fall_beside(peak, 0.01)
     assert fall == pytest.approx(1 - 1 / np.hypot(1, 0.01 / damping))
-    errors = resonance_choice.PeakErrors({"points": 0.001}, {"points": 0.01}, fall={"points": fall})
+    errors = peak_errors.PeakErrors({"points": 0.001}, {"points": 0.01}, fall={"points": fall})
     assert errors.needs["points"] == (0.05 if damping < 0.01 else max(fall, 0.001))
 
 
@@ -163,8 +169,8 @@ def test_what_is_too_large_with_all_points_is_judged_with_twice_as_many(monkeypa
     richer = replace(settings, points=None)
     point = peak_with(4).solution
     unknowns = family.build(replace(settings, points=16)).model.springs.size * 7
-    monkeypatch.setattr(resonance_choice, "LIFTING_POINTS_JUDGE", unknowns)
-    found = resonance_choice.compared_settings(family, settings, richer, "points", point)
+    monkeypatch.setattr(peak_errors, "LIFTING_POINTS_JUDGE", unknowns)
+    found = peak_errors.compared_settings(family, settings, richer, "points", point)
     assert found == (settings, replace(settings, points=16), 2.0)
 
 
@@ -174,14 +180,14 @@ def test_more_harmonics_start_from_the_peak_that_judged_them():
     settings = replace(first_for(family.modes), harmonics=3, samples=128)
     peak = peak_with(16)
     judge = peak_with(16, 1.2)
-    errors = resonance_choice.PeakErrors({}, {}, better={"harmonics": judge})
+    errors = peak_errors.PeakErrors({}, {}, better={"harmonics": judge})
     ahead = resonance_choice._solution_ahead
     richer = replace(settings, harmonics=15)
     base, point = ahead(family, settings, peak, errors, richer)
     assert base.harmonics == 7 and point is judge.solution
     more_points = replace(settings, points=8)
     assert ahead(family, settings, peak, errors, more_points) == (settings, peak.solution)
-    unknown = resonance_choice.PeakErrors({}, {})
+    unknown = peak_errors.PeakErrors({}, {})
     assert ahead(family, settings, peak, unknown, richer) == (settings, peak.solution)
 
 
@@ -213,9 +219,9 @@ def test_a_richer_model_of_the_same_equations_tells_no_error(monkeypatch):
         asked.append(new)
         return peak_of_settings(replace(new, points=1))
 
-    monkeypatch.setattr(resonance_choice, "peak_from", known)
+    search_by(monkeypatch, known)
     settings = replace(first_for(10), points=1)
-    errors = resonance_choice.peak_errors(family, settings, peak_of_settings(settings), 0.05)
+    errors = peak_errors.peak_errors(family, settings, peak_of_settings(settings), 0.05)
     assert errors.height["modes"] == 0 < errors.height["harmonics"]
     assert all(s.modes == settings.modes for s in asked)
 
@@ -231,8 +237,8 @@ def test_harmonics_that_lift_off_has_changed_are_judged_again(monkeypatch):
     def told(family, settings, peak, accuracy, known):
         judged.append((settings.harmonics, dict(known)))
         far = {"harmonics": np.inf, "samples": 1.0} if len(judged) == 1 else {"samples": 0.0}
-        changes = dict.fromkeys(resonance_choice.DIRECTIONS, 0.0) | far
-        return resonance_choice.PeakErrors(changes, changes)
+        changes = dict.fromkeys(DIRECTIONS, 0.0) | far
+        return peak_errors.PeakErrors(changes, changes)
 
     closed = {"stick": 8, "slip": 6, "lift": 2, "open": 0}
     lifted = {"stick": 0, "slip": 0, "lift": 16, "open": 0}
@@ -255,7 +261,7 @@ def test_an_error_stays_known_where_the_richer_model_is_not_solved_any_more(judg
     settings = replace(first_for(10), harmonics=7, points=4)
     before = replace(settings, harmonics=3)
     known = judged(99, 99)
-    unknown = resonance_choice.PeakErrors(
+    unknown = peak_errors.PeakErrors(
         {**known.height, "points": np.inf, "harmonics": np.inf},
         {**known.frequency, "points": np.inf, "harmonics": np.inf},
     )
@@ -281,7 +287,7 @@ def test_a_poor_model_has_the_errors_that_a_richer_one_still_shows(monkeypatch):
         more = 0.25 if new.harmonics == 1 else 0.55
         return peak_with(4, (1.0 + 0.15 * (new.harmonics > 1)) * (1 + more * (new.points != 4)))
 
-    monkeypatch.setattr(resonance_choice, "peak_from", found)
+    search_by(monkeypatch, found)
     start = replace(first_for(family.modes), points=4, harmonics=1)
     settings, peak, errors = resonance_choice.choose_at_peak(
         family, start, peak_with(4, 1.0), 0.05, ("points",)
@@ -296,7 +302,7 @@ def test_many_harmonics_are_judged_by_half_as_many_again_where_contacts_lift(har
     family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=63))
     settings = replace(first_for(family.modes), harmonics=harmonics, samples=128)
     point = SimpleNamespace(states={"lift": 4}, w=np.zeros((16, 3, 1)))
-    judge = resonance_choice.judge_settings(family, settings, "harmonics", point)
+    judge = peak_errors.judge_settings(family, settings, "harmonics", point)
     assert judge.harmonics == more and judge.samples >= 8 * more
 
 
@@ -316,9 +322,9 @@ def test_few_contacts_that_lift_leave_the_judge_four_times_the_harmonics(monkeyp
         lower = {3: 0.0, 7: 0.01}.get(new.harmonics, 0.1)
         return KnownPeak(1.0 - lower, 100.0, point)
 
-    monkeypatch.setattr(resonance_choice, "peak_from", known)
+    search_by(monkeypatch, known)
     peak = KnownPeak(1.0, 100.0, point)
-    errors = resonance_choice.peak_errors(family, settings, peak, 0.05)
+    errors = peak_errors.peak_errors(family, settings, peak, 0.05)
     assert errors.height["harmonics"] == pytest.approx(1 / (1 - height) - 1)
 
 
@@ -332,10 +338,10 @@ def test_a_choice_for_a_fine_accuracy_begins_with_what_it_mostly_ends_at(monkeyp
 
     def told(family, settings, peak, accuracy, known):
         begun.append(settings)
-        return resonance_choice.PeakErrors(*[dict.fromkeys(resonance_choice.DIRECTIONS, 0.0)] * 2)
+        return peak_errors.PeakErrors(*[dict.fromkeys(DIRECTIONS, 0.0)] * 2)
 
     monkeypatch.setattr(resonance_choice, "peak_errors", told)
-    monkeypatch.setattr(resonance_choice, "peak_from", lambda *given, **options: peak_with(1, 1.0))
+    search_by(monkeypatch, lambda *given, **options: peak_with(1, 1.0))
     monkeypatch.setattr(resonance_choice, "sticks_safely", lambda model, point: False)
     first = first_for(family.modes)
     for settings, accuracy in (

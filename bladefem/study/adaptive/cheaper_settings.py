@@ -13,14 +13,8 @@ from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import lifts_off
 from .family import Family, family_member, lowest_harmonics
-from .resonance_choice import (
-    LIFTING_POINTS,
-    SHIFT_WEIGHT,
-    SUFFICIENT_SHARE,
-    PeakErrors,
-    lacks_harmonics_for_lift_off,
-    peak_from,
-)
+from .peak_errors import SHIFT_WEIGHT, PeakErrors, peak_from
+from .resonance_choice import LIFTING_POINTS, SUFFICIENT_SHARE, lacks_harmonics_for_lift_off
 from .settings import DAMPER_MODELS, FIRST_SETTINGS, Settings
 
 # points of the sweep that follows a choice

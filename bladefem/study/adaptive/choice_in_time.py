@@ -17,15 +17,8 @@ from ...errors import NotSolvedError
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution, mostly_lifts_off, size
 from .family import Family, lowest_harmonics
-from .resonance_choice import (
-    LARGEST_BALANCE,
-    MAX_ENRICHMENTS,
-    MAX_LIFTING_UNKNOWNS,
-    PeakErrors,
-    peak_errors,
-    peak_from,
-    too_large,
-)
+from .peak_errors import PeakErrors, peak_errors, peak_from, too_large
+from .resonance_choice import LARGEST_BALANCE, MAX_ENRICHMENTS, MAX_LIFTING_UNKNOWNS
 from .settings import DIRECTIONS, RICHEST_SETTINGS, Settings, enriched_settings
 
 # respects that a march leaves nothing of

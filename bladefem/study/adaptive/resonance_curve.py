@@ -27,15 +27,11 @@ from .choice import Checked, covered_band, solver_options
 from .choice_in_time import March, choose_in_time, marched_widely
 from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
+from .peak_errors import JUDGE_STEPS, PeakErrors, compared_settings, judge_settings, peak_from
 from .resonance_choice import (
     FAR_BEYOND,
-    JUDGE_STEPS,
-    PeakErrors,
     choose_at_peak,
-    compared_settings,
-    judge_settings,
     lacks_harmonics_for_lift_off,
-    peak_from,
     settings_of_lift_off,
 )
 from .settings import Settings, enriched_settings, same_settings

@@ -20,7 +20,8 @@ from ...hbm.solution import Solution, mostly_lifts_off
 from ...reduction.assemble import change_each
 from .choice import solver_options
 from .family import Family, family_member
-from .resonance_choice import LIFTING_POINTS, peak_from
+from .peak_errors import peak_from
+from .resonance_choice import LIFTING_POINTS
 from .settings import Settings
 
 # harmonics at most of the models that follow the resonance; they have LIFTING_POINTS contact points

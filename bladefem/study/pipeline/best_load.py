@@ -27,7 +27,8 @@ from ...scene.tables import Scene
 from ...scene.validate_contact import friction_of_seats
 from ..adaptive.choice import default_band, solver_options
 from ..adaptive.family import Family, family_member, joined_elements, with_excited_harmonics
-from ..adaptive.resonance_choice import choose_at_peak, too_large
+from ..adaptive.peak_errors import too_large
+from ..adaptive.resonance_choice import choose_at_peak
 from ..adaptive.settings import FIRST_SETTINGS, Settings, same_settings
 from .assemble_model import LoadCase
 

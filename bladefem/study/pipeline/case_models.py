@@ -25,7 +25,8 @@ from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import Family, Member, family_member, shared_harmonics
-from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak, peak_from
+from ..adaptive.peak_errors import peak_from
+from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak
 from ..adaptive.settings import DAMPER_MODELS, Settings, enriched_settings, first_settings
 from ..adaptive.stiff_layer import softened_where_lifting
 from .assemble_model import LoadCase, joint_model
