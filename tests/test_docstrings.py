@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 import doctest
+import re
 from importlib import import_module
 from pathlib import Path
 
@@ -29,3 +31,34 @@ def test_public_names_have_examples():
     mesh_and_modes = ("study.pipeline.scene_mesh", "study.pipeline.normal_modes")
     for name in ("scene.toml", "scene.units", *mesh_and_modes, "report.opened"):
         assert f"bladefem.{name}" in MODULES
+
+
+def arguments_of(function: ast.FunctionDef) -> set[str]:
+    """Names in the signature."""
+    given = function.args
+    every = [*given.posonlyargs, *given.args, *given.kwonlyargs]
+    every += [one for one in (given.vararg, given.kwarg) if one is not None]
+    return {one.arg for one in every}
+
+
+def described_arguments(doc: str) -> list[str]:
+    """Names before the colons of the section "Args"; "a, b: ..." describes two."""
+    section = re.search(r"\n\s*Args:\n(.*?)(?=\n\s*\n|\Z)", doc, re.S)
+    if section is None:
+        return []
+    lines = section[1].splitlines()
+    indent = min(len(line) - len(line.lstrip()) for line in lines if line.strip())
+    heads = [line for line in lines if len(line) - len(line.lstrip()) == indent]
+    names = [re.match(r"\s*([\w, ]+):", line) for line in heads]
+    return [name for found in names if found for name in re.split(r"[, ]+", found[1].strip())]
+
+
+@pytest.mark.parametrize("package", ["bladefem", "geometry", "verification"])
+def test_described_arguments_are_in_the_signature(package):
+    wrong = []
+    for file in sorted((ROOT / package).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                described = set(described_arguments(ast.get_docstring(node) or ""))
+                wrong += [(file.name, node.name, one) for one in described - arguments_of(node)]
+    assert wrong == []

@@ -138,6 +138,7 @@ def iterate(
         method: one of METHODS: "picard", "amplitude", "complex", "parts" (Eq. 34 three ways),
             "anderson", "describing".
         start: (H, n) first platform motion; without damper when left out, as in Fig. 14.
+
     Raises:
         InputError: unknown method.
     """

@@ -37,6 +37,7 @@ def direct(
         most: largest number of periods.
         tolerance: accepted relative change over a period.
         explicit: leapfrog instead of Newmark.
+
     Raises:
         InputError: an explicit step beyond the stability limit.
         NotSolvedError: a time step has no solution (possible only where the normal load follows the

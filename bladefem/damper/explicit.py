@@ -78,6 +78,7 @@ def damper_cycle(
         start: from rest when left out.
         most: largest number of periods.
         tolerance: accepted relative change over a period.
+
     Raises:
         InputError: the step is beyond the stability limit.
     """

@@ -146,6 +146,7 @@ def march(
             out.
         pull: steady force through the centre of mass along x and y [N]. (A steady speed of the
             foundation needs none: only the drift changes, by that speed.)
+
     Raises:
         InputError: the step is beyond the stability limit of the explicit march (2 over the highest
             stuck frequency).

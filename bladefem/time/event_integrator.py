@@ -106,6 +106,7 @@ def integrate_periods(
         samples: equal instants a period in the result; more steps are taken where the fastest
             motion asks for it.
         tangent: also the derivative of the end state by the start state.
+
     Raises:
         InputError: frequency not above zero, or fewer than 8 samples.
     """

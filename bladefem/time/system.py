@@ -109,6 +109,7 @@ def blade_ring(
         ratio: modal damping ratio [1].
         elements: for one blade, tangents = 1, both halves (n,).
         mass: of one damper [kg].
+
     Raises:
         InputError: the residual flexibility is not zero (keep all modes, or leave it out
             knowingly), or an odd port.

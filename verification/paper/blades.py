@@ -178,6 +178,7 @@ def judge(
 
     Args:
         blades, waves: the ring that a travelling wave of phase 2 pi waves / blades needs.
+
     Raises:
         InputError: the model has residual flexibility.
     """
