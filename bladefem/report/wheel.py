@@ -13,12 +13,14 @@ import pandas as pd
 
 from ..scene.units import newton_range, newtons
 from ..study.mistuning.pattern_response import PatternResponse
-from ..study.mistuning.scatter_use import SHARE, ScatteredUse
+from ..study.mistuning.scatter_use import ScatteredUse
 from ..study.mistuning.sector_comparison import SectorComparison, comparison_words
 from ..util.message import warning
 from ..util.percent import percent
 from ..view import wheel as view
 from ..wheel.statistics import (
+    CONFIDENCE_LEVEL,
+    WHEEL_SHARE,
     Amplification,
     RobustOptimum,
     best_load,
@@ -31,6 +33,9 @@ from .headlines import NOT_DETERMINED, Headline
 WHEEL_FIGURE = "wheel/wheel_motion"
 # the first headline of a scatter
 ROBUST_OPTIMUM = "robust optimum of the load of a seat"
+# what stands before the ends of an interval, and the share of the wheels that a design is made for
+INTERVAL = f"{100 * CONFIDENCE_LEVEL:g} % interval"
+WHEELS = f"{100 * WHEEL_SHARE:g} %"
 # quantiles of a scatter
 SCATTER_QUANTILES = (0.5, 0.95, 0.99)
 
@@ -248,7 +253,7 @@ def use_headlines(used: Sequence[ScatteredUse]) -> list[Headline]:
     one = min(used, key=lambda row: row.share.value)
     return [
         Headline(
-            f"utilisation that {100 * SHARE:g} % of wheels stay below",
+            f"utilisation that {WHEELS} of wheels stay below",
             f"{one.share.value:.3g}",
             f"up to {_upper(one.highest)} with the errors of sample, mesh and loading history",
             f"under {newtons(one.load, 4)}; {one.tuned:.3g} on the tuned wheel",
@@ -259,8 +264,8 @@ def use_headlines(used: Sequence[ScatteredUse]) -> list[Headline]:
 def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
     """The utilisation with scatter in words, with what it assumes."""
     return [
-        f"utilisation under {newtons(one.load, 4)}: {100 * SHARE:g} % of wheels stay below "
-        f"{one.share.value:.3g} (95 % interval {one.share.low:.3g} to {_upper(one.share.high)}), "
+        f"utilisation under {newtons(one.load, 4)}: {WHEELS} of wheels stay below "
+        f"{one.share.value:.3g} ({INTERVAL} {one.share.low:.3g} to {_upper(one.share.high)}), "
         f"the tuned wheel uses {one.tuned:.3g}; with the upper ends of the errors of mesh and "
         f"loading history {_upper(one.highest)}; the highest blade is taken to move in the tuned "
         "wheel's shape"
@@ -279,14 +284,14 @@ def scatter_headlines(found: Amplification) -> list[Headline]:
     i = _lowest_known(found)
     if i is None:
         return numbers
-    factor = found.quantile(i, SHARE)
+    factor = found.quantile(i, WHEEL_SHARE)
     return [
         *numbers,
         Headline(
             f"amplification at {newtons(found.loads[i], 4)}, where the tuned wheel is lowest",
             f"{factor.value:.3g}",
-            f"95 % interval {factor.low:.3g} to {_upper(factor.high)}",
-            f"highest blade over the tuned wheel, {100 * SHARE:g} % of {found.peak.shape[1]} "
+            f"{INTERVAL} {factor.low:.3g} to {_upper(factor.high)}",
+            f"highest blade over the tuned wheel, {WHEELS} of {found.peak.shape[1]} "
             "wheels stay below",
         ),
     ]
@@ -300,7 +305,7 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
         Headline(
             ROBUST_OPTIMUM,
             newtons(robust.load.value, 4),
-            f"95 % interval {newton_range(robust.load.low, robust.load.high)}",
+            f"{INTERVAL} {newton_range(robust.load.low, robust.load.high)}",
             f"lowest amplitude that {words} stay below, by the bootstrap over the wheels",
         ),
         Headline(
@@ -312,7 +317,7 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
         Headline(
             "highest blade at the robust optimum",
             f"{1e6 * robust.height.value:.4g} µm",
-            f"95 % interval {1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} µm",
+            f"{INTERVAL} {1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} µm",
             f"{words} stay below",
         ),
     ]
@@ -341,10 +346,10 @@ def scatter_sentences(found: Amplification, held_means: bool = False) -> list[st
     sentences = _optimum_sentences(found)
     i = _lowest_known(found)
     if i is not None:
-        q = found.quantile(i, 0.95)
+        q = found.quantile(i, WHEEL_SHARE)
         sentences.append(
-            f"at {newtons(found.loads[i])}, where the tuned wheel is lowest, 95 % of "
-            f"{found.peak.shape[1]} wheels stay below {q.value:.3g} times it (95 % interval "
+            f"at {newtons(found.loads[i])}, where the tuned wheel is lowest, {WHEELS} of "
+            f"{found.peak.shape[1]} wheels stay below {q.value:.3g} times it ({INTERVAL} "
             f"{q.low:.3g} to {_upper(q.high)})"
         )
     sentences.extend(_comparison_sentences(found))
@@ -373,7 +378,7 @@ def _lowest_known(found: Amplification) -> int | None:
 
 def optimum_is_known(found: Amplification) -> bool:
     """There are several loads, and amplifications are known where the wheels are lowest."""
-    heights = np.quantile(found.peak, SHARE, axis=1)
+    heights = np.quantile(found.peak, WHEEL_SHARE, axis=1)
     return len(found.loads) > 1 and bool(found.is_known[np.argmin(heights)])
 
 
@@ -471,7 +476,7 @@ def _optimum_sentences(found: Amplification) -> list[str]:
     sentences = [
         f"tuned optimum: {newtons(load, 4)}, {1e6 * height:.4g} um",
         f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
-        f"{newtons(robust.load.value, 4)} (95 % interval "
+        f"{newtons(robust.load.value, 4)} ({INTERVAL} "
         f"{newton_range(robust.load.low, robust.load.high)}), {1e6 * robust.height.value:.4g} um "
         f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
         "between the loads studied both optima are those of a parabola, whose error the intervals "
@@ -483,7 +488,7 @@ def _optimum_sentences(found: Amplification) -> list[str]:
             f"under {', '.join(f'{load:g}' for load in unknown)} N, where amplifications are not "
             "known, each drawn wheel counts as high as the tuned one, and is higher"
         )
-    if robust.at_end > 0.025:
+    if robust.at_end > (1 - CONFIDENCE_LEVEL) / 2:
         sentences.append(
             f"in {100 * robust.at_end:.0f} % of the resamples the robust optimum is the smallest "
             "or the largest load: the interval is open there, expected a wider study.loads"

@@ -29,6 +29,8 @@ from .resonance import Respond, find_wheel_peak
 from .solve import TUNED_PATTERN, WheelSolution, solve_wheel
 
 CONFIDENCE_LEVEL = 0.95
+# of the wheels that stay below what a design is made for
+WHEEL_SHARE = 0.95
 # of the bootstrap: its intervals then move by a few per cent of their width
 BOOTSTRAP_RESAMPLES = 1000
 
@@ -328,7 +330,7 @@ def best_load(loads: np.ndarray, heights: np.ndarray) -> tuple[float, float]:
 
 def robust_optimum(
     found: Amplification,
-    share: float = 0.95,
+    share: float = WHEEL_SHARE,
     confidence: float = CONFIDENCE_LEVEL,
 ) -> RobustOptimum:
     """The load with the smallest quantile of the highest blade, between the loads.

@@ -9,12 +9,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...wheel.statistics import Amplification, Quantile
+from ...wheel.statistics import WHEEL_SHARE, Amplification, Quantile
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.utilisation import highest_use, run_utilisation
-
-# of the wheels that stay below
-SHARE = 0.95
 
 
 @dataclass(frozen=True)
@@ -25,8 +22,8 @@ class ScatteredUse:
     load: float
     # utilisation of the tuned wheel
     tuned: float
-    # utilisation of the highest blade that SHARE of the wheels stay below, with the interval that
-    # the number of wheels leaves, and what checked wheels are off the law of one damper
+    # utilisation of the highest blade that WHEEL_SHARE of the wheels stay below, with the interval
+    # that the number of wheels leaves, and what checked wheels are off the law of one damper
     share: Quantile
     # upper end of that interval with the upper ends of the errors of mesh and loading history
     # (contact tractions); infinite with too few wheels
@@ -52,7 +49,7 @@ def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
         # an amplification that is not known leaves that of the stress unknown too
         places = [i for i, one in enumerate(found.loads) if one == load and found.is_known[i]]
         for i in places:
-            factor = found.quantile(i, SHARE)
+            factor = found.quantile(i, WHEEL_SHARE)
             share = Quantile(*(tuned * one for one in (factor.value, factor.low, factor.high)))
             highest = highest_use(run, number, used) * factor.high
             rows.append(ScatteredUse(load, tuned, share, highest))
