@@ -289,12 +289,12 @@ def prepared(
 
         scene = given_scene(options, responds)
         given = _given_fields(options)
-        options.held.enter_context(lock_run_folder(folder))
 
         def tell_of_moves(sentence: str) -> None:
             if not options.quiet:
                 print(f"bladefem: {sentence}", file=sys.stderr, flush=True)
 
+        options.held.enter_context(lock_run_folder(folder, tell_of_moves))
         take_folder(folder, scene, same_mesh, tell_of_moves)
         keep_given(folder, given)
         return scene

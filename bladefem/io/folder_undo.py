@@ -7,11 +7,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from .own_results import RESULTS_FILE, SCENE_FILE, move_user_files
+
 # results of the scene before, put away by a command, and what that name held until then
 EARLIER_FOLDER = "earlier"
 REPLACED_FOLDER = ".earlier"
-# the scene with all its values, and the fields of it that the user gave
-SCENE_FILE = "scene.toml"
+# the fields of the scene that the user gave
 GIVEN_FIELDS_FILE = "given.json"
 # of stored stages the one that is no long work: what is bad in a mesh is found right after it
 SHORT_STAGE = "mesh.npz"
@@ -66,7 +67,10 @@ def restore_folder(before: FolderState) -> bool:
             path.unlink()
         if put_away:
             for path in earlier.iterdir():
-                path.rename(folder / path.name)
+                if path.name == RESULTS_FILE:
+                    path.unlink()
+                else:
+                    path.rename(folder / path.name)
             earlier.rmdir()
             if (folder / REPLACED_FOLDER).is_dir():
                 (folder / REPLACED_FOLDER).rename(earlier)
@@ -81,8 +85,13 @@ def restore_folder(before: FolderState) -> bool:
 
 
 def forget_replaced(folder: str | Path) -> None:
-    """Remove for good what the put-away results have replaced."""
-    shutil.rmtree(Path(folder) / REPLACED_FOLDER, ignore_errors=True)
+    """Remove for good what the put-away results have replaced, but for what bladefem did not
+    write.
+    """
+    replaced = Path(folder) / REPLACED_FOLDER
+    if replaced.is_dir():
+        move_user_files(replaced, Path(folder) / EARLIER_FOLDER)
+        shutil.rmtree(replaced, ignore_errors=True)
 
 
 def _files(folder: Path) -> set[Path]:

@@ -20,39 +20,40 @@ from .folder_undo import (
     EARLIER_FOLDER,
     GIVEN_FIELDS_FILE,
     REPLACED_FOLDER,
-    SCENE_FILE,
     folder_state,
     forget_replaced,
     restore_folder,
 )
+from .own_results import (
+    NAMED_MESH,
+    RESULTS_FILE,
+    SCENE_FILE,
+    USER_FOLDER,
+    note_results,
+    result_states,
+    return_user_files,
+    save_user_files,
+    written_results,
+)
 from .stage_cache import open_folder, write_text
 
-# not all .msh are results: a mesh of the user's own may lie in the folder
-NAMED_MESH = "named_mesh.msh"
 # what belongs to the mesh alone
 MESH_FILES = (NAMED_MESH, "mesh.vtu")
 # of what is put away, and of the reasons for it: those that are named
 NAMED_FILES = 3
 NAMED_FIELDS = 3
-RESULT_SUFFIXES = (
-    ".csv",
-    ".gif",
-    ".html",
-    ".json",
-    ".md",
-    ".nc",
-    ".png",
-    ".svg",
-    ".tex",
-    ".txt",
-    ".vtu",
-)
 
 
 @contextmanager
-def lock_run_folder(folder: str | Path) -> Iterator[None]:
+def lock_run_folder(
+    folder: str | Path, tell: Callable[[str], None] | None = None
+) -> Iterator[None]:
     """Keep a run folder for this process; the system gives it back when the process ends, however
     it ends. A command that ends by bad input, before any long work, leaves the folder as it was.
+
+    Args:
+        tell: takes a sentence about files of the user's that the command has overwritten, and where
+            they are.
 
     Raises:
         InputError: another process holds it, or the folder cannot be written.
@@ -74,6 +75,9 @@ def lock_run_folder(folder: str | Path) -> Iterator[None]:
         except OSError:
             # a file system without locks
             pass
+        return_user_files(folder)
+        states, written = result_states(folder), written_results(folder)
+        save_user_files(folder)
         try:
             yield
         except InputError as error:
@@ -82,6 +86,15 @@ def lock_run_folder(folder: str | Path) -> Iterator[None]:
                 error.args = (f"{error}; the results that were moved are back",)
             raise
         finally:
+            kept = return_user_files(folder)
+            if kept and tell is not None:
+                tell(
+                    f"{', '.join(kept)} in {folder} came from elsewhere; bladefem has written "
+                    f"{'a file of that name' if len(kept) == 1 else 'files of these names'}, and "
+                    f"yours {'is' if len(kept) == 1 else 'are'} in {Path(folder) / USER_FOLDER}"
+                )
+            if Path(folder).is_dir() and result_states(folder) != states:
+                note_results(folder, states, written)
             forget_replaced(folder)
     finally:
         os.close(file)
@@ -183,28 +196,22 @@ def _announcement(folder: Path, results: Sequence[Path], fields: Sequence[str]) 
     """What will be put away, why, what stays, and what else can be done."""
     names = sorted(path.name for path in results)
     more = f" and {len(names) - NAMED_FILES} more" if len(names) > NAMED_FILES else ""
+    verb = "is" if len(names) == 1 else "are"
     why = ""
     if fields:
         others = f" and {len(fields) - NAMED_FIELDS} more" if len(fields) > NAMED_FIELDS else ""
         why = f", which differs in {', '.join(fields[:NAMED_FIELDS])}{others}"
     return (
-        f"{folder} holds results of another scene{why}: {', '.join(names[:NAMED_FILES])}{more} are "
-        f"moved to {folder / EARLIER_FOLDER}, since tables and reports have one scene; stored "
-        "stages stay, and those that do not depend on it are not computed again; another folder, "
+        f"{folder} holds results of another scene{why}: {', '.join(names[:NAMED_FILES])}{more} "
+        f"{verb} moved to {folder / EARLIER_FOLDER}, since tables and reports have one scene; "
+        "stored stages stay, and those that do not depend on it are not computed again; another folder, "
         "-o, keeps both"
     )
 
 
 def _results_in(folder: Path, kept: Container[str]) -> list[Path]:
-    """Results in a folder other than the kept files."""
-    return [
-        p
-        for p in folder.iterdir()
-        if (p.suffix in RESULT_SUFFIXES or p.name == NAMED_MESH)
-        and not p.name.startswith(".")
-        and p.name not in kept
-        and p.is_file()
-    ]
+    """Results of bladefem's in a folder other than the kept files."""
+    return [folder / name for name in sorted(written_results(folder)) if name not in kept]
 
 
 def _put_away(folder: Path, results: Sequence[Path]) -> str:
@@ -217,6 +224,8 @@ def _put_away(folder: Path, results: Sequence[Path]) -> str:
         if earlier.is_dir():
             earlier.rename(folder / REPLACED_FOLDER)
         earlier.mkdir()
+        if (folder / RESULTS_FILE).is_file():
+            shutil.copy2(folder / RESULTS_FILE, earlier / RESULTS_FILE)
         for path in [*results, folder / SCENE_FILE]:
             path.rename(earlier / path.name)
     except OSError as error:

@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from bladefem.errors import InputError, NotSolvedError
+from bladefem.io.own_results import RESULTS_FILE
 from bladefem.io.run_folder import keep_given, lock_run_folder, take_folder
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
@@ -17,7 +18,8 @@ OTHER = vary(Scene(), contact__mu=0.2)
 
 
 def results(folder):
-    return {str(p.relative_to(folder)) for p in folder.rglob("*") if p.is_file()}
+    files = (p for p in folder.rglob("*") if p.is_file() and p.name != RESULTS_FILE)
+    return {str(p.relative_to(folder)) for p in files}
 
 
 def test_results_go_with_their_scene_and_stages_stay(tmp_path):
@@ -94,6 +96,7 @@ def test_a_scene_that_cannot_be_read_counts_as_another(tmp_path):
 
 HOLDER = """
 import sys
+from bladefem.io.own_results import RESULTS_FILE
 from bladefem.io.run_folder import lock_run_folder
 with lock_run_folder(sys.argv[1]):
     print("held", flush=True)
@@ -174,3 +177,49 @@ def test_what_results_replace_is_gone_after_the_command(tmp_path):
     assert (tmp_path / "earlier" / "report.md").read_text() == "second"
     assert results(tmp_path / "earlier") == {"report.md", "scene.toml"}
     assert not (tmp_path / ".earlier").exists()
+
+
+def command(folder, scene, **files):
+    """What a command does: it takes the folder, and writes files of its own."""
+    told = []
+    with lock_run_folder(folder, told.append):
+        moved = take_folder(folder, scene)
+        for name, text in files.items():
+            (folder / f"{name}.md").write_text(text)
+    return moved, told
+
+
+def test_files_of_the_user_stay_through_any_number_of_commands(tmp_path):
+    """Results of other scenes come and go; a file that bladefem did not write is never one."""
+    command(tmp_path, Scene(), report="first")
+    (tmp_path / "notes.txt").write_text("mine")
+    (tmp_path / "earlier").mkdir()
+    (tmp_path / "earlier" / "older.csv").write_text("mine too")
+    for number, scene in enumerate((OTHER, Scene(), OTHER)):
+        moved, told = command(tmp_path, scene, report=f"run {number}")
+        assert "1 file moved" in moved and told == []
+    assert (tmp_path / "notes.txt").read_text() == "mine"
+    assert (tmp_path / "earlier" / "older.csv").read_text() == "mine too"
+    assert (tmp_path / "earlier" / "report.md").read_text() == "run 1"
+
+
+def test_a_file_of_the_user_that_is_overwritten_is_kept(tmp_path):
+    """In a folder that is no run folder yet, twice, and one that was edited after it was written."""
+    (tmp_path / "report.md").write_text("mine")
+    _, told = command(tmp_path, Scene(), report="first")
+    assert "report.md" in told[0] and "not_from_bladefem" in told[0]
+    assert (tmp_path / "report.md").read_text() == "first"
+    (tmp_path / "report.md").write_text("first, with my remarks")
+    command(tmp_path, Scene(), report="second")
+    kept = tmp_path / "not_from_bladefem"
+    assert (kept / "report.md").read_text() == "mine"
+    assert (kept / "report_2.md").read_text() == "first, with my remarks"
+    assert not (tmp_path / ".saved").exists()
+
+
+def test_a_killed_command_leaves_the_files_of_the_user(tmp_path):
+    (tmp_path / ".saved").mkdir()
+    (tmp_path / ".saved" / "report.md").write_text("mine")
+    (tmp_path / "report.md").write_text("half")
+    command(tmp_path, Scene())
+    assert (tmp_path / "not_from_bladefem" / "report.md").read_text() == "mine"
