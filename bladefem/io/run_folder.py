@@ -204,8 +204,8 @@ def _announcement(folder: Path, results: Sequence[Path], fields: Sequence[str]) 
     return (
         f"{folder} holds results of another scene{why}: {', '.join(names[:NAMED_FILES])}{more} "
         f"{verb} moved to {folder / EARLIER_FOLDER}, since tables and reports have one scene; "
-        "stored stages stay, and those that do not depend on it are not computed again; another folder, "
-        "-o, keeps both"
+        "stored stages stay, and those that do not depend on it are not computed again; another "
+        "folder, -o, keeps both"
     )
 
 

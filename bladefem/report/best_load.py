@@ -223,8 +223,9 @@ def reasons_against(
     """
     found = []
     if searched is not None and len(searched):
+        # why, without every way that was tried: the run's remarks have those
         found += [
-            f"the exact search failed ({reason})"
+            f"the exact search failed ({reason.partition(': ')[0]})"
             for reason in searched["reason"]
             if isinstance(reason, str) and reason
         ]

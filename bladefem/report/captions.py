@@ -154,8 +154,9 @@ CAPTIONS = {
     "resonance amplitude: of the balance, of contact points, of the body's mesh and of the layer; "
     "without damper and in full stick (load ∞) the response is linear, and it is that of modes, "
     "contact points and meshes. "
-    "Stresses with an error by the mesh are those of the whole motion; the others are of the "
-    "excited mode alone, which leaves out other modes, higher harmonics and damper forces.",
+    "The alternating stress is that of the whole motion, computed under the best load and under "
+    "the damper's own; that of the excited mode alone leaves out other modes, higher harmonics and "
+    "damper forces, and compares loads.",
     "accuracy/loads_with_doubtful_points": "Loads with points that did not converge or needed a "
     "fallback.",
 }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -122,8 +122,19 @@ class RunFolder:
 
     @cached_property
     def response(self) -> Arrays:
-        """Amplitude and phase over (load, frequency); ``.plot()`` draws the curves."""
-        return Arrays("response", self.group("response"), _draw_response)
+        """Amplitude and phase over (load, frequency); ``.plot()`` draws the curves, with what the
+        table of points knows of branches, stability and marches.
+        """
+        draw = partial(_draw_response, self._points)
+        return Arrays("response", self.group("response"), draw)
+
+    @cached_property
+    def _points(self) -> pd.DataFrame | None:
+        """One row a response point; None where the results have no such table."""
+        try:
+            return self.group("points").to_dataframe()
+        except InputError:
+            return None
 
     @cached_property
     def resonance(self) -> Arrays:
@@ -285,11 +296,23 @@ def _patches(scene: Scene, folder: Path) -> list[Patch]:
     return list(stored_stage(folder, seating_stage(scene)).patches)
 
 
-def _draw_response(data: xr.Dataset, file: str | Path | None = None, **options: Any) -> object:
-    """Curves of one damper mass, the first where there are several."""
+def _draw_response(
+    points: pd.DataFrame | None,
+    data: xr.Dataset,
+    file: str | Path | None = None,
+    **options: Any,
+) -> object:
+    """Curves of one damper mass, the first where there are several.
+
+    Args:
+        points: table of all points, with columns that the arrays do not have.
+    """
+    table = data.to_dataframe().reset_index() if points is None else points
     if "mass" in data.dims:
-        data = data.isel(mass=0)
-    table = data.to_dataframe().reset_index()
+        mass = float(data["mass"][0])
+        table = table[table["mass"].isna() | (table["mass"] == mass)]
+    table = table[table["load"].isin(data["load"].to_numpy())]
+    table = table[table["frequency"].isin(data["frequency"].to_numpy())]
     table = table[table["converged"].notna()].copy()
     table["converged"] = table["converged"].astype(bool)
     return response.draw_responses(table, file, **options)

@@ -59,6 +59,7 @@ PAGE_COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
             "reduction",
             "alternating_stress",
             "stress_error",
+            "mode_stress",
             "dissipated",
             "error",
             "points",

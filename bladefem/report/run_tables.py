@@ -80,13 +80,16 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
 
 
 def _summary(result: SolvedRun) -> pd.DataFrame:
-    """The design table, with the alternating stress at each resonance and its error by the mesh."""
+    """The design table with stresses at each resonance: of the whole motion where that was
+    computed, and of the excited mode alone, in proportion to the amplitude.
+    """
     table = pd.DataFrame(design_table(result.response.curves, result.response.limits))
     place = table.columns.get_loc("reduction") + 1
-    stress = _alternating(result, table["peak_amplitude"].to_numpy())
-    table.insert(place, "alternating_stress", stress)
+    mode_alone = result.strength.alternating * table["peak_amplitude"].to_numpy()
+    table.insert(place, "mode_stress", mode_alone)
     if result.damped:
-        table.insert(place + 1, "stress_error", _stress_errors(result, len(table)))
+        table.insert(place, "stress_error", _stress_errors(result, len(table)))
+        table.insert(place, "alternating_stress", _alternating(result, len(table)))
     return table
 
 
@@ -100,12 +103,11 @@ def _stress_errors(result: SolvedRun, rows: int) -> np.ndarray:
     return errors
 
 
-def _alternating(result: SolvedRun, amplitudes: np.ndarray) -> np.ndarray:
-    """(rows,) alternating stress [Pa] of the design table: of the whole motion where that was
-    computed, in proportion to the amplitude where a march contradicts it, of the mode alone at
-    the other loads, without damper and stuck.
+def _alternating(result: SolvedRun, rows: int) -> np.ndarray:
+    """(rows,) alternating stress [Pa] of the whole motion, in proportion to the amplitude where a
+    march contradicts it; NaN where it was not computed.
     """
-    stress = result.strength.alternating * amplitudes
+    stress = np.full(rows, np.nan)
     for number, found in (result.damped or {}).items():
         stress[1 + number] = result.response.curves[number].over_balance * found.largest
     return stress

@@ -146,8 +146,10 @@ def stress(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]
     """What the amplitude means for the blade."""
     if not np.isfinite(best.get("alternating_stress", np.nan)):
         return []
-    free = summary.loc[summary["load"] == 0, "alternating_stress"]
-    remark = f"; {1e-6 * free.iloc[0]:.3g} MPa without damper" if len(free) else ""
+    free = summary.loc[summary["load"] == 0]
+    remark = ""
+    if len(free) and "mode_stress" in free:
+        remark = f"; {1e-6 * free['mode_stress'].iloc[0]:.3g} MPa of the mode without damper"
     return [
         (
             "alternating stress there",

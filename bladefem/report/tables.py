@@ -147,6 +147,7 @@ COLUMNS = {
     "largest": Column("largest displacement", "m", "µm", 1e6),
     "alternating_stress": Column("alternating stress", "Pa", "MPa", 1e-6, 4),
     "stress_error": Column("error of the stress by the mesh", "1", "%", 100.0, 2),
+    "mode_stress": Column("stress of the excited mode alone", "Pa", "MPa", 1e-6, 4),
     "mean_stress": Column("mean stress", "Pa", "MPa", 1e-6, 4),
     "allowed_stress": Column("allowed amplitude", "Pa", "MPa", 1e-6, 4),
     "utilisation": Column("utilisation", "1", digits=3),

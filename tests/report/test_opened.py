@@ -32,6 +32,7 @@ from bladefem.study.pipeline.run_records import (
     SolvedRun,
     folder_of,
 )
+from bladefem.view.response import MARCHED
 from geometry.mesh import Mesh
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
@@ -152,6 +153,23 @@ def test_results_draw_themselves(run, name, tmp_path):
     arrays.plot(tmp_path / "all.png")
     arrays.isel(load=0).plot(tmp_path / "one.png")
     assert all((tmp_path / file).stat().st_size > 5000 for file in ("all.png", "one.png"))
+
+
+def test_a_picture_of_a_response_knows_what_its_table_knows(tmp_path):
+    """The resonance is the march, not the unstable balance above it."""
+    table = points().query("load == 200 and converged").reset_index(drop=True)
+    top = int(table["amplitude"].idxmax())
+    table["stability"] = np.where(table.index == top, "unstable", "stable")
+    march = table.iloc[[top]].assign(amplitude=0.9 * table["amplitude"][top], method=MARCHED)
+    table = pd.concat([table, march.assign(stability="stable")], ignore_index=True)
+    (tmp_path / "scene.toml").write_text(dump_scene(Scene()))
+    groups = {"response": curve_arrays(table), "points": xr.Dataset.from_dataframe(table)}
+    write_results(tmp_path / "results.nc", groups, dump_scene(Scene()))
+    figure = bladefem.open(tmp_path).response.sel(load=200).plot()
+    (axes,) = figure.axes
+    assert [line.get_marker() for line in axes.lines].count("D") == 1
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert "unstable (1)" in labels
 
 
 def test_representations_are_short_and_safe(run):
