@@ -36,7 +36,7 @@ def require_browser() -> list[str]:
     if command is None:
         raise InputError(
             f"--pdf: no Chromium was found, expected one of {', '.join(BROWSERS)} (Debian: apt "
-            "install chromium); any browser prints report.html as well"
+            "install chromium); any browser prints the HTML page as well"
         )
     return command
 
