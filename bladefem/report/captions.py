@@ -52,11 +52,16 @@ CAPTIONS = {
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
-    "and amplitude over load for each value.",
+    "and amplitude over load for each value. Bars are estimated errors; diamonds are resonances "
+    "that a march in time gives, or the stiff layer that a softer one stands for, squares unstable "
+    "balances; hollow marks have an unknown error.",
     "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
-    "over the values of both fields; the smallest in bold.",
+    "over the values of both fields, with its estimated error and what gives it where that is no "
+    "stable balance; the smallest in bold.",
     "response/study_band": "Resonance amplitude over the loads that all samples have: median of "
-    "the samples, the middle 80 % of them, and all; in grey the blade without damper.",
+    "the samples and the middle 80 % of them where there are ten at least, and all; in grey the "
+    "blade without damper.",
+    "response/band": "Resonance amplitude over the samples under each load.",
     "response/accuracy_of_methods_and_models": "Error of the resonance amplitude over computing "
     "time; the star is the automatic choice, the stairs are what no other setting beats.",
     "response/errors_of_each": "Errors of resonance amplitude and frequency of each setting.",
