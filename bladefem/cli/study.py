@@ -87,6 +87,8 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
         place = f"{said} ({number} of {len(parts)})"
         begun = time.perf_counter()
         tell(options, comm, partial(str, f"\n{place}"))
+        # files and pipes get their lines while a value is at work
+        sys.stdout.flush()
         if done:
             on_root(comm, partial(_borrow_stages, Path(parts[0].output), Path(one.output)))
         run = _solve_variant(one, comm)
@@ -101,7 +103,6 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
         if not sys.stdout.isatty():
             seconds = time.perf_counter() - begun
             tell(options, comm, partial(_finished_line, place, seconds, done[-1]))
-        # files and pipes get their lines while the next value is at work
         sys.stdout.flush()
     written = ", ".join(map(str, files))
     tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
