@@ -6,6 +6,8 @@ One field: curves over its values. Two fields: a map. Scattered fields: a band o
 from __future__ import annotations
 
 import argparse
+import sys
+import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,11 +16,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..scene.units import newtons
 from ..util.communicator import Communicator
 from . import tables
 from .commands import given_scene, prepared, run_folder, tell
 
 if TYPE_CHECKING:
+    from ..report.study import Variant
     from ..study.pipeline.run_records import SolvedRun
 
 # runs of one study
@@ -80,20 +84,40 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
     files: list[Path] = []
     for number, (values, one, scene) in enumerate(zip(plan.runs, parts, scenes, strict=True), 1):
         said = ", ".join(f"{n} = {v}" for n, v in zip(plan.names, values, strict=True))
-        progress = f"\n{said} ({number} of {len(parts)})"
-        tell(options, comm, partial(str, progress))
+        place = f"{said} ({number} of {len(parts)})"
+        begun = time.perf_counter()
+        tell(options, comm, partial(str, f"\n{place}"))
+        # files and pipes get their lines while a value is at work
+        sys.stdout.flush()
         if done:
             on_root(comm, partial(_borrow_stages, Path(parts[0].output), Path(one.output)))
         run = _solve_variant(one, comm)
         tell(options, comm, partial(tables.response_tables, run.response), run)
         # not before the first line: it is slow to load
-        from ..report.study import Variant
+        from ..report.study import Variant, warnings_of_variant
 
-        done.append(Variant("; ".join(values), scene, run.response))
+        warnings = warnings_of_variant(run.response, run.messages)
+        done.append(Variant("; ".join(values), scene, run.response, warnings))
         # so that an interruption leaves some
         table, files = on_root(comm, lambda: plan.write(done, base))
+        if not sys.stdout.isatty():
+            seconds = time.perf_counter() - begun
+            tell(options, comm, partial(_finished_line, place, seconds, done[-1]))
+        sys.stdout.flush()
     written = ", ".join(map(str, files))
     tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
+
+
+def _finished_line(place: str, seconds: float, variant: Variant) -> str:
+    """One line a value for logs: the value, the time and the result."""
+    from ..report.best_load import error_words
+    from ..report.study import study_tables
+
+    best = study_tables([variant])[0].iloc[0]
+    return (
+        f"finished: {place} in {seconds:.3g} s: {1e6 * best['peak_amplitude']:.4g} um, "
+        f"{error_words(best)}, at {best['peak_frequency']:.5g} Hz under {newtons(best['load'], 4)}"
+    )
 
 
 def _solve_variant(options: argparse.Namespace, comm: Communicator | None) -> SolvedRun:
@@ -127,8 +151,8 @@ def _make_plan(options: argparse.Namespace) -> Plan:
     if len(runs) > MOST_RUNS:
         raise InputError(f"--vary: {len(runs)} runs, expected at most {MOST_RUNS}")
     if len(fields) == 1:
-        return Plan(names, runs, _write_one(names[0]), lambda t: tables.side_by_side(names[0], t))
-    return Plan(names, runs, _write_map(names, values), _map_table)
+        return Plan(names, runs, _write_one(names[0]), partial(_value_table, names[0]))
+    return Plan(names, runs, _write_map(names, values), partial(_map_table, names, values))
 
 
 def _scatter_plan(options: argparse.Namespace) -> Plan:
@@ -167,10 +191,22 @@ def _write_map(
     return write
 
 
-def _map_table(table: Any) -> str:
-    """The columns that fit on a terminal."""
-    shown = [*table.columns[:2], "load", "peak_frequency", "peak_amplitude", "reduction", "error"]
-    return tables.report_table(table[shown])
+def _value_table(name: str, table: Any) -> str:
+    """The values side by side, and the best one where the errors separate it."""
+    from ..report.best_value import best_value_lines
+    from ..report.study import best_values
+
+    return f"{tables.side_by_side(name, table)}\n{best_value_lines(best_values(name, table))}"
+
+
+def _map_table(names: tuple[str, ...], values: list[list[str]], table: Any) -> str:
+    """The columns that fit on a terminal, and the best values where the errors separate them."""
+    from ..report.best_value import best_value_lines
+    from ..report.study_map import best_pair
+
+    shown = [*names, "load", "peak_frequency", "peak_amplitude", "reduction", "error"]
+    best = best_pair((names[0], names[1]), (values[0], values[1]), table)
+    return f"{tables.report_table(table[shown])}\n{best_value_lines(best)}"
 
 
 def _parse_variation(text: str) -> tuple[str, list[str]]:

@@ -102,7 +102,7 @@ def survey_tables(found: Survey) -> str:
     if found.convergence is not None:
         parts.append(_convergence_table(found.convergence.summary))
     if found.answer is not None:
-        columns = ["mode", "frequency", "amplitude", "phase", "largest"]
+        columns = ["mode", "frequency", "amplitude", "phase", "largest", "peaked"]
         parts.append(report_table(found.answer.resonances[columns]))
     if found.mac is not None:
         rows = [[i + 1, row.argmax() + 1, f"{row.max():.4f}"] for i, row in enumerate(found.mac)]

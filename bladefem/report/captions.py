@@ -26,11 +26,15 @@ CAPTIONS = {
     "motion of the root along each axis.",
     "modes/wave": "The excited mode as a wave that turns round the wheel.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
-    "marked where an order meets the wave that it excites.",
-    "modes/crossings": "Speeds at which an engine order excites a mode.",
+    "marked where an order meets the wave that it excites. Drawn are orders 1 to 5 and those next "
+    "to the scene's own, with the nodal diameters that they excite; the table of crossings has all "
+    "orders.",
+    "modes/crossings": "Speeds at which an engine order excites a mode; the orders are those named "
+    "under accuracy and method.",
     "modes/interference": "Interference diagram at the operating speed: engine orders against "
     "nodal diameters.",
-    "modes/margins": "The mode closest to each engine order at the operating speed.",
+    "modes/margins": "The mode closest to each engine order at the operating speed; at rest the "
+    "lowest mode, which no order excites.",
     "modes/mac": "Modal assurance criterion against the modes of the other run.",
     "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
     "response/best_load": "The load that makes the resonance smallest, by exact search; every load "
@@ -52,19 +56,26 @@ CAPTIONS = {
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
-    "and amplitude over load for each value.",
+    "and amplitude over load for each value. Bars are estimated errors; diamonds are resonances "
+    "that a march in time gives, or the stiff layer that a softer one stands for, squares unstable "
+    "balances; hollow marks have an unknown error.",
     "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
-    "over the values of both fields; the smallest in bold.",
+    "over the values of both fields, with its estimated error and what gives it where that is no "
+    "stable balance; the smallest in bold.",
     "response/study_band": "Resonance amplitude over the loads that all samples have: median of "
-    "the samples, the middle 80 % of them, and all; in grey the blade without damper.",
+    "the samples and the middle 80 % of them where there are ten at least, and all; in grey the "
+    "blade without damper.",
+    "response/band": "Resonance amplitude over the samples under each load.",
     "response/accuracy_of_methods_and_models": "Error of the resonance amplitude over computing "
     "time; the star is the automatic choice, the stairs are what no other setting beats.",
     "response/errors_of_each": "Errors of resonance amplitude and frequency of each setting.",
     "accuracy/methods": "Methods on the same model: time and errors.",
     "accuracy/models": "Models by the full balance of harmonics: time and errors.",
     "accuracy/meshes": "Meshes with the settings of the automatic choice: time and errors.",
-    "modes/stresses": "Where the blade is stressed most: by rotation, and by the excited mode "
-    "scaled to 1 mm at the probe (mesh values at Gauss points).",
+    "modes/stresses": "Where the blade is stressed most: by rotation and heat, by each of the "
+    "first modes in the excited nodal diameter scaled to a largest displacement of 1 mm, and, "
+    "where a linear response was asked for, at each of its resonances. Stresses are values at "
+    "nodes; von Mises also at Gauss points.",
     "modes/fatigue": "The places of the blade that use most of what the material lasts: "
     "alternating stress of the whole damped motion, mean stress of rotation (negative: "
     "compression), the amplitude allowed there, and the utilisation with the upper ends of its "
@@ -131,6 +142,9 @@ CAPTIONS = {
     "the highest of each curve that is not unstable, diamonds the resonances that a march in time "
     "gives, or the stiff layer that a softer one stands for, in place of it; squares are unstable "
     "motions, and coloured lines are dashed next to them.",
+    "response/forced_response_linear": "Linear response without damper: amplitude and phase at the "
+    "probe over frequency. Dots are its resonances with the numbers of their modes, hollow where "
+    "the amplitude has no maximum near the natural frequency, which stands there.",
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
     "The star marks the best load, by exact search where that was made, with the band of loads "
     "that keep within the accuracy of it; there is none where the answer names no optimum. Bars "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from ..io.stage_cache import write_table, write_text
@@ -12,8 +13,15 @@ from ..study.chart.chart import Chart
 from ..util.message import Message, method
 from ..util.percent import percent
 from ..view.chart import draw_chart, draw_errors
-from .headlines import Headline
+from .headlines import NOT_DETERMINED, Headline
 from .write import Page, write_report
+
+# tables with a row of the automatic choice, that of the whole model first: methods are compared on
+# a simplified one where all of them shall take it
+CHOICE_TITLES = {
+    "models": "automatic choice, whole model",
+    "methods": "its harmonics and samples alone, on the model of the methods",
+}
 
 
 def write_chart(
@@ -54,22 +62,21 @@ def _report(
     folder: Path,
 ) -> tuple[Path, Path]:
     """The automatic choice first, then all methods and models."""
-    chosen = [table[table["chosen"].astype(bool)] for table in tables.values() if "chosen" in table]
-    rows = [row for table in chosen for _, row in table.iterrows()]
     numbers = [
-        Headline(
-            "automatic choice",
-            f"{percent(row['error'])} error",
-            f"wanted {percent(scene.accuracy)}",
-            f"{row['name']}, {row['time']:.3g} s",
-        )
-        for row in rows[:1]
+        headline
+        for name in CHOICE_TITLES
+        if name in tables
+        for headline in choice_headlines(name, tables[name], scene.accuracy)
     ]
     names = ("response/accuracy_of_methods_and_models", "response/errors_of_each")
     return write_report(
         folder,
         scene,
-        {f"accuracy/{name}": table for name, table in tables.items()},
+        # no estimates, as the columns of this name are in other tables
+        {
+            f"accuracy/{name}": table.rename(columns={"error": "error_to_reference"})
+            for name, table in tables.items()
+        },
         dict(zip(names, pictures, strict=True)),
         (text if isinstance(text, Message) else method(text) for text in chart.remarks),
         page=Page(
@@ -78,3 +85,22 @@ def _report(
             subject=f"{scene.kind}, speed against accuracy",
         ),
     )
+
+
+def choice_headlines(name: str, table: pd.DataFrame, accuracy: float) -> list[Headline]:
+    """Error and time of the automatic choice in one table.
+
+    Args:
+        name: key of ``CHOICE_TITLES``.
+        table: of a chart.
+        accuracy: wanted.
+    """
+    return [
+        Headline(
+            CHOICE_TITLES[name],
+            f"{percent(row['error'])} error" if np.isfinite(row["error"]) else NOT_DETERMINED,
+            f"against the reference of the {name}, wanted {percent(accuracy)}",
+            ", ".join(filter(None, [f"{row['time']:.3g} s a frequency", row["reason"]])),
+        )
+        for _, row in table[table["chosen"].astype(bool)].iterrows()
+    ]

@@ -18,12 +18,22 @@ from geometry.mesh import sector_of
 
 from ..data import ModeSet
 from ..hbm.parallel import share_work
+from ..io.run_folder import given_fields
 from ..io.stage_cache import on_root, write_results
 from ..scene.tables import Scene
 from ..scene.toml import dump_scene
+from ..study.modes.campbell import Campbell
 from ..study.modes.comparison import family_table
+from ..study.modes.crossings import fold_order
 from ..study.modes.linear_response_report import stress_states, stress_table
-from ..study.modes.survey import Survey, Wanted, excited_set, survey_modes
+from ..study.modes.survey import (
+    ORDERS_ABOVE,
+    Survey,
+    Wanted,
+    excited_set,
+    order_is_given,
+    survey_modes,
+)
 from ..study.pipeline.run_records import folder_of
 from ..study.pipeline.stage_inputs import all_declared
 from ..util.communicator import Communicator
@@ -52,6 +62,10 @@ SECTION_OF = {
     "forced_response": "response",
     "resonances": "response",
 }
+# entries of the page whose files have the name of another figure
+ENTRY_OF = {"forced_response": "forced_response_linear"}
+# lowest engine orders, which a Campbell diagram has whatever the scene's own order is
+LOWEST_ORDERS = 5
 # pictures and files that take longest, by their names
 SLOWEST_TO_WRITE = ("wave.gif", "modes.png", "modes.vtu", "mode_1_wheel.png")
 # fields [Pa] or [m] by name, at nodes or in cells
@@ -245,7 +259,7 @@ def _report(
 def _entry(name: str) -> str:
     """Section and name of a table or picture on the page."""
     stem = Path(name).stem
-    return f"{SECTION_OF.get(stem, 'modes')}/{stem}"
+    return f"{SECTION_OF.get(stem, 'modes')}/{ENTRY_OF.get(stem, stem)}"
 
 
 def _numbers(
@@ -338,13 +352,31 @@ def _drawings(
             tables["forced_response"],
             tables["resonances"],
             file,
-            title=f"linear response to engine order {run.scene.excitation.engine_order}",
+            title=_response_title(result),
         )
     if result.convergence is not None:
         out["convergence.png"] = lambda file: convergence.draw_convergence(
             tables["convergence_points"], tables["convergence"], file
         )
     return out | _speed_drawings(result, tables)
+
+
+def _response_title(result: Survey) -> str:
+    """A single blade does not see the engine order, and one that nobody gave is called so."""
+    run = result.run
+    if len(run.modes) < 2:
+        return "linear response to the excitation"
+    origin = "" if order_is_given(given_fields(folder_of(run))) else " (default)"
+    return f"linear response to engine order {run.scene.excitation.engine_order}{origin}"
+
+
+def drawn_orders(own: int, found: Campbell) -> list[int]:
+    """The lowest engine orders and those next to the scene's own that cross a mode, with its own
+    one: more cannot be told apart in a picture.
+    """
+    crossing = {int(order) for order in found.crossings["engine_order"]}
+    near = range(own - ORDERS_ABOVE, own + ORDERS_ABOVE + 1)
+    return sorted({own, *(crossing & {*range(1, LOWEST_ORDERS + 1), *near})})
 
 
 def _speed_drawings(
@@ -355,10 +387,23 @@ def _speed_drawings(
         return {}
     found = result.campbell
     scene = result.run.scene
-    orders = sorted({scene.excitation.engine_order, *found.crossings["engine_order"]})
+    orders = drawn_orders(scene.excitation.engine_order, found)
+    crossings = found.crossings[found.crossings["engine_order"].isin(orders)]
+    table = found.table
+    if "nodal_diameter" in table:
+        count = sector_of(result.run.mesh).count
+        excited = {fold_order(order, count) for order in orders}
+        table = table[table["nodal_diameter"].isin(excited)]
+    given = order_is_given(given_fields(folder_of(result.run)))
+    own = "" if given else f"; engine order {scene.excitation.engine_order} is the default"
     out: dict[str, Callable[[Path], object]] = {
         "campbell.png": lambda file: speed.draw_campbell(
-            found.table, orders, file, crossings=found.crossings, operating=found.speed
+            table,
+            orders,
+            file,
+            crossings=crossings,
+            operating=found.speed,
+            title=f"Campbell diagram{own}",
         )
     }
     if len(result.run.modes) > 1 and found.speed > 0:

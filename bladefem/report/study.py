@@ -10,15 +10,19 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from ..io.stage_cache import write_table
 from ..scene.fields import field_at, value_at
 from ..scene.tables import Scene
 from ..scene.units import newtons, parse, show
+from ..study.pipeline.curve import Curve
 from ..study.pipeline.design_table import design_table
 from ..study.pipeline.run_records import Response
-from ..view.study import draw_study
-from .best_load import error_words
+from ..util.message import by_level, warning
+from ..view.study import BALANCE, LINEAR, MARCH, STIFF_LAYER, UNSTABLE, draw_study
+from .best_load import error_words, lowest_of_response
+from .best_value import are_determined, value_headlines
 from .headlines import Headline
-from .tables import write_tables
+from .tables import units_of, write_tables
 from .write import Page, write_report
 
 # columns that only the tables in files have
@@ -33,6 +37,8 @@ class Variant:
     text: str
     scene: Scene
     response: Response
+    # of its run (``warnings_of_variant``)
+    warnings: Sequence[str] = ()
 
 
 def write_study(
@@ -46,15 +52,24 @@ def write_study(
     Args:
         name: dotted name of the varied field.
     """
-    table, loads = study_tables(name, variants)
-    files = write_tables(table, folder / "study", f"best load for each {name}")
-    files += write_tables(loads, folder / "study_loads", f"all loads for each {name}")
+    table, loads = study_tables(variants)
+    files = write_value_tables(
+        table, [name], variants, folder / "study", f"best load for each {name}"
+    )
+    files += write_value_tables(
+        loads, [name], variants, folder / "study_loads", f"all loads for each {name}"
+    )
     axis, label = _axis(name, variants)
     draw_study(
         table.assign(axis=axis), loads, folder / "study.png", label=label, title=f"study of {name}"
     )
     pages = _report(name, variants, table, loads, folder)
     return table, [*files, folder / "study.png", *pages]
+
+
+def best_values(name: str, table: pd.DataFrame) -> list[Headline]:
+    """The best value of the field, where the errors separate it from the others."""
+    return value_headlines(table, {name: "value"}, {name: list(map(str, table["value"]))})
 
 
 def _report(
@@ -66,18 +81,17 @@ def _report(
 ) -> tuple[Path, Path]:
     """``report_study.html`` and ``.md``: the best value first, all of them in one table."""
     best = table.loc[table["peak_amplitude"].idxmin()]
+    values = best_values(name, table)
+    sure = are_determined(values)
+    words = load_words(best["load"], loads)
     numbers = [
+        values[0]._replace(remark=words) if sure else values[0],
         Headline(
-            f"best {name}",
-            str(best["value"]),
-            place_of_value(str(best["value"]), list(map(str, table["value"]))),
-            load_words(best["load"], loads),
-        ),
-        Headline(
-            "resonance amplitude there",
+            "resonance amplitude there" if sure else "smallest resonance amplitude",
             f"{1e6 * best['peak_amplitude']:.4g} µm",
             error_words(best),
-            f"{best['reduction']:.4g} times below the blade without damper",
+            f"{'' if sure else f'{words}, '}{best['reduction']:.4g} times below the blade without "
+            "damper",
         ),
         Headline(
             "resonance frequency there",
@@ -86,33 +100,96 @@ def _report(
             f"{best['free_frequency']:.5g} Hz without damper",
         ),
     ]
+    shown = {
+        "response/best_load_of_each_value": with_texts(table, [name], variants),
+        "response/all_loads": with_texts(loads, [name], variants),
+    }
     return write_report(
         folder,
         variants[0].scene,
-        {
-            "response/best_load_of_each_value": table.drop(columns=UNPRINTED),
-            "response/all_loads": loads.drop(columns=UNPRINTED),
-        },
+        {entry: one.drop(columns=UNPRINTED) for entry, one in shown.items()},
         {"response/side_by_side": folder / "study.png"},
+        warnings_of_all([name], variants),
         page=Page(numbers=numbers, stem="report_study", subject=f"study of {name}"),
     )
 
 
-def place_of_value(best: str, values: Sequence[str]) -> str:
-    """How many values were studied, and whether the best is at an end of them.
-
-    >>> place_of_value("50 deg", ["40 deg", "50 deg", "60 deg"])
-    'best of 3 values'
-    >>> place_of_value("60 deg", ["40 deg", "50 deg", "60 deg"])
-    'best of 3 values, the last: better ones may lie beyond'
+def warnings_of_variant(response: Response, messages: Sequence[str]) -> list[str]:
+    """What of the run of one value may make its answer wrong: why its best load is not determined,
+    and its warnings.
     """
-    words = f"best of {len(values)} values"
-    # words such as "coupled" have no order
-    ordered = all(value.lstrip("+-.")[:1].isdigit() for value in values)
-    if not ordered or len(values) < 2 or best not in (values[0], values[-1]):
-        return words
-    end = "first" if best == values[0] else "last"
-    return f"{words}, the {end}: better ones may lie beyond"
+    against = lowest_of_response(response).against
+    undetermined = [f"best load: not determined: {'; '.join(against)}"] if against else []
+    return [*undetermined, *by_level(messages)["warning"]]
+
+
+def warnings_of_all(names: Sequence[str], variants: Sequence[Variant]) -> list[str]:
+    """The warnings of all runs, each with the values that it belongs to, the same sentence once."""
+    belongs: dict[str, list[str]] = {}
+    for variant in variants:
+        for text in variant.warnings:
+            belongs.setdefault(text, []).append(_label(names, variant))
+    return [warning(f"{'; '.join(of)}: {text}") for text, of in belongs.items()]
+
+
+def _label(names: Sequence[str], variant: Variant) -> str:
+    """ "damper.angle = 30 deg, contact.mu = 0.2"."""
+    values = texts_of(variant, len(names))
+    return ", ".join(f"{name} = {value}" for name, value in zip(names, values, strict=True))
+
+
+def texts_of(variant: Variant, fields: int) -> list[str]:
+    """The values of a variant as written, one a field."""
+    return variant.text.split("; ") if fields > 1 else [variant.text]
+
+
+def with_texts(
+    table: pd.DataFrame, names: Sequence[str], variants: Sequence[Variant]
+) -> pd.DataFrame:
+    """A table with a column of texts for each field in place of "value", for people."""
+    texts = {variant.text: texts_of(variant, len(names)) for variant in variants}
+    columns = {name: [texts[one][k] for one in table["value"]] for k, name in enumerate(names)}
+    return _with_fields(table, columns)
+
+
+def with_numbers(
+    table: pd.DataFrame, names: Sequence[str], variants: Sequence[Variant]
+) -> tuple[pd.DataFrame, dict[str, str]]:
+    """A table with a column of SI numbers for each field in place of "value", texts where the field
+    is no number, and the units of these columns.
+    """
+    columns: dict[str, list[Any]] = {}
+    units = {}
+    for k, name in enumerate(names):
+        read = {variant.text: _number(name, variant.scene) for variant in variants}
+        if None in read.values():
+            texts = {variant.text: texts_of(variant, len(names))[k] for variant in variants}
+            columns[name] = [texts[one] for one in table["value"]]
+            continue
+        columns[name] = [read[one] for one in table["value"]]
+        unit = field_at(name).meta.get("unit") or "1"
+        if unit != "1":
+            units[name] = unit
+    return _with_fields(table, columns), units
+
+
+def _with_fields(table: pd.DataFrame, columns: dict[str, list[Any]]) -> pd.DataFrame:
+    """The fields first, then the columns that are not theirs."""
+    rest = table.drop(columns=["value", *(name for name in columns if name in table)])
+    return pd.concat([pd.DataFrame(columns, index=table.index), rest], axis=1)
+
+
+def write_value_tables(
+    table: pd.DataFrame,
+    names: Sequence[str],
+    variants: Sequence[Variant],
+    stem: Path,
+    caption: str,
+) -> list[Path]:
+    """Write ``stem``.csv with the fields in SI, .md and .tex with them as written."""
+    numbers, units = with_numbers(table, names, variants)
+    csv = write_table(stem.with_name(f"{stem.name}.csv"), numbers, {**units_of(numbers), **units})
+    return [csv, *write_tables(with_texts(table, names, variants), stem, caption, ("md", "tex"))]
 
 
 def load_words(load: float, loads: pd.DataFrame) -> str:
@@ -130,19 +207,18 @@ def end_words(load: float, loads: pd.DataFrame) -> str:
     return ""
 
 
-def study_tables(name: str, variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """The best load of each value, and all of them; SI columns, the value also as written."""
+def study_tables(variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The best load of each value, and all of them; SI columns, the value as written."""
     best = []
     every = []
     for variant in variants:
         rows = pd.DataFrame(design_table(variant.response.curves, variant.response.limits))
         rows.insert(0, "value", variant.text)
+        rows["given_by"] = [LINEAR, *map(given_by, variant.response.curves), LINEAR]
         damped = rows.iloc[1:-1]
-        own = _number(name, variant.scene)
         best.append(
             {
                 "value": variant.text,
-                **({} if own is None else {_head(name): own}),
                 "free_frequency": rows["peak_frequency"].iloc[0],
                 "free_amplitude": rows["peak_amplitude"].iloc[0],
                 **damped.loc[damped["peak_amplitude"].idxmin()].drop("value"),
@@ -152,10 +228,13 @@ def study_tables(name: str, variants: Sequence[Variant]) -> tuple[pd.DataFrame, 
     return pd.DataFrame(best).infer_objects(), pd.concat(every, ignore_index=True)
 
 
-def _head(name: str) -> str:
-    """ "damper.angle [rad]"."""
-    unit = field_at(name).meta.get("unit") or "1"
-    return name if unit == "1" else f"{name} [{unit}]"
+def given_by(curve: Curve) -> str:
+    """What gives the resonance of a curve: a balance, or what stands in place of one."""
+    if curve.is_march:
+        return MARCH
+    if curve.keeps_unstable:
+        return UNSTABLE
+    return STIFF_LAYER if curve.reaches_layer else BALANCE
 
 
 def _number(name: str, scene: Scene) -> float | None:

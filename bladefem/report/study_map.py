@@ -8,12 +8,21 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from ..scene.tables import Scene
 from ..scene.units import newtons
-from ..view.study_map import draw_band, draw_map
+from ..view.study_map import LEAST_FOR_SHARES, draw_band, draw_map
 from .best_load import error_words
+from .best_value import are_determined, value_headlines
 from .headlines import Headline
-from .study import UNPRINTED, Variant, end_words, load_words, place_of_value, study_tables
+from .study import (
+    UNPRINTED,
+    Variant,
+    end_words,
+    load_words,
+    study_tables,
+    warnings_of_all,
+    with_texts,
+    write_value_tables,
+)
 from .tables import write_tables
 from .write import Page, write_report
 
@@ -31,34 +40,38 @@ def write_map(
         values: of the first and of the second field, as written.
         variants: those that are solved so far, in the order of the second field within the first.
     """
-    best, loads = _tables(names, variants)
-    shape = len(values[0]), len(values[1])
-    amplitude = np.full(shape[0] * shape[1], np.nan)
-    load = np.full(shape[0] * shape[1], np.nan)
-    amplitude[: len(best)] = best["peak_amplitude"]
-    load[: len(best)] = best["load"]
-    files = write_tables(best, folder / "study", f"best load for each {' and '.join(names)}")
-    files += write_tables(loads, folder / "study_loads", "all loads of each value")
+    best, loads = study_tables(variants)
+    caption = f"best load for each {' and '.join(names)}"
+    files = write_value_tables(best, names, variants, folder / "study", caption)
+    files += write_value_tables(
+        loads, names, variants, folder / "study_loads", "all loads of each value"
+    )
+    best = with_texts(best, names, variants)
     picture = folder / "study.png"
-    draw_map(amplitude.reshape(shape), load.reshape(shape), values, names, picture)
+    draw_map(best, values, names, picture)
     top = best.loc[best["peak_amplitude"].idxmin()]
-    numbers = [
-        Headline(f"best {name}", str(top[name]), place_of_value(str(top[name]), one), "")
-        for name, one in zip(names, values, strict=True)
-    ]
+    numbers = best_pair(names, values, best)
+    there = "resonance amplitude there"
     numbers.append(
         Headline(
-            "resonance amplitude there",
+            there if are_determined(numbers) else "smallest resonance amplitude",
             f"{1e6 * top['peak_amplitude']:.4g} µm",
             error_words(top),
             load_words(top["load"], loads),
         )
     )
-    subject = f"study of {' and '.join(names)}"
-    pages = _page(
-        variants[0].scene, best, loads, picture, numbers, subject, folder, "response/study_map"
-    )
+    loads = with_texts(loads, names, variants)
+    pages = _page(names, variants, (best, loads), picture, numbers, folder, "response/study_map")
     return best, [*files, picture, *pages]
+
+
+def best_pair(
+    names: tuple[str, str], values: tuple[Sequence[str], Sequence[str]], best: pd.DataFrame
+) -> list[Headline]:
+    """The best value of each of both fields, where the errors separate it from the others."""
+    return value_headlines(
+        best, {name: name for name in names}, dict(zip(names, values, strict=True))
+    )
 
 
 def write_scatter(
@@ -69,36 +82,48 @@ def write_scatter(
     """Write study, study_loads, study.png (a band over the loads) and the page; returns the table
     of the band and the files.
     """
-    best, loads = _tables(tuple(names), variants)
+    best, loads = study_tables(variants)
     shared = shared_loads(loads)
     band = band_of(shared)
-    files = write_tables(best, folder / "study", "best load of each sample")
-    files += write_tables(loads, folder / "study_loads", "all loads of each sample")
+    files = write_value_tables(best, names, variants, folder / "study", "best load of each sample")
+    files += write_value_tables(
+        loads, names, variants, folder / "study_loads", "all loads of each sample"
+    )
     files += write_tables(band, folder / "study_band", "resonance amplitude over the samples")
     picture = folder / "study.png"
     draw_band(shared, picture, title=f"scatter of {', '.join(names)}")
-    robust = band.loc[band["amplitude_90"].idxmin()]
-    numbers = [
+    numbers = _robust_numbers(band, len(variants))
+    best = with_texts(best, names, variants)
+    pages = _page(names, variants, (best, band), picture, numbers, folder, "response/study_band")
+    return band, [*files, picture, *pages]
+
+
+def _robust_numbers(band: pd.DataFrame, samples: int) -> list[Headline]:
+    """The load whose highest samples are lowest, and the amplitudes there: all samples where they
+    are too few for a share of them.
+    """
+    shares = "amplitude_90" in band
+    robust = band.loc[band["amplitude_90" if shares else "largest_amplitude"].idxmin()]
+    every = f"{1e6 * robust['smallest_amplitude']:.4g} to {1e6 * robust['largest_amplitude']:.4g}"
+    few = f"{samples} samples, of which no shares are told: that takes {LEAST_FOR_SHARES}"
+    return [
         Headline(
             "most robust load",
             newtons(robust["load"], 4),
-            f"of {len(band)} loads under which all {len(variants)} samples were studied"
+            f"of {len(band)} loads under which all {samples} samples were studied"
             f"{end_words(robust['load'], band)}",
-            "smallest amplitude that 90 % of the samples stay below",
+            f"smallest amplitude that {'90 % of the' if shares else 'all'} samples stay below",
         ),
         Headline(
             "resonance amplitude there",
             f"{1e6 * robust['amplitude_50']:.4g} µm",
             f"80 % between {1e6 * robust['amplitude_10']:.4g} and "
             f"{1e6 * robust['amplitude_90']:.4g} µm",
-            f"{1e6 * robust['smallest']:.4g} to {1e6 * robust['largest']:.4g} µm in all",
-        ),
+            f"{every} µm in all",
+        )
+        if shares
+        else Headline("resonance amplitude there", f"{every} µm", "smallest and largest", few),
     ]
-    subject = f"scatter of {', '.join(names)}"
-    pages = _page(
-        variants[0].scene, best, band, picture, numbers, subject, folder, "response/study_band"
-    )
-    return band, [*files, picture, *pages]
 
 
 def shared_loads(loads: pd.DataFrame) -> pd.DataFrame:
@@ -115,52 +140,39 @@ def shared_loads(loads: pd.DataFrame) -> pd.DataFrame:
 
 
 def band_of(loads: pd.DataFrame) -> pd.DataFrame:
-    """Smallest, 10 %, median, 90 % and largest resonance amplitude [m] of each load."""
+    """Smallest and largest resonance amplitude [m] of each load, and 10 %, median and 90 % of them
+    where the samples are enough for such shares.
+    """
     damped = loads[(loads["load"] > 0) & np.isfinite(loads["load"])]
     groups = damped.groupby("load")["peak_amplitude"]
-    return pd.DataFrame(
-        {
-            "smallest": groups.min(),
-            "amplitude_10": groups.quantile(0.1),
-            "amplitude_50": groups.quantile(0.5),
-            "amplitude_90": groups.quantile(0.9),
-            "largest": groups.max(),
-        }
-    ).reset_index()
-
-
-def _tables(
-    names: tuple[str, ...], variants: Sequence[Variant]
-) -> tuple[pd.DataFrame, pd.DataFrame]:
-    """As ``study_tables``, with a column for each field."""
-    best, loads = study_tables(names[0], variants)
-    best = best.drop(columns=[column for column in best if str(column).startswith(f"{names[0]} [")])
-    texts = [variant.text.split("; ") for variant in variants]
-    for number, name in enumerate(names):
-        if name in best:
-            best = best.drop(columns=name)
-        best.insert(number + 1, name, [text[number] for text in texts])
-    return best.drop(columns="value"), loads
+    columns = {"smallest_amplitude": groups.min()}
+    if groups.size().min() >= LEAST_FOR_SHARES:
+        columns |= {f"amplitude_{share}": groups.quantile(share / 100) for share in (10, 50, 90)}
+    return pd.DataFrame({**columns, "largest_amplitude": groups.max()}).reset_index()
 
 
 def _page(
-    scene: Scene,
-    best: pd.DataFrame,
-    second: pd.DataFrame,
+    names: Sequence[str],
+    variants: Sequence[Variant],
+    tables: tuple[pd.DataFrame, pd.DataFrame],
     picture: Path,
     numbers: list[Headline],
-    subject: str,
     folder: Path,
     figure: str,
 ) -> tuple[Path, Path]:
-    tables = {
-        "response/best_load_of_each_value": best.drop(columns=UNPRINTED, errors="ignore"),
-        "response/all_loads": second.drop(columns=UNPRINTED, errors="ignore"),
-    }
+    best, second = (one.drop(columns=UNPRINTED, errors="ignore") for one in tables)
+    kind, joint = ("scatter", ", ") if figure.endswith("band") else ("study", " and ")
+    # the second table of a scatter is its band
+    entry = "response/band" if kind == "scatter" else "response/all_loads"
     return write_report(
         folder,
-        scene,
-        tables,
+        variants[0].scene,
+        {"response/best_load_of_each_value": best, entry: second},
         {figure: picture},
-        page=Page(numbers=numbers, stem="report_study", subject=subject),
+        warnings_of_all(names, variants),
+        page=Page(
+            numbers=numbers,
+            stem="report_study",
+            subject=f"{kind} of {joint.join(names)}",
+        ),
     )

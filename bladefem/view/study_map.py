@@ -9,47 +9,57 @@ import numpy as np
 import pandas as pd
 
 from ..scene.units import newtons
+from ..util.percent import percent
+from .study import MARKS
 from .style import COLOURS, MICRO, canvas, log_axis
 
+# samples from which shares of them are told
+LEAST_FOR_SHARES = 10
 # luminance below which white letters are read better
 DARK_LUMINANCE = 0.5
 
 
 def draw_map(
-    amplitude: np.ndarray,
-    load: np.ndarray,
+    table: pd.DataFrame,
     labels: tuple[Sequence[str], Sequence[str]],
     names: tuple[str, str],
     file: str | Path | None = None,
 ) -> object:
-    """Resonance amplitude at the best load over two fields, each field of the map with its numbers;
-    returns the figure.
+    """Resonance amplitude at the best load over two fields, each field of the map with its numbers,
+    the estimated error and what gives the resonance where that is no stable balance; returns the
+    figure.
 
     Args:
-        amplitude: (rows, columns) smallest resonance amplitude [m], NaN where not solved.
-        load: (rows, columns) load of a seat there [N].
+        table: one row a pair of values, the second field within the first, those that are not
+            solved yet left out at the end: peak_amplitude [m], load [N], error, given_by.
         labels: values of rows and columns.
         names: of the fields along rows and columns.
         file: PNG to write.
     """
-    rows, columns = amplitude.shape
-    with canvas(file, size=(2.2 + 1.1 * columns, 1.7 + 0.75 * rows)) as ax:
-        image = ax.imshow(MICRO * amplitude, origin="lower", aspect="auto", cmap="viridis_r")
+    rows, columns = len(labels[0]), len(labels[1])
+    amplitude = np.full(rows * columns, np.nan)
+    amplitude[: len(table)] = table["peak_amplitude"]
+    texts = [_cell_text(row) for _, row in table.iterrows()]
+    texts += ["not solved"] * (rows * columns - len(table))
+    with canvas(file, size=(2.2 + 1.3 * columns, 1.7 + 0.95 * rows)) as ax:
+        image = ax.imshow(
+            MICRO * amplitude.reshape(rows, columns),
+            origin="lower",
+            aspect="auto",
+            cmap="viridis_r",
+        )
         ax.set_xticks(range(columns), labels[1])
         ax.set_yticks(range(rows), labels[0])
         ax.set(xlabel=names[1], ylabel=names[0], title="resonance amplitude at the best load")
         ax.grid(False)
         best = np.nanargmin(amplitude) if np.isfinite(amplitude).any() else -1
-        for number, (value, at) in enumerate(zip(amplitude.flat, load.flat, strict=True)):
-            shown = (
-                f"{MICRO * value:.4g} µm\n{newtons(at, 4)}" if np.isfinite(value) else "not solved"
-            )
+        for number, (value, text) in enumerate(zip(amplitude, texts, strict=True)):
             red, green, blue, _ = image.cmap(image.norm(MICRO * value))
             dark = 0.3 * red + 0.59 * green + 0.11 * blue < DARK_LUMINANCE
             ax.text(
                 number % columns,
                 number // columns,
-                shown,
+                text,
                 ha="center",
                 va="center",
                 fontsize=8,
@@ -60,14 +70,24 @@ def draw_map(
         return ax.figure
 
 
+def _cell_text(row: pd.Series) -> str:
+    """Amplitude with its estimated error, load, and what gives the resonance."""
+    error = row["error"]
+    certainty = "error unknown" if np.isinf(error) else f"± {percent(error)}"
+    lines = [f"{MICRO * row['peak_amplitude']:.4g} µm"]
+    lines += [] if np.isnan(error) else [certainty]
+    lines += [newtons(row["load"], 4)]
+    return "\n".join([*lines, row["given_by"]] if row["given_by"] in MARKS else lines)
+
+
 def draw_band(
     loads: pd.DataFrame,
     file: str | Path | None = None,
     *,
     title: str = "",
 ) -> object:
-    """Resonance amplitude over load with its scatter: all samples, the middle 80 %, the median;
-    returns the figure.
+    """Resonance amplitude over load with its scatter: all samples, and the middle 80 % and the
+    median where they are enough for that; returns the figure.
 
     Args:
         loads: one row a load of each sample: value, load [N], peak_amplitude [m]; load 0 is the
@@ -89,15 +109,16 @@ def draw_band(
             alpha=0.15,
             label=f"all {amplitude.shape[1]} samples",
         )
-        ax.fill_between(
-            amplitude.index,
-            quantiles[0.1],
-            quantiles[0.9],
-            color=COLOURS[0],
-            alpha=0.35,
-            label="80 % of them",
-        )
-        ax.plot(amplitude.index, quantiles[0.5], "o-", color=COLOURS[0], label="median")
+        if amplitude.shape[1] >= LEAST_FOR_SHARES:
+            ax.fill_between(
+                amplitude.index,
+                quantiles[0.1],
+                quantiles[0.9],
+                color=COLOURS[0],
+                alpha=0.35,
+                label="80 % of them",
+            )
+            ax.plot(amplitude.index, quantiles[0.5], "o-", color=COLOURS[0], label="median")
         free = MICRO * loads.loc[loads["load"] == 0, "peak_amplitude"]
         if len(free):
             ax.axhspan(free.min(), free.max(), color="#777777", alpha=0.3, label="no damper")

@@ -50,6 +50,9 @@ def fake_curve(load, amplitude):
         layer_law=np.nan,
         error=0.013,
         interval=None,
+        is_march=False,
+        keeps_unstable=False,
+        reaches_layer=False,
         peak_frequency=830.0,
         peak_amplitude=amplitude,
         frequency=np.arange(5.0),
@@ -286,8 +289,9 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     )
     assert "resonance amplitude [µm]" in out and "study.csv" in out.splitlines()[-1]
     table, loads = (pd.read_csv(tmp_path / f"{name}.csv") for name in ("study", "study_loads"))
-    assert list(table["value"]) == ["30 deg", "45 deg"]
+    assert "value" not in table and "value" not in loads
     np.testing.assert_allclose(table["damper.angle [rad]"], np.radians([30, 45]))
+    np.testing.assert_allclose(loads["damper.angle [rad]"], np.radians([30] * 4 + [45] * 4))
     assert (
         set(table["load [N]"]) == {50.0}
         and set(table["peak_amplitude [m]"]) == {2e-5}
@@ -296,7 +300,7 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert {f"study.{kind}" for kind in ("csv", "md", "tex", "png")} <= {
         p.name for p in tmp_path.iterdir()
     }
-    assert "| 30 deg | 0.5236 | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
+    assert "| 30 deg | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
 
 
 def test_a_study_leaves_influences_out_unless_they_are_asked_for(pipeline, tmp_path):
@@ -315,7 +319,24 @@ def test_a_study_that_breaks_off_leaves_what_is_done(pipeline, tmp_path):
 
     pipeline.state.behaviour = behaviour
     assert main(["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45, 50 deg"]) == 1
-    assert list(pd.read_csv(tmp_path / "study.csv")["value"]) == ["30 deg"]
+    angles = pd.read_csv(tmp_path / "study.csv")["damper.angle [rad]"]
+    np.testing.assert_allclose(angles, np.radians([30]))
+
+
+def test_a_study_tells_logs_what_each_value_gave(pipeline, tmp_path, capsys, monkeypatch):
+    command = ["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45 deg"]
+    assert main(command) == 0
+    said = capsys.readouterr().out
+    lines = [line for line in said.splitlines() if line.startswith("finished: ")]
+    assert [line.partition(" in ")[0] for line in lines] == [
+        "finished: damper.angle = 30 deg (1 of 2)",
+        "finished: damper.angle = 45 deg (2 of 2)",
+    ]
+    assert all("s: 20 um, ± 1.3 % (model; mesh apart), at 830 Hz under 50 N" in x for x in lines)
+    assert "best damper.angle: not determined: the estimated errors do not separate" in said
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    assert main(command) == 0
+    assert "finished: " not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -11,11 +12,13 @@ import pytest
 
 from bladefem import load_scene
 from bladefem.cli.main import main
+from bladefem.cli.tables import survey_tables
 from bladefem.data import ModeSet
+from bladefem.errors import InputError
 from bladefem.fem.compat import MPI
 from bladefem.io.stage_cache import read_results
 from bladefem.report.modes import mac_table, report_survey
-from bladefem.study.modes.survey import Wanted
+from bladefem.study.modes.survey import Wanted, refuse_other_kind
 
 ONE_PIXEL = base64.b64decode(
     "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
@@ -78,6 +81,59 @@ def test_folder_holds_tables_pictures_and_shapes(folder):
         shapes["frequency"].values.ravel(), table["frequency [Hz]"], rtol=1e-8
     )
     assert table["family"].iloc[0] == "first flap"
+
+
+def test_a_speed_survey_begins_with_the_first_engine_order(folder):
+    """plane.toml gives no engine order, and turns at 0 rpm."""
+    crossings = pd.read_csv(folder / "crossings.csv")
+    assert set(crossings["engine_order"]) <= set(range(1, 10))
+    margins = pd.read_csv(folder / "margins.csv")
+    assert margins["engine_order"].tolist() == list(range(1, 10))
+    assert set(margins["verdict"]) == {"not excited at rest"} and margins["margin"].isna().all()
+    page = (folder / "report_modes.md").read_text()
+    assert "engine orders 1 to 9, up to 3 above excitation.engine_order = 6, the default" in page
+
+
+def test_a_linear_response_has_captions_of_its_own(folder):
+    page = (folder / "report_modes.md").read_text()
+    assert "Figure 1. Linear response without damper" in page
+    assert "full stick" not in page and "normal load per seat" not in page
+    assert "scaled to a largest displacement of 1 mm" in page
+
+
+def test_the_terminal_tells_resonances_without_a_maximum():
+    table = pd.DataFrame(
+        {
+            **{name: [1.0, 2.0] for name in ("frequency", "amplitude", "phase", "largest")},
+            "mode": [1, 2],
+            "natural": [1.0, 2.0],
+            "peaked": [True, False],
+        }
+    )
+    found = SimpleNamespace(
+        run=SimpleNamespace(
+            modes=[ModeSet(np.array([1.0]), np.zeros((1, 1, 3)), None, np.zeros(1))]
+        ),
+        campbell=None,
+        convergence=None,
+        answer=SimpleNamespace(resonances=table),
+        mac=None,
+    )
+    lines = survey_tables(found).splitlines()
+    assert lines[-4].endswith("a maximum")
+    assert lines[-2].endswith("yes") and lines[-1].endswith("no")
+
+
+def test_a_wheel_is_not_compared_with_a_single_blade(folder):
+    own, sets = (SimpleNamespace(pairs={}), [SimpleNamespace(nodal_diameter=3)])
+    with pytest.raises(InputError) as said:
+        refuse_other_kind(folder, own, sets)
+    assert "its modes are those of a wheel, expected the run of a single blade" in str(said.value)
+    own.pairs["cyclic"], sets[0].nodal_diameter = None, None
+    with pytest.raises(InputError, match="those of a single blade, expected the run of a wheel"):
+        refuse_other_kind(folder, own, sets)
+    sets[0].nodal_diameter = 0
+    refuse_other_kind(folder, own, sets)
 
 
 def test_arrays_keep_the_scene_they_are_of(folder):

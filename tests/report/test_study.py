@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from limit_stubs import linear_limits
 
-from bladefem.report.study import Variant, study_tables, write_study
+from bladefem.report.best_value import best_value_lines, within_errors
+from bladefem.report.study import Variant, best_values, study_tables, write_study
 from bladefem.report.study_map import write_map
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
+from bladefem.view.study import draw_study
 
 
 def curve(load, amplitude):
@@ -29,6 +33,9 @@ def curve(load, amplitude):
         layer_law=np.nan,
         error=0.01,
         interval=None,
+        is_march=False,
+        keeps_unstable=False,
+        reaches_layer=False,
         frequency=np.arange(4.0),
         converged=np.ones(4, bool),
     )
@@ -41,25 +48,23 @@ def response(*amplitudes):
 
 
 @pytest.mark.parametrize(
-    ("field", "texts", "number"),
+    ("field", "texts", "head"),
     [
         ("damper.angle", ("30 deg", "45 deg"), "damper.angle [rad]"),
-        ("contact.normal", ("coupled", "prescribed"), None),
+        ("contact.normal", ("coupled", "prescribed"), "contact.normal"),
     ],
 )
-def test_best_load_of_each_value(field, texts, number, tmp_path):
+def test_best_load_of_each_value(field, texts, head, tmp_path):
     variants = [
         Variant(text, vary(Scene(), field, text), response(*amplitudes))
         for text, amplitudes in zip(texts, ((5e-5, 3e-5), (2e-5, 4e-5)), strict=True)
     ]
-    table, loads = study_tables(field, variants)
+    table, loads = study_tables(variants)
     assert list(table["value"]) == list(texts) and list(table["load"]) == [40.0, 20.0]
     assert list(table["peak_amplitude"]) == [3e-5, 2e-5] and list(
         table["reduction"]
     ) == pytest.approx([10 / 3, 5.0])
-    assert len(loads) == 8 and [name for name in table if "[" in name] == (
-        [number] if number else []
-    )
+    assert len(loads) == 8
     _, files = write_study(field, variants, tmp_path)
     assert [f.name for f in files] == [
         *(f"{stem}.{kind}" for stem in ("study", "study_loads") for kind in ("csv", "md", "tex")),
@@ -70,14 +75,21 @@ def test_best_load_of_each_value(field, texts, number, tmp_path):
     assert all(f.stat().st_size > 100 for f in files)
     page = files[-1].read_text(encoding="utf-8")
     beyond = "best of 2 values, the last: better ones may lie beyond" in page
-    assert beyond == (number is not None)
+    assert beyond == head.endswith("[rad]")
+    for stem in ("study", "study_loads"):
+        assert next(iter(pd.read_csv(tmp_path / f"{stem}.csv"))) == head
+    assert f"| {field} |" in (tmp_path / "study.md").read_text(encoding="utf-8")
     assert "with 20 N on each seat, the smallest load studied" in page
 
 
 def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
     names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3", "0.4"))
     variants = [
-        Variant(f"{a}; {m}", Scene(), response(5e-5, (3 - (m == "0.3")) * 1e-5, 6e-5))
+        Variant(
+            f"{a}; {m}",
+            vary(vary(Scene(), names[0], a), names[1], m),
+            response(5e-5, (3 - (m == "0.3") + (a == "45 deg")) * 1e-5, 6e-5),
+        )
         for a in values[0]
         for m in values[1]
     ]
@@ -87,3 +99,91 @@ def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
     assert "best damper.angle: **30 deg**, best of 2 values, the first" in page
     assert "best contact.mu: **0.3**, best of 3 values\n" in page
     assert "with 40 N on each seat)" in page
+
+
+def of_values(amplitudes, errors):
+    """A study of contact.mu with these amplitudes and errors at the best load."""
+    variants = []
+    for number, (amplitude, error) in enumerate(zip(amplitudes, errors, strict=True)):
+        text = f"{0.2 + 0.1 * number:.1f}"
+        one = response(2 * amplitude, amplitude)
+        for each in one.curves:
+            each.error = error
+        variants.append(Variant(text, vary(Scene(), "contact.mu", text), one))
+    return variants
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "errors", "near"),
+    [
+        ((139.53e-6, 140.49e-6, 2e-4), (0.14, 0.15, 0.01), ["0.2", "0.3"]),
+        ((3.16e-6, 2.507e-6), (0.19, 0.71), ["0.2", "0.3"]),
+        ((2e-6, 3e-6), (np.inf, 0.01), ["0.2", "0.3"]),
+        ((2e-6, 3e-6), (0.01, np.inf), ["0.2", "0.3"]),
+        ((2e-6, 3e-6), (np.nan, 0.1), ["0.2"]),
+        ((2e-6, 3e-6), (0.1, 0.1), ["0.2"]),
+    ],
+)
+def test_no_value_is_best_that_the_errors_do_not_separate(amplitudes, errors, near, tmp_path):
+    table, files = write_study("contact.mu", of_values(amplitudes, errors), tmp_path)
+    assert list(within_errors(table)["value"]) == near
+    page = files[-1].read_text(encoding="utf-8")
+    terminal = best_value_lines(best_values("contact.mu", table))
+    if len(near) == 1:
+        assert "best contact.mu: **0.2**, best of 2 values" in page
+        assert terminal.startswith("best contact.mu: 0.2, best of 2 values")
+        return
+    said = "the estimated errors do not separate 0.2 and 0.3"
+    assert f"best contact.mu: **not determined**, {said}" in page
+    assert f"best contact.mu: not determined: {said}" in terminal
+    assert "smallest resonance amplitude: **" in page and "amplitude there" not in page
+
+
+def test_one_field_of_a_map_may_be_determined_alone(tmp_path):
+    names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3"))
+    heights = {("30 deg", "0.2"): 2e-5, ("30 deg", "0.3"): 2.01e-5}
+    variants = [
+        Variant(
+            f"{a}; {m}",
+            vary(vary(Scene(), names[0], a), names[1], m),
+            response(heights.get((a, m), 5e-5), 6e-5),
+        )
+        for a in values[0]
+        for m in values[1]
+    ]
+    _, files = write_map(names, values, variants, tmp_path)
+    page = files[-1].read_text(encoding="utf-8")
+    assert "best damper.angle: **30 deg**, best of 2 values" in page
+    assert "best contact.mu: **not determined**, the estimated errors do not separate" in page
+
+
+def test_warnings_of_all_values_are_on_the_page_each_once(tmp_path):
+    variants = [
+        replace(one, warnings=("2 of 40 points did not converge", *more))
+        for one, more in zip(of_values((2e-5, 3e-5), (0.01, 0.01)), (("a torus",), ()), strict=True)
+    ]
+    _, files = write_study("contact.mu", variants, tmp_path)
+    page = files[-1].read_text(encoding="utf-8")
+    assert "- contact.mu = 0.2; contact.mu = 0.3: 2 of 40 points did not converge\n" in page
+    assert "- contact.mu = 0.2: a torus\n" in page
+
+
+def test_bars_and_marks_tell_how_sure_each_resonance_is():
+    variants = of_values((2e-5, 3e-5, 4e-5), (0.5, 0.01, np.inf))
+    for each in variants[0].response.curves:
+        each.is_march = True
+    for each in variants[2].response.curves:
+        each.keeps_unstable = True
+    table, loads = study_tables(variants)
+    assert list(table["given_by"]) == ["march in time", "balance", "unstable balance"]
+    figure = draw_study(table.assign(axis=[0.2, 0.3, 0.4]), loads)
+    left, right = figure.axes[0], figure.axes[-1]
+    bars = left.containers[0].lines[2][0].get_segments()
+    heights = [segment[:, 1] for segment in bars]
+    np.testing.assert_allclose(heights, [[10, 30], [29.7, 30.3], [40, 40]])
+    marks = {
+        (line.get_marker(), line.get_mfc()) for line in left.lines if len(line.get_xdata()) == 1
+    }
+    assert {mark for mark, _ in marks} >= {"D", "s"} and ("s", "white") in marks
+    words = [text.get_text() for text in right.get_legend().get_texts()]
+    assert words[-3:] == ["march in time", "unstable balance", "error unknown (hollow)"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 from numba import njit
 
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.report.chart import write_chart
 from bladefem.scene.toml import load_scene
@@ -28,7 +30,9 @@ from bladefem.study.chart.methods import (
     tangential_model,
 )
 from bladefem.study.chart.rows import Bench, Job, chart_rows, parabola_resonance
+from bladefem.study.chart.scene import _judged_sentence
 from bladefem.study.pipeline.scene_mesh import build_mesh
+from bladefem.util.percent import percent
 from bladefem.view.chart import draw_errors
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
@@ -159,6 +163,41 @@ def test_files_are_written(made, tmp_path):
     files = write_chart(made, tmp_path, 0.02, "reference blade")
     assert all(file.stat().st_size > 100 for file in files)
     assert len(pd.read_csv(files[0])) == len(made.methods)
+
+
+def test_the_page_begins_with_the_whole_model_and_its_errors_are_no_estimates(made, tmp_path):
+    scene = load_scene(PLANE)
+    files = write_chart(made, tmp_path, scene.accuracy, scene.title, scene)
+    page = files[-1].read_text(encoding="utf-8")
+    row = made.models[made.models["chosen"].astype(bool)].iloc[0]
+    first = next(line for line in page.splitlines() if line.startswith("- "))
+    assert first.startswith("- automatic choice, whole model: **")
+    assert f"**{percent(row['error'])} error**, against the reference of the models" in first
+    assert "its harmonics and samples alone, on the model of the methods" in page
+    assert "error against the reference [%] | error of the frequency [%]" in page
+    assert "error of the worst phasor [%]" in page and "error of the reference [%]" in page
+    assert "estimated error [%]" not in page
+
+
+def test_a_reference_says_how_its_resonance_is_read(made):
+    said = [remark for remark in made.remarks if remark.startswith("reference of the models")]
+    assert "by the parabola through the highest three frequencies" in said[0]
+
+
+def test_a_flat_top_is_told_apart_from_the_vertex_that_errors_compare(made, monkeypatch):
+    judged = SimpleNamespace(
+        march_replaces_balance=False,
+        strong_drive_skipped=False,
+        march=None,
+        marks=SimpleNamespace(verdict=np.full(len(made.curve.points), "stable")),
+    )
+    monkeypatch.setattr("bladefem.study.chart.scene.judged_resonance", lambda *_: judged)
+    monkeypatch.setattr("bladefem.study.chart.scene.Marches", lambda models: None)
+    said = _judged_sentence(None, None, made.curve)
+    top = max((p for p in made.curve.points if p.converged), key=size)
+    assert said.startswith("the highest point solved with the automatic choice, ")
+    assert f"{top.frequency:.5g} Hz (errors compare vertices of parabolas " in said
+    assert said.endswith("is stable")
 
 
 def test_names_of_axes_fit_and_each_row_has_one_legend(made):

@@ -1,15 +1,21 @@
 """Engine orders against frequencies with closed forms."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 
+from bladefem.report.modes import drawn_orders
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import vary
 from bladefem.study.modes.crossings import (
     campbell_crossings,
     crossing_margins,
     fold_order,
     interference_table,
 )
+from bladefem.study.modes.survey import orders_remark
 
 
 def southwell(speeds, still=300.0, factor=1.7):
@@ -79,3 +85,28 @@ def test_interference_and_margins():
         "ok",
         "close",
     ]
+
+
+def test_nothing_is_excited_at_rest():
+    table = pd.DataFrame(
+        {"nodal_diameter": [2, 2, 3], "mode": [1, 2, 1], "frequency": [390.0, 1000.0, 400.0]}
+    )
+    found = crossing_margins(table, 12, 0.0, [2, 3, 5])
+    assert found["verdict"].tolist() == ["not excited at rest"] * 2
+    assert found["mode"].tolist() == [1, 1] and found["margin"].isna().all()
+
+
+def test_orders_of_the_diagrams_are_told():
+    scene = vary(Scene(), "excitation.engine_order", "9")
+    assert "engine orders 1 to 12, up to 3 above excitation.engine_order = 9" in orders_remark(
+        scene, ["excitation.engine_order"]
+    )
+    assert orders_remark(scene, ["kind"]).endswith("= 9, the default: the scene gives none")
+    assert orders_remark(scene, None).endswith("= 9")
+
+
+def test_pictures_have_the_lowest_orders_and_the_neighbours():
+    crossings = pd.DataFrame({"engine_order": [*range(2, 23), 40]})
+    found = SimpleNamespace(crossings=crossings)
+    assert drawn_orders(20, found) == [2, 3, 4, 5, 17, 18, 19, 20, 21, 22]
+    assert drawn_orders(30, found) == [2, 3, 4, 5, 30]

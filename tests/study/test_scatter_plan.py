@@ -102,6 +102,9 @@ def response(*amplitudes):
             frequency=np.arange(5.0),
             converged=np.ones(5, bool),
             interval=None,
+            is_march=False,
+            keeps_unstable=False,
+            reaches_layer=False,
         )
         for i, amplitude in enumerate(amplitudes)
     ]
@@ -127,6 +130,10 @@ def test_map_finds_the_best_of_both(tmp_path):
     assert list(table["peak_amplitude"]) == [4e-5, 3e-5, 2e-5, 5e-5]
     assert list(table["contact.mu"]) == ["0.2", "0.3", "0.2", "0.3"]
     assert all(file.is_file() for file in files)
+    written = pd.read_csv(tmp_path / "study.csv")
+    np.testing.assert_allclose(written["damper.angle [rad]"], np.radians([40, 40, 50, 50]))
+    np.testing.assert_allclose(written["contact.mu"], [0.2, 0.3, 0.2, 0.3])
+    assert len(pd.read_csv(tmp_path / "study_loads.csv")["contact.mu"]) == 16
     page = (tmp_path / "report_study.html").read_text()
     assert "best damper.angle" in page
     assert "50 deg" in page
@@ -150,12 +157,27 @@ def test_band_holds_the_samples(tmp_path):
     assert list(band["load"]) == [20.0, 40.0]
     assert list(band["amplitude_50"]) == pytest.approx([6e-5, 12e-5])
     assert list(band["amplitude_90"]) == pytest.approx([10e-5, 20e-5])
-    assert list(band["smallest"]) == pytest.approx([1e-5, 2e-5])
+    assert list(band["smallest_amplitude"]) == pytest.approx([1e-5, 2e-5])
     assert all(file.is_file() for file in files)
     page = (tmp_path / "report_study.html").read_text()
     assert "most robust load" in page
     assert "of 2 loads under which all 11 samples were studied" in page
     assert "were studied, the smallest load studied: a smaller one may do better" in page
+
+
+@pytest.mark.parametrize("samples", [2, 9, 10])
+def test_shares_of_samples_take_ten_of_them(samples, tmp_path):
+    rows = halton_values([Range("contact.mu", 0.2, 0.4, "1")], samples)
+    amplitudes = [(1e-5 * (i + 1), 3e-5) for i in range(samples)]
+    found = variants(["contact.mu"], rows, amplitudes)
+    band, _ = write_scatter(["contact.mu"], found, tmp_path)
+    shares = {name for name in band if name.startswith("amplitude_")}
+    page = (tmp_path / "report_study.md").read_text(encoding="utf-8")
+    assert bool(shares) == ("80 % between" in page) == (samples >= 10)
+    assert ("all samples stay below" in page) == (samples < 10)
+    head = (tmp_path / "study_band.md").read_text(encoding="utf-8").splitlines()[0]
+    assert head.endswith("largest resonance amplitude [µm] |")
+    assert ("median" in head) == (samples >= 10)
 
 
 def test_best_loads_of_single_samples_are_no_part_of_the_band(tmp_path):
@@ -168,7 +190,7 @@ def test_best_loads_of_single_samples_are_no_part_of_the_band(tmp_path):
         variant.response.curves.append(own)
     band, _ = write_scatter(["contact.mu"], found, tmp_path)
     assert list(band["load"]) == [20.0, 40.0]
-    assert list(band["smallest"]) == pytest.approx([4e-5, 3e-5])
+    assert list(band["smallest_amplitude"]) == pytest.approx([4e-5, 3e-5])
     assert "31" in (tmp_path / "study_loads.csv").read_text(), "they stay in the table of loads"
 
 

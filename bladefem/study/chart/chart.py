@@ -216,9 +216,9 @@ def _bench(
     )
     harmonics, samples = REFERENCE_SETTINGS[len(reached) - 1]
     course.remarks.append(
-        f"reference of the {name}: H {harmonics}, {samples} samples, resonance "
-        f"{truth.frequency:.6g} Hz, {1e6 * truth.amplitude:.6g} um, changed by "
-        f"{doubt['error']:.1e} on its last rung"
+        f"reference of the {name}: H {harmonics}, {samples} samples, resonance by the parabola "
+        f"through the highest three frequencies {truth.frequency:.6g} Hz, "
+        f"{1e6 * truth.amplitude:.6g} um, changed by {doubt['error']:.1e} on its last rung"
     )
     return Bench(omegas, truth, doubt)
 

@@ -85,6 +85,8 @@ def campbell_tables(
         campbell_crossings(_excited_waves(table, order, sectors), [order], sectors or None)
         for order in orders
     ]
+    # one without rows stands for all where no order crosses a mode
+    crossed = [rows for rows in crossed if len(rows)] or crossed[:1]
     tables = [_order_interference(at_speed, order, sectors, operating) for order in orders]
     return Campbell(
         table,

@@ -13,6 +13,9 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
+# verdict where engine orders have the frequency zero
+AT_REST = "not excited at rest"
+
 
 def fold_order(order: int, sectors: int) -> int:
     """The nodal diameter, 0..N/2, that an engine order excites on a wheel of N sectors."""
@@ -102,8 +105,8 @@ def interference_table(
 
     Returns:
         columns engine_order, nodal_diameter, wave, mode, frequency [Hz], excitation [Hz], margin
-        [1] = natural over excitation frequency - 1, speed_at_resonance [rad/s] (at constant natural
-        frequency).
+        [1] = natural over excitation frequency - 1 (NaN at rest), speed_at_resonance [rad/s] (at
+        constant natural frequency).
     """
     extra = [c for c in ("family",) if c in table]
     rows = []
@@ -119,7 +122,7 @@ def interference_table(
                     **{c: mode[c] for c in extra},
                     "frequency": mode["frequency"],
                     "excitation": excitation,
-                    "margin": mode["frequency"] / excitation - 1 if excitation > 0 else np.inf,
+                    "margin": mode["frequency"] / excitation - 1 if excitation > 0 else np.nan,
                     "speed_at_resonance": 2 * np.pi * mode["frequency"] / order
                     if order
                     else np.inf,
@@ -147,11 +150,14 @@ def crossing_margins(
     least: float = 0.05,
 ) -> pd.DataFrame:
     """The closest mode to each engine order, with a verdict: "ok" when at least ``least`` apart,
-    else "close".
+    else "close"; at rest the lowest mode, "not excited at rest".
     """
     rows = interference_table(table, sectors, speed, orders)
     if rows.empty:
         return rows.assign(verdict=[])
+    if not speed > 0:
+        lowest = rows.loc[rows.groupby("engine_order")["frequency"].idxmin()]
+        return lowest.assign(verdict=AT_REST).reset_index(drop=True)
     closest = rows.loc[rows.groupby("engine_order")["margin"].apply(lambda m: m.abs().idxmin())]
     return closest.assign(
         verdict=np.where(closest["margin"].abs() >= least, "ok", "close")

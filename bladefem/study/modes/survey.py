@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -17,6 +17,7 @@ from geometry.mesh import Mesh
 from ...data import ModeSet
 from ...errors import InputError
 from ...hbm.model import Damping
+from ...io.run_folder import given_fields
 from ...io.stage_cache import cached_stage, found_remark, on_root
 from ...io.stored_stage import stored_stage
 from ...scene.tables import Scene
@@ -36,8 +37,9 @@ from .effective_mass import effective_masses
 from .linear_response_report import ForcedResponseAnswer, forced_response_answer
 from .mesh_convergence import Convergence, default_sizes, mesh_convergence
 
-# engine orders above and below the scene's own, in Campbell and SAFE diagrams
-NEIGHBOURING_ORDERS = 3
+# engine orders above the scene's own, in Campbell and SAFE diagrams; all below it are looked at,
+# since the lowest carry most of an uneven inflow
+ORDERS_ABOVE = 3
 
 
 @dataclass(frozen=True)
@@ -93,6 +95,8 @@ def survey_modes(
     other = None if wanted.other is None else on_root(comm, partial(_read_other, wanted.other))
     start = pipeline.run(scene, folder, until="mesh", comm=comm, progress=progress)
     check_blade(scene, start.mesh)
+    if wanted.other is not None and other is not None:
+        refuse_other_kind(wanted.other, start.mesh, other[1])
     if wanted.loads is not None:
         refuse_loads(scene, start.mesh, wanted.loads, wanted.damping)
     bodies = Bodies(scene, start.mesh, comm, progress)
@@ -114,6 +118,7 @@ def survey_modes(
         result = replace(
             result, campbell=campbell_tables(bodies, wanted.speeds, _engine_orders(scene))
         )
+        run.messages.append(orders_remark(scene, on_root(comm, lambda: given_fields(folder))))
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
         sizes = list(wanted.sizes) or default_sizes(scene)
@@ -164,8 +169,28 @@ def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
 
 
 def _engine_orders(scene: Scene) -> list[int]:
-    order = scene.excitation.engine_order
-    return list(range(max(order - NEIGHBOURING_ORDERS, 1), order + NEIGHBOURING_ORDERS + 1))
+    return list(range(1, scene.excitation.engine_order + ORDERS_ABOVE + 1))
+
+
+def order_is_given(given: Collection[str] | None) -> bool:
+    """Whether somebody gave the scene's engine order: it counts as given where nobody knows.
+
+    Args:
+        given: dotted names of the fields that were given, as the run folder knows them.
+    """
+    return given is None or "excitation.engine_order" in given
+
+
+def orders_remark(scene: Scene, given: Collection[str] | None) -> str:
+    """Which engine orders the diagrams have; a default that nobody gave stands where it is seen."""
+    own = f"excitation.engine_order = {scene.excitation.engine_order}"
+    text = (
+        "Campbell crossings, interference and margins are those of engine orders 1 to "
+        f"{_engine_orders(scene)[-1]}, up to {ORDERS_ABOVE} above {own}"
+    )
+    if order_is_given(given):
+        return method(text)
+    return f"{text}, the default: the scene gives none"
 
 
 def _stage_seconds(
@@ -201,6 +226,22 @@ def _read_stage(folder: Path, name: str) -> Any:
         return None
 
 
+def refuse_other_kind(folder: Path, own: Mesh, sets: Sequence[ModeSet]) -> None:
+    """Modes of a wheel are not compared with those of a single blade.
+
+    Raises:
+        InputError: one of both is a wheel, the other a single blade.
+    """
+    of_wheel = any(s.nodal_diameter is not None for s in sets)
+    if of_wheel == is_wheel(own):
+        return
+    theirs, mine = ("a wheel", "a single blade")[:: 1 if of_wheel else -1]
+    raise InputError(
+        f"compare = {folder}: its modes are those of {theirs}, expected the run of {mine}, as in "
+        "this scene"
+    )
+
+
 def _compare_modes(
     result: Survey,
     mesh: Mesh,
@@ -212,8 +253,10 @@ def _compare_modes(
     mine = excited_set(result.run)
     theirs = [s for s in sets if s.nodal_diameter == mine.nodal_diameter]
     if not theirs:
+        known = ", ".join(str(s.nodal_diameter) for s in sets)
         raise InputError(
-            f"compare: the other run has no modes of nodal diameter {mine.nodal_diameter}"
+            f"compare: the other run has modes of nodal diameters {known}, expected "
+            f"{mine.nodal_diameter} among them"
         )
     own = result.run.mesh
     same = mesh.points.shape == own.points.shape and np.array_equal(mesh.points, own.points)

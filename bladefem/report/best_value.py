@@ -1,0 +1,92 @@
+"""Which value of a studied field is the best, as far as the estimated errors separate the values.
+
+Tables have one row a value, or a pair of values: peak_amplitude [m], error [1] (NaN: not estimated,
+inf: unknown), and a column of texts for each field.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import pandas as pd
+
+from .headlines import NOT_DETERMINED, Headline
+
+
+def within_errors(table: pd.DataFrame) -> pd.DataFrame:
+    """The rows whose amplitudes less their estimated errors are no more than the smallest amplitude
+    with its own, the row of that one among them.
+    """
+    amplitude = table["peak_amplitude"]
+    # what is not estimated separates nothing and joins nothing
+    error = table["error"].fillna(0.0)
+    best = amplitude.idxmin()
+    lowest = amplitude * (1 - error).clip(lower=0.0)
+    return table[lowest <= amplitude[best] * (1 + error[best])]
+
+
+def value_headlines(
+    table: pd.DataFrame, columns: Mapping[str, str], studied: Mapping[str, Sequence[str]]
+) -> list[Headline]:
+    """The best value of each field, or that the errors leave it open.
+
+    Args:
+        table: see the head of this file.
+        columns: name of a field to its column of texts.
+        studied: name of a field to all its values, in their order.
+    """
+    best = table.loc[table["peak_amplitude"].idxmin()]
+    near = within_errors(table)
+    found = []
+    for name, column in columns.items():
+        values = list(dict.fromkeys(map(str, near[column])))
+        if len(values) > 1:
+            found.append(
+                Headline(
+                    f"best {name}",
+                    NOT_DETERMINED,
+                    f"the estimated errors do not separate {_listed(values)}",
+                    f"smallest amplitude with {best[column]}",
+                )
+            )
+            continue
+        place = place_of_value(str(best[column]), studied[name])
+        found.append(Headline(f"best {name}", str(best[column]), place, ""))
+    return found
+
+
+def best_value_lines(headlines: Sequence[Headline]) -> str:
+    """The same for a terminal, a line a field."""
+    return "\n".join(
+        f"{one.what}: {one.value}: {one.uncertainty}; {one.remark}"
+        if one.value == NOT_DETERMINED
+        else f"{one.what}: {one.value}, {one.uncertainty}"
+        for one in headlines
+    )
+
+
+def are_determined(headlines: Sequence[Headline]) -> bool:
+    """Whether the errors leave no value open."""
+    return all(one.value != NOT_DETERMINED for one in headlines)
+
+
+def place_of_value(best: str, values: Sequence[str]) -> str:
+    """How many values were studied, and whether the best is at an end of them.
+
+    >>> place_of_value("50 deg", ["40 deg", "50 deg", "60 deg"])
+    'best of 3 values'
+    >>> place_of_value("60 deg", ["40 deg", "50 deg", "60 deg"])
+    'best of 3 values, the last: better ones may lie beyond'
+    """
+    words = f"best of {len(values)} values"
+    # words such as "coupled" have no order
+    ordered = all(value.lstrip("+-.")[:1].isdigit() for value in values)
+    if not ordered or len(values) < 2 or best not in (values[0], values[-1]):
+        return words
+    end = "first" if best == values[0] else "last"
+    return f"{words}, the {end}: better ones may lie beyond"
+
+
+def _listed(values: Sequence[str]) -> str:
+    """ "0.2, 0.3 and 0.4"."""
+    return f"{', '.join(values[:-1])} and {values[-1]}"
