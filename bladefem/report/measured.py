@@ -11,7 +11,7 @@ from ..scene.units import newtons, show
 from ..study.contact_identification import ContactFit
 from ..study.fit_intervals import UNKNOWN_LOG_HALF_WIDTH
 from ..study.fit_truncation import LeftOut
-from ..study.measured_responses import FittedScene
+from ..study.measured_responses import LARGEST_AMPLITUDE, FittedScene
 from ..util.message import warning
 from ..view.measured import draw_measured
 from .headlines import Headline
@@ -84,6 +84,7 @@ def fit_sentences(found: FittedScene) -> list[str]:
     if found.scene_values:
         rows = (f"{name} = {_value(name, value)}" for name, value in found.scene_values.items())
         sentences.append(f"for the scene, under [contact]: {', '.join(rows)}")
+    sentences += _useless_values(found)
     sentences += left_out_sentences(fit)
     if fit.misfit > 2:
         sentences.append(
@@ -94,6 +95,34 @@ def fit_sentences(found: FittedScene) -> list[str]:
         )
     if not kept.all():
         sentences.append(warning(f"{int((~kept).sum())} of {len(off)} readings not solved"))
+    return sentences
+
+
+def _useless_values(found: FittedScene) -> list[str]:
+    """Why a fitted field is not given for the scene, and readings that look wrong."""
+    sentences = []
+    for one in found.fields:
+        if not found.fit.knowledge.known[one.parameter]:
+            sentences.append(
+                warning(f"no value of contact.{one.name} for the scene: the readings leave it open")
+            )
+        elif not one.allows:
+            low, high = (show(end, one.unit) for end in one.allowed)
+            sentences.append(
+                warning(
+                    f"contact.{one.name} would be {show(one.value, one.unit)}, and a scene takes "
+                    f"{low} to {high}: the readings are not those of this scene"
+                )
+            )
+    largest, size = float(found.readings.amplitude.max()), found.sector_size
+    if largest > LARGEST_AMPLITUDE * size:
+        sentences.append(
+            warning(
+                f"an amplitude of {show(largest, 'm')} is {100 * largest / size:.2g} % of the "
+                f"sector's size, {show(size, 'm')}: too large for a linear elastic blade; is its "
+                "unit right?"
+            )
+        )
     return sentences
 
 

@@ -2,6 +2,8 @@
 bad files.
 """
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,8 +11,13 @@ from mistuned import COARSE_MISTUNED, MISTUNED
 
 from bladefem.cli.main import main
 from bladefem.errors import InputError
-from bladefem.scene.toml import load_scene
-from bladefem.study.measured_responses import read_readings
+from bladefem.report.measured import fit_sentences
+from bladefem.scene.toml import load_scene, vary
+from bladefem.study.contact_identification import ContactFit
+from bladefem.study.fit_intervals import Knowledge
+from bladefem.study.fit_truncation import LeftOut
+from bladefem.study.measured_models import BODY_MESH, Readings
+from bladefem.study.measured_responses import FittedScene, read_readings
 from bladefem.study.pipeline import pipeline
 
 COARSE = (
@@ -72,6 +79,66 @@ def test_command_finds_the_contact_of_the_readings(measured, tmp_path, capsys):
     assert (tmp_path / "fit.png").is_file() and (tmp_path / "report_fit.html").is_file()
 
 
+def fitted_scene(factors, intervals, amplitude=1e-4, names=("mu", "stiffness"), mesh=0.0, **more):
+    """A fit as its report takes it, of the shipped wheel without a run."""
+    scene = load_scene(MISTUNED, COARSE)
+    intervals = np.array(intervals, dtype=float)
+    half = np.log(intervals[:, 1] / np.array(factors))
+    shift = LeftOut(BODY_MESH, np.full(len(names), np.log1p(mesh)), 0, widens=False)
+    fit = ContactFit(
+        names,
+        np.array(factors),
+        Knowledge(half, intervals, []),
+        1.0,
+        [np.array([amplitude])],
+        [np.array([amplitude])],
+        half,
+        (shift,),
+    )
+    one = np.array([amplitude])
+    readings = Readings(np.array([80.0]), np.array([1.5]), np.array([200.0]), one)
+    run = SimpleNamespace(
+        scene=vary(scene, **more) if more else scene,
+        mesh=SimpleNamespace(points=np.array([[0.0, 0, 0], [0.3, 0.4, 0]])),
+        messages=[],
+        timings={},
+    )
+    settings = SimpleNamespace(harmonics=7, samples=128)
+    return FittedScene(run, readings, fit, 0.05, one, one, settings)
+
+
+def test_no_value_for_the_scene_that_is_open_or_out_of_range():
+    """The answer to amplitudes in a wrong unit was a friction coefficient of 2.565."""
+    good = fitted_scene([0.8, 1.2], [[0.7, 0.9], [1.1, 1.3]])
+    assert good.scene_values == pytest.approx({"mu": 0.24, "kt_area": 4.8e10})
+    assert "for the scene, under [contact]: mu = 0.24" in " ".join(fit_sentences(good))
+    odd = fitted_scene([8.55, 1.2], [[8, 9], [0.0, np.inf]])
+    assert odd.scene_values == {}
+    said = fit_sentences(odd)
+    assert not any("for the scene, under [contact]" in one for one in said)
+    (high,) = (one for one in said if "contact.mu would be 2.565" in one)
+    assert high.level == "warning" and "a scene takes 0 to 2" in high
+    (wide,) = (one for one in said if "no value of contact.kt_area" in one)
+    assert wide.level == "warning"
+
+
+def test_amplitudes_of_the_size_of_the_blade_raise_a_warning():
+    wide = fitted_scene([0.8, 1.2], [[0.7, 0.9], [1.1, 1.3]], amplitude=0.06)
+    (said,) = (one for one in fit_sentences(wide) if "an amplitude of 60 mm is 12 %" in one)
+    assert said.level == "warning"
+
+
+def test_amplitudes_larger_than_the_sector_are_refused(measured, tmp_path, capsys):
+    file = tmp_path / "metres.csv"
+    file.write_text("frequency [Hz], amplitude [m]\n200, 105\n205, 253\n")
+    arguments = ["fit", str(MISTUNED), "-o", str(tmp_path / "run"), "--measured", str(file)]
+    for override in (*COARSE, "study.loads=80 N"):
+        arguments += ["--set", override]
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert "an amplitude of 253 m is larger than the sector" in said and said.count("\n") == 1
+
+
 def test_scene_of_one_harmonic_is_fitted_with_more(measured, tmp_path):
     scene, file = measured
     few = tmp_path / "few.csv"
@@ -87,7 +154,10 @@ def test_scene_of_one_harmonic_is_fitted_with_more(measured, tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("frequency [Hz]\n200\n", "expected a column 'amplitude'"),
+        ("frequency [Hz]\n200\n", "expected a column 'amplitude .um.'"),
+        ("frequency [Hz], amplitude\n200, 105\n", "'amplitude' has no unit.*'amplitude .um.'"),
+        ("frequency, amplitude [um]\n200, 105\n", "'frequency' has no unit.*'frequency .Hz.'"),
+        ("frequency [Hz], amplitude [um], load []\n200, 1, 80\n", "'load ..' has no unit"),
         ("frequency [Hz], amplitude [kg]\n200, 1\n", "amplitude .kg.*unit"),
         ("frequency [Hz], height [um]\n200, 1\n", "column 'height .um.', expected load, force"),
         ("frequency [Hz], amplitude [um]\n200\n", "expected 2 .*numbers in each row"),
