@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -53,7 +53,7 @@ LARGEST_AMPLITUDE = 0.05
 class FittedField:
     """A field that the scene gives and that a fitted parameter scales."""
 
-    # under [contact]: "mu", "left.kt_area"
+    # under [contact]: "mu", "left.kt_area"; empty for the load of the readings
     name: str
     # number of the parameter
     parameter: int
@@ -92,16 +92,27 @@ class FittedScene:
         """Fields that the scene gives and that a fitted parameter scales."""
         contact = self.run.scene.contact
         seats = {"": contact, "left.": contact.left, "right.": contact.right}
-        if contact.left.mu is not None and contact.right.mu is not None:
-            # no seat has that of [contact]
-            seats[""] = replace(contact, mu=None)
+        # both seats have a friction coefficient of their own: none has that of [contact]
+        unused = "mu" if contact.left.mu is not None and contact.right.mu is not None else ""
         return [
             self._field(number, seat + field, value)
             for number, name in enumerate(self.fit.names)
             for field in SCALED_FIELDS.get(name, ())
             for seat, values in seats.items()
-            if (value := getattr(values, field)) is not None
+            if seat + field != unused and (value := getattr(values, field)) is not None
         ]
+
+    @property
+    def absolute_values(self) -> list[FittedField]:
+        """The fields, and the normal load where all readings have the same one."""
+        loads = np.unique(self.readings.load)
+        if "load" not in self.fit.names or len(loads) > 1:
+            return self.fields
+        number = self.fit.names.index("load")
+        load = float(loads[0])
+        low, high = (float(end) * load for end in self.fit.knowledge.intervals[number])
+        fitted = float(self.fit.factors[number]) * load
+        return [*self.fields, FittedField("", number, fitted, low, high, "N", (0.0, np.inf))]
 
     def _field(self, number: int, name: str, value: float) -> FittedField:
         meta = field_at(f"contact.{name}").meta
