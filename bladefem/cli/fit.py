@@ -39,7 +39,7 @@ def fit(options: argparse.Namespace, comm: Communicator | None) -> None:
     names = [name.strip() for name in options.parameters.split(",") if name.strip()]
     scene, folder, bars = prepared(options, comm, responds=True)
     from ..io.stage_cache import on_root
-    from ..report.measured import fit_sentences, parameter_table, write_fit
+    from ..report.measured import fit_sentences, terminal_table, write_fit
     from ..report.tables import readable_texts
     from ..study.measured_responses import check_parameters, fit_scene, read_readings
 
@@ -52,7 +52,7 @@ def fit(options: argparse.Namespace, comm: Communicator | None) -> None:
         comm,
         lambda: "\n".join(
             [
-                tables.frame_table(readable_texts(parameter_table(found))),
+                tables.frame_table(readable_texts(terminal_table(found))),
                 "",
                 *fit_sentences(found),
                 f"written: {', '.join(map(str, files))}",

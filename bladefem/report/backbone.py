@@ -15,6 +15,7 @@ from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..util.message import warning
 from ..util.percent import percent
 from ..view.backbone import draw_design_map
+from .best_load import error_words
 from .headlines import Headline
 from .tables import write_tables
 from .write import Page, write_report
@@ -106,6 +107,39 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
     return sentences
 
 
+def backbone_headlines(run: SolvedRun, found: Sequence[Backbone]) -> list[Headline]:
+    """The lowest resonance by its mode, with the error of the balance that judges it, and the
+    damping there.
+    """
+    best = min(found, key=lambda one: one.balance[0])
+    used = best.friction[best.converged].max(initial=0.0)
+    of_balance = error_words(balance_error(run, best))
+    return [
+        Headline(
+            "resonance by the nonlinear mode, at the best load studied",
+            f"{1e6 * best.predicted[0]:.4g} µm",
+            f"off by {100 * best.error:+.2g} % from the balance; the balance itself: {of_balance}",
+            f"under {newtons(best.load, 4)} at {best.predicted[1]:.5g} Hz",
+        ),
+        Headline(
+            "largest friction damping under that load",
+            f"{100 * used:.3g} %",
+            "by the model; no excitation enters",
+            "of critical",
+        ),
+    ]
+
+
+def balance_error(run: SolvedRun, one: Backbone) -> pd.Series:
+    """The estimated error of the balance that a mode stands next to, and the mesh's part in it: as
+    in the design table of the run.
+    """
+    curves = run.response.curves
+    (curve,) = (c for c in curves if (c.load, c.mass) == (one.load, one.mass))
+    error = np.nan if curve.error is None else curve.error
+    return pd.Series({"error": error, "body_mesh": curve.body_mesh}, dtype=float)
+
+
 def write_backbones(
     run: SolvedRun,
     found: Sequence[Backbone],
@@ -120,29 +154,14 @@ def write_backbones(
     points = [(c.frequency[c.converged], c.amplitude[c.converged]) for c in run.response.curves]
     picture = folder / "design_map.png"
     draw_design_map(found, points, run.scene.title, picture)
-    best = min(found, key=lambda one: one.balance[0])
-    used = best.friction[best.converged].max(initial=0.0)
-    numbers = [
-        Headline(
-            "resonance by the nonlinear mode, at the best load studied",
-            f"{1e6 * best.predicted[0]:.4g} µm",
-            f"off by {100 * best.error:+.2g} % from the balance",
-            f"under {newtons(best.load, 4)} at {best.predicted[1]:.5g} Hz",
-        ),
-        Headline(
-            "largest friction damping under that load",
-            f"{100 * used:.3g} %",
-            "by the model; no excitation enters",
-            "of critical",
-        ),
-    ]
     pages = write_report(
         folder,
         run.scene,
         tables,
         {"response/design_map": picture},
-        [*filter(None, [moved]), *remarks, *backbone_sentences(found)],
+        # what makes the balance wrong makes its modes wrong
+        [*filter(None, [moved]), *run.messages, *remarks, *backbone_sentences(found)],
         run.timings,
-        page=Page(numbers=numbers, stem="report_backbone"),
+        page=Page(numbers=backbone_headlines(run, found), stem="report_backbone"),
     )
     return [folder / "backbone_resonances.csv", folder / "backbone.csv", picture, *pages]

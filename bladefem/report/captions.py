@@ -89,8 +89,8 @@ CAPTIONS = {
     "of the balance, diamonds where the mode turns back in amplitude. Right: resonance amplitude "
     "and forced response by the mode alone next to the "
     "balance.",
-    "contact/fit": "The contact fitted to measured responses: over the scene's values; in the "
-    "picture the readings, lines of the fitted contact, dotted lines of the scene's.",
+    "contact/fit": "The contact fitted to measured responses: values, and factors on the scene's; "
+    "in the picture dots are readings, squares the fitted contact, crosses the scene's.",
     "contact/fit_readings": "Each reading, and its amplitude by the contact of the scene and by "
     "the fitted one.",
     "wheel/whole_wheel": "The whole wheel with its pattern: the highest blade next to the tuned "

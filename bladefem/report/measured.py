@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from ..scene.units import newtons, show
+from ..scene.units import newtons, parse, plain_number, readable_units, show
 from ..study.contact_identification import ContactFit
 from ..study.fit_intervals import UNKNOWN_LOG_HALF_WIDTH
 from ..study.fit_truncation import LeftOut
-from ..study.measured_responses import FittedScene
+from ..study.measured_models import FEWEST_HARMONICS
+from ..study.measured_responses import LARGEST_AMPLITUDE, FittedField, FittedScene
 from ..util.message import warning
 from ..view.measured import draw_measured
-from .headlines import Headline
+from .headlines import NOT_DETERMINED, Headline
 from .tables import write_tables
 from .write import Page, write_report
 
@@ -26,23 +29,79 @@ NAMES = {
     "stiffness": "contact stiffness",
     "load": "normal load",
 }
+# columns of the parameters that files have and a terminal has no room for
+FILE_COLUMNS = ("log_half_by_readings", "log_half_by_model")
+# significant digits of a fitted value
+FEWEST_DIGITS, MOST_DIGITS = 2, 4
 # smallest shift of a logarithm that is reported
 COUNTED_SHIFT = 5e-4
 
 
 def parameter_table(found: FittedScene) -> pd.DataFrame:
-    """One row a parameter: the factor on the scene's value, with its interval."""
+    """One row a parameter, or a field of the scene where it scales several: the value and the
+    factor on the scene's, with intervals.
+    """
     fit = found.fit
-    return pd.DataFrame(
+    rows: list[tuple[int, FittedField | None]] = []
+    for number in range(len(fit.names)):
+        values = [one for one in found.absolute_values if one.parameter == number]
+        rows += [(number, one) for one in values] or [(number, None)]
+    numbers = [number for number, _ in rows]
+    table = pd.DataFrame(
         {
-            "parameter": [NAMES[name] for name in fit.names],
-            "over_scene": fit.factors,
-            "factor_low": fit.knowledge.intervals[:, 0],
-            "factor_high": fit.knowledge.intervals[:, 1],
-            **_shares_of_half_widths(fit),
-            "determined": ["yes" if known else "no" for known in fit.knowledge.known],
+            "parameter": [NAMES[fit.names[number]] for number in numbers],
+            **_absolute_columns([one for _, one in rows]),
+            "over_scene": fit.factors[numbers],
+            "factor_low": fit.knowledge.intervals[numbers, 0],
+            "factor_high": fit.knowledge.intervals[numbers, 1],
+            **{name: half[numbers] for name, half in _shares_of_half_widths(fit).items()},
+            "mesh_shift": _told_shifts(fit)[numbers],
+            "determined": [_determined(fit, number) for number in numbers],
         }
     )
+    return (
+        table if any(not one.widens for one in fit.left_out) else table.drop(columns="mesh_shift")
+    )
+
+
+def terminal_table(found: FittedScene) -> pd.DataFrame:
+    """The columns of `parameter_table` that fit a terminal."""
+    table = parameter_table(found)
+    dropped = set(FILE_COLUMNS)
+    if table["fitted_value"].notna().all():
+        # the interval of the value says as much
+        dropped |= {"factor_low", "factor_high"}
+    return table[[name for name in table if name not in dropped]]
+
+
+def _absolute_columns(values: Sequence[FittedField | None]) -> dict[str, list[Any]]:
+    """Columns of the fitted values in units that people read; empty where the scene gives none."""
+    shown = [(*_in_readable_unit(one)[0], _in_readable_unit(one)[1]) for one in values]
+    names = ("fitted_value", "fitted_low", "fitted_high", "fitted_unit")
+    columns = dict(zip(names, map(list, zip(*shown, strict=True)), strict=True))
+    fields = [f"contact.{one.name}" if one is not None and one.name else "" for one in values]
+    return {"fitted_field": fields, **columns}
+
+
+def _in_readable_unit(one: FittedField | None) -> tuple[tuple[float, float, float], str]:
+    """The value with the ends of its interval, and their unit; NaN where there is none."""
+    if one is None:
+        return (np.nan, np.nan, np.nan), ""
+    unit = "N" if one.unit == "N" else readable_units(one.unit)[0]
+    size = 1.0 if unit == "1" else parse(f"1 {unit}", one.unit)
+    return (one.value / size, one.low / size, one.high / size), "" if unit == "1" else unit
+
+
+def _told_shifts(fit: ContactFit) -> np.ndarray:
+    """(p,) relative shifts by what no interval holds; infinite where it is not known."""
+    unknown = abs(fit.apart) >= UNKNOWN_LOG_HALF_WIDTH
+    return np.where(unknown, np.inf, np.expm1(np.where(unknown, 0.0, fit.apart)))
+
+
+def _determined(fit: ContactFit, number: int) -> str:
+    if not fit.knowledge.known[number]:
+        return "no"
+    return "but for the mesh" if fit.moved_apart[number] else "yes"
 
 
 def _shares_of_half_widths(fit: ContactFit) -> dict[str, np.ndarray]:
@@ -64,7 +123,7 @@ def readings_table(found: FittedScene) -> pd.DataFrame:
             "measured_amplitude": readings.amplitude,
             "scene_amplitude": found.before,
             "fitted_amplitude": found.fitted,
-            "off": found.fitted / readings.amplitude - 1,
+            "off_reading": found.fitted / readings.amplitude - 1,
         }
     )
 
@@ -79,11 +138,14 @@ def fit_sentences(found: FittedScene) -> list[str]:
         f"square; by the scene's {_percent(found.before / found.readings.amplitude - 1)}); "
         f"{100 * found.error:.3g} % were assumed as their error; "
         f"{found.settings.harmonics} harmonics",
-        fit.sentence(),
+        *_more_than_the_scene(found),
+        _known_sentence(fit),
+        *_absolute_sentences(found),
     ]
     if found.scene_values:
         rows = (f"{name} = {_value(name, value)}" for name, value in found.scene_values.items())
         sentences.append(f"for the scene, under [contact]: {', '.join(rows)}")
+    sentences += _useless_values(found)
     sentences += left_out_sentences(fit)
     if fit.misfit > 2:
         sentences.append(
@@ -94,6 +156,125 @@ def fit_sentences(found: FittedScene) -> list[str]:
         )
     if not kept.all():
         sentences.append(warning(f"{int((~kept).sum())} of {len(off)} readings not solved"))
+    return sentences
+
+
+def _more_than_the_scene(found: FittedScene) -> list[str]:
+    """Why a fit has more harmonics than the scene gives."""
+    given, taken = found.run.scene.model.harmonics, found.settings.harmonics
+    if given is None or given >= taken:
+        return []
+    said = (
+        f"{taken} harmonics, not the {given} of model.harmonics: a fit takes {FEWEST_HARMONICS} at "
+        "least, since what fewer leave out (three: up to 6 % of an amplitude where contacts lift "
+        "off) would be taken for the contact's"
+    )
+    more = ", and more where these move a parameter further than half of what the readings tell"
+    return [said + (more if taken > FEWEST_HARMONICS else "")]
+
+
+def _known_sentence(fit: ContactFit) -> str:
+    """What the readings determine, and whether another mesh would say something else."""
+    moved = fit.moved_apart & fit.knowledge.known
+    if not moved.any():
+        return fit.sentence()
+    names = " and ".join(name for name, far in zip(fit.names, moved, strict=True) if far)
+    return f"{fit.sentence()}; for this mesh: its error moves {names} beyond the intervals"
+
+
+def _absolute_sentences(found: FittedScene) -> list[str]:
+    """The values of those parameters that the readings determine, with their intervals."""
+    fit = found.fit
+    return [
+        f"{_field_name(one)} = {_value_words(fit, one)}, 95 % interval {_interval_words(one)}"
+        f"{_apart_words(fit, one.parameter)}"
+        for one in found.absolute_values
+        if fit.knowledge.known[one.parameter]
+    ]
+
+
+def _field_name(one: FittedField) -> str:
+    return f"contact.{one.name}" if one.name else "normal load of a seat"
+
+
+def _value_words(fit: ContactFit, one: FittedField) -> str:
+    """ "0.25", "34 N/mm^3": by as many digits as are known."""
+    (value, _, _), unit = _in_readable_unit(one)
+    return f"{plain_number(value, _known_digits(fit, one.parameter))} {unit}".rstrip()
+
+
+def _interval_words(one: FittedField) -> str:
+    (_, low, high), unit = _in_readable_unit(one)
+    return f"{plain_number(low, 3)} to {plain_number(high, 3)} {unit}".rstrip()
+
+
+def _apart_words(fit: ContactFit, number: int) -> str:
+    """ "; mesh apart: +31 %", where that counts."""
+    shift = float(fit.apart[number])
+    return f"; mesh apart: {_shift(shift)}" if abs(shift) >= COUNTED_SHIFT else ""
+
+
+def _known_digits(fit: ContactFit, number: int) -> int:
+    """Significant digits of a value by its interval, or by the mesh where that moves it further."""
+    known = max(float(fit.knowledge.half[number]), abs(float(fit.apart[number])), 1e-12)
+    return int(np.clip(np.ceil(-np.log10(known)) + 1, FEWEST_DIGITS, MOST_DIGITS))
+
+
+def fit_headlines(found: FittedScene) -> list[Headline]:
+    """One number a parameter: its value where the scene gives one, else the factor on its own."""
+    fit = found.fit
+    numbers = []
+    for number, name in enumerate(fit.names):
+        factor = f"{plain_number(float(fit.factors[number]), _known_digits(fit, number))} times"
+        low, high = fit.knowledge.intervals[number]
+        between = f"{low:.3g} to {high:.3g}"
+        values = [one for one in found.absolute_values if one.parameter == number]
+        if not fit.knowledge.known[number]:
+            best = f"best fit: {factor} the scene's, interval {between}".replace("inf", "∞")
+            left = "the readings leave it open"
+            numbers.append(Headline(NAMES[name], NOT_DETERMINED, left, best))
+            continue
+        apart = _apart_words(fit, number)
+        if not values:
+            sure = f"95 % interval {between}{apart}"
+            numbers.append(Headline(NAMES[name], f"{factor} the scene's", sure, ""))
+        numbers += [
+            Headline(
+                NAMES[name],
+                _value_words(fit, one),
+                f"95 % interval {_interval_words(one)}{apart}",
+                f"{_field_name(one)}, {factor} the scene's ({between})",
+            )
+            for one in values
+        ]
+    return numbers
+
+
+def _useless_values(found: FittedScene) -> list[str]:
+    """Why a fitted field is not given for the scene, and readings that look wrong."""
+    sentences: list[str] = []
+    for one in found.fields:
+        if not found.fit.knowledge.known[one.parameter]:
+            sentences.append(
+                warning(f"no value of contact.{one.name} for the scene: the readings leave it open")
+            )
+        elif not one.allows:
+            low, high = (show(end, one.unit) for end in one.allowed)
+            sentences.append(
+                warning(
+                    f"contact.{one.name} would be {show(one.value, one.unit)}, and a scene takes "
+                    f"{low} to {high}: the readings are not those of this scene"
+                )
+            )
+    largest, size = float(found.readings.amplitude.max()), found.sector_size
+    if largest > LARGEST_AMPLITUDE * size:
+        sentences.append(
+            warning(
+                f"an amplitude of {show(largest, 'm')} is {100 * largest / size:.2g} % of the "
+                f"sector's size, {show(size, 'm')}: too large for a linear elastic blade; is its "
+                "unit right?"
+            )
+        )
     return sentences
 
 
@@ -167,26 +348,11 @@ def write_fit(found: FittedScene, folder: Path) -> list[Path]:
         levels[f"{newtons(load, 4)}, force {newtons(force, 4)}"] = (
             readings.frequency[rows],
             readings.amplitude[rows],
-            found.before[rows],
             found.fitted[rows],
+            found.before[rows],
         )
     picture = folder / "fit.png"
     draw_measured(levels, found.run.scene.title, picture)
-    numbers = [
-        Headline(
-            NAMES[name],
-            f"{factor:.4g} times the scene's",
-            f"95 % interval {low:.3g} to {high:.3g}" if known else "the readings leave it open",
-            "",
-        )
-        for name, factor, (low, high), known in zip(
-            found.fit.names,
-            found.fit.factors,
-            found.fit.knowledge.intervals,
-            found.fit.knowledge.known,
-            strict=True,
-        )
-    ]
     pages = write_report(
         folder,
         found.run.scene,
@@ -194,6 +360,6 @@ def write_fit(found: FittedScene, folder: Path) -> list[Path]:
         {"contact/fit": picture},
         [*found.run.messages, *fit_sentences(found)],
         found.run.timings,
-        page=Page(numbers=numbers, stem="report_fit"),
+        page=Page(numbers=fit_headlines(found), stem="report_fit"),
     )
     return [folder / "fit.csv", folder / "fit_readings.csv", picture, *pages]

@@ -21,7 +21,7 @@ from ..hbm.sensitivity import sensitivities
 from ..hbm.solution import Solution
 from ..hbm.solve import solve
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
-from ..util.arrays import RealArray
+from ..util.arrays import BooleanArray, RealArray
 from .adaptive.indicators import ESTIMATE_OPTIONS
 from .fit_intervals import Knowledge, what_is_known
 from .fit_truncation import LeftOut, RicherBalance, left_out, richer_balances
@@ -88,6 +88,17 @@ class ContactFit:
     def held(self) -> tuple[LeftOut, ...]:
         """What is left out of the model and held by the intervals."""
         return tuple(one for one in self.left_out if one.widens)
+
+    @property
+    def apart(self) -> RealArray:
+        """(p,) shifts of the logarithms by what no interval holds."""
+        shifts = [one.shift for one in self.left_out if not one.widens]
+        return np.sum([np.zeros(len(self.names)), *shifts], axis=0)
+
+    @property
+    def moved_apart(self) -> BooleanArray:
+        """(p,) what no interval holds moves the parameter further than the readings tell it."""
+        return np.asarray(abs(self.apart) > self.half_by_readings)
 
     def sentence(self) -> str:
         """What the data determine, and what they do not."""

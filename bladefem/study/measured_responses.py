@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError, missing_file
+from ..scene.fields import field_at
 from ..scene.tables import Scene
 from ..scene.toml import vary
-from ..scene.units import parse
+from ..scene.units import parse, show
 from ..util.arrays import RealArray
 from ..util.communicator import Communicator
 from ..util.progress import Progress, without_progress
@@ -26,6 +27,12 @@ from .pipeline.stage_runner import Folder
 # column of the file to the unit inside; the first two may be left out for those of the scene
 COLUMNS = {"load": "N", "force": "N", "frequency": "Hz", "amplitude": "m"}
 OPTIONAL_COLUMNS = ("load", "force")
+EXAMPLES = {
+    "load": "load [N]",
+    "force": "force [N]",
+    "frequency": "frequency [Hz]",
+    "amplitude": "amplitude [um]",
+}
 # of the half width of an interval by the readings: up to such a shift by a richer model the
 # interval is widened, beyond it a richer model is fitted
 ENOUGH_SHIFT = 0.5
@@ -38,6 +45,31 @@ SCALED_FIELDS = {
 }
 # fits with richer models, each of which begins where the last one ended
 MOST_ENRICHMENTS = 4
+# of the size of the sector: largest amplitude of which a linear elastic blade is a model
+LARGEST_AMPLITUDE = 0.05
+
+
+@dataclass(frozen=True)
+class FittedField:
+    """A field that the scene gives and that a fitted parameter scales."""
+
+    # under [contact]: "mu", "left.kt_area"; empty for the load of the readings
+    name: str
+    # number of the parameter
+    parameter: int
+    # fitted value and ends of its interval [SI]
+    value: float
+    low: float
+    high: float
+    # SI
+    unit: str
+    # ends of the values that a scene takes [SI]
+    allowed: tuple[float, float]
+
+    @property
+    def allows(self) -> bool:
+        """A scene takes the fitted value."""
+        return self.allowed[0] <= self.value <= self.allowed[1]
 
 
 @dataclass(frozen=True)
@@ -56,23 +88,57 @@ class FittedScene:
     settings: Settings
 
     @property
-    def scene_values(self) -> dict[str, float]:
-        """Field under [contact] to its fitted value [SI], of those fields that the scene gives and
-        that a fitted parameter scales.
-        """
+    def fields(self) -> list[FittedField]:
+        """Fields that the scene gives and that a fitted parameter scales."""
         contact = self.run.scene.contact
         seats = {"": contact, "left.": contact.left, "right.": contact.right}
-        found = {}
-        for name, factor in zip(self.fit.names, self.fit.factors, strict=True):
-            for field in SCALED_FIELDS.get(name, ()):
-                for seat, values in seats.items():
-                    value = getattr(values, field)
-                    if value is not None:
-                        found[seat + field] = float(factor) * value
-        if contact.left.mu is not None and contact.right.mu is not None:
-            # no seat has that of [contact]
-            found.pop("mu", None)
-        return found
+        # both seats have a friction coefficient of their own: none has that of [contact]
+        unused = "mu" if contact.left.mu is not None and contact.right.mu is not None else ""
+        return [
+            self._field(number, seat + field, value)
+            for number, name in enumerate(self.fit.names)
+            for field in SCALED_FIELDS.get(name, ())
+            for seat, values in seats.items()
+            if seat + field != unused and (value := getattr(values, field)) is not None
+        ]
+
+    @property
+    def absolute_values(self) -> list[FittedField]:
+        """The fields, and the normal load where all readings have the same one."""
+        loads = np.unique(self.readings.load)
+        if "load" not in self.fit.names or len(loads) > 1:
+            return self.fields
+        number = self.fit.names.index("load")
+        load = float(loads[0])
+        low, high = (float(end) * load for end in self.fit.knowledge.intervals[number])
+        fitted = float(self.fit.factors[number]) * load
+        return [*self.fields, FittedField("", number, fitted, low, high, "N", (0.0, np.inf))]
+
+    def _field(self, number: int, name: str, value: float) -> FittedField:
+        meta = field_at(f"contact.{name}").meta
+        ends = self.fit.knowledge.intervals[number]
+        low, high = (float(end) * value if value else 0.0 for end in ends)
+        fitted = float(self.fit.factors[number]) * value
+        return FittedField(
+            name, number, fitted, low, high, meta["unit"], (meta["low"], meta["high"])
+        )
+
+    @property
+    def scene_values(self) -> dict[str, float]:
+        """Field under [contact] to its fitted value [SI], of those that the readings determine and
+        that a scene takes.
+        """
+        known = self.fit.knowledge.known
+        return {one.name: one.value for one in self.fields if known[one.parameter] and one.allows}
+
+    @property
+    def sector_size(self) -> float:
+        """Diagonal of the box round the meshed bodies [m]."""
+        return _size_of(self.run)
+
+
+def _size_of(run: ReducedRun) -> float:
+    return float(np.linalg.norm(np.ptp(run.mesh.points, axis=0)))
 
 
 def _positive_numbers(row: list[str], count: int, path: Path) -> list[float]:
@@ -98,7 +164,8 @@ def read_readings(path: str | Path, scene: Scene) -> Readings:
     comment.
 
     Raises:
-        InputError: the file is missing, or its columns are not those or no positive numbers.
+        InputError: the file is missing, or its columns are not those, have no unit or no positive
+            numbers.
     """
     path = Path(path)
     if not path.is_file():
@@ -117,10 +184,13 @@ def read_readings(path: str | Path, scene: Scene) -> Readings:
                 "its unit: 'amplitude [um]'"
             )
         where = f"--measured {path}: column '{head}'"
+        if not unit:
+            # a plain number is SI elsewhere; readings are in micrometres more often than in metres
+            raise InputError(f"{where} has no unit, expected one, such as '{EXAMPLES[name]}'")
         found[name] = parse(f"1 {unit}", COLUMNS[name], where) * column
     missing = [name for name in COLUMNS if name not in found and name not in OPTIONAL_COLUMNS]
     if missing:
-        raise InputError(f"--measured {path}: expected a column '{missing[0]}'")
+        raise InputError(f"--measured {path}: expected a column '{EXAMPLES[missing[0]]}'")
     if "load" not in found:
         found["load"] = np.full(len(values), _only_load(scene, path))
     found.setdefault("force", np.full(len(values), scene.excitation.force))
@@ -189,6 +259,7 @@ def fit_scene(
     check_parameters(names, scene)
     loads = tuple(float(load) for load in np.unique(readings.load))
     run = pipeline.run(vary(scene, study__loads=loads), folder, "reduction", comm, progress)
+    _refuse_amplitudes(readings, _size_of(run))
     models = measured_models(run, readings)
     settings = first_fit_settings(run.settings)
     levels, order = models.levels(settings)
@@ -204,6 +275,23 @@ def fit_scene(
     before[order] = np.concatenate(first.before)
     fitted[order] = np.concatenate(fit.fitted)
     return FittedScene(run, readings, fit, error, before, fitted, settings)
+
+
+def _refuse_amplitudes(readings: Readings, size: float) -> None:
+    """Amplitudes that no blade has.
+
+    Args:
+        size: of the sector [m].
+
+    Raises:
+        InputError: one is larger than the sector.
+    """
+    largest = float(readings.amplitude.max())
+    if largest > size:
+        raise InputError(
+            f"--measured: an amplitude of {show(largest, 'm')} is larger than the sector, "
+            f"{show(size, 'm')}; expected amplitudes in the unit of their column"
+        )
 
 
 def _fitted(

@@ -2,6 +2,7 @@
 points, and the command.
 """
 
+import re
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -81,6 +82,11 @@ def test_a_force_that_no_amplitude_meets_is_said():
     assert "reaches no resonance" in said and said.level == "warning"
 
 
+def listed(page):
+    """Sentences of a report."""
+    return [line for line in page.splitlines() if line.startswith("- ")]
+
+
 def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     arguments = ["backbone", PLANE, "-o", str(tmp_path), "--set", "mesh.scale=4"]
     arguments += ["--set", "study.loads=20 N", "--set", "study.influences=false"]
@@ -90,5 +96,15 @@ def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     assert "resonances predicted by the nonlinear mode alone are off by" in capsys.readouterr().out
     for name in ("design_map.png", "backbone.csv", "backbone_resonances.csv"):
         assert (tmp_path / name).is_file()
+    # the error of the balance and its warnings stand there, as in the report of the run
+    page = (tmp_path / "report_backbone.md").read_text()
+    assert re.search(
+        r"from the balance; the balance itself: (± [\d.]+ % \(model and mesh\)|error)", page
+    )
+    assert main(["run", *arguments[1:]]) == 0
+    of_run = [one for one in listed((tmp_path / "report.md").read_text()) if "estimated" in one]
+    assert any("estimated error of the resonance amplitude above the wanted" in o for o in of_run)
+    said = [one for one in of_run if "away from the resonance" in one or "above the wanted" in one]
+    assert len(said) == 2 and set(said) <= set(listed(page))
     assert main(arguments) == 0
     assert "backbone_20N: found in the folder" in (tmp_path / "report_backbone.html").read_text()

@@ -4,12 +4,15 @@ whole wheels or by the damper law.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ...io.stage_cache import on_root
+from ...io.stage_cache import cached_stage, key_of, on_root
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress
@@ -21,12 +24,12 @@ from ...wheel.statistics import Amplification, scatter_statistics, unknown_stati
 from ...wheel.walking import with_free_means
 from ..adaptive.choice import solver_options
 from ..pipeline.curve import Curve
+from ..pipeline.stage_runner import Folder
 from .engine_orders import own_harmonic
 from .law_level import law_level, with_checks
 from .other_blades import OtherBlades
 from .pattern_response import frequency_grid
 from .peak_choice import (
-    ChosenPeak,
     chosen_peak,
     first_balance,
     pattern_peak,
@@ -39,6 +42,38 @@ from .validate import LAW_LEVEL, scene_scatter
 # harmonics of the engine order that many wheels take at most: what these leave is told, and most of
 # it is the tuned wheel's too, over which amplifications are counted
 SCATTER_HARMONICS = 3
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class KeptWheels:
+    """Finished wheels of an interrupted scatter: each is a file of its own, named by what it
+    depends on, so that ranks write and find them without each other.
+    """
+
+    # run folder; None keeps nothing
+    folder: Folder
+    # of the folder of these files, among the stages
+    name: str
+    # `stage_key` of the statistics
+    key: str
+
+    def __call__(self, compute: Callable[[], Result], *more: Any) -> Result:
+        """A result, computed or found.
+
+        Args:
+            more: what it depends on besides the key.
+        """
+        key = key_of(self.key, *more)
+        return cached_stage(self.folder, f"{self.name}/{key}", key, compute)[0]
+
+    def remove(self) -> None:
+        """Once the statistics of all wheels are kept, the wheels are not needed any more."""
+        if self.folder is not None:
+            shutil.rmtree(Path(self.folder) / "stages" / self.name, ignore_errors=True)
+
+
+NOTHING_KEPT = KeptWheels(None, "", "")
 
 
 @dataclass(frozen=True)
@@ -54,6 +89,8 @@ class DrawnWheels:
     # the same wheel with free means, by which peaks are searched again; None where the scene holds
     # them, or no damper has a motion that friction alone resists
     free: Wheel | None = None
+    # those finished
+    kept: KeptWheels = NOTHING_KEPT
 
     @property
     def harmonic(self) -> int:
@@ -70,21 +107,25 @@ class DrawnWheels:
         return self.scene.mistuning.level == LAW_LEVEL
 
     def peak(self, pattern: Pattern, balance: tuple[int, int], free: bool = True) -> PatternPeak:
-        """The highest blade with a pattern.
+        """The highest blade with a pattern, solved or found among those kept.
 
         Args:
             balance: harmonics and samples of the common period.
             free: look for it with free means too, where the scene has these.
         """
-        found = pattern_peak(
-            self.wheel,
-            self.free if free else None,
-            pattern,
-            self.grid(pattern),
-            balance,
-            self.harmonic,
-            solver_options(self.scene.accuracy),
-        )
+
+        def solve() -> PatternPeak:
+            return pattern_peak(
+                self.wheel,
+                self.free if free else None,
+                pattern,
+                self.grid(pattern),
+                balance,
+                self.harmonic,
+                solver_options(self.scene.accuracy),
+            )
+
+        found = self.kept(solve, "peak", pattern, balance, free)
         return replace(found, asked=self.free is not None)
 
 
@@ -94,12 +135,14 @@ def drawn_wheels(
     wheel: Wheel,
     curve: Curve,
     others: OtherBlades | None,
+    kept: KeptWheels = NOTHING_KEPT,
 ) -> DrawnWheels:
     """The wheels that a scene draws.
 
     Args:
         families: (families,) frequencies of the blade alone [rad/s].
         others: blades of another shape, which all of the wheels have.
+        kept: where finished wheels are kept.
     """
     spread = MAX_DEVIATIONS * (scene.mistuning.scatter or 0.0) + 0.005
     if others is not None:
@@ -112,7 +155,7 @@ def drawn_wheels(
     patterns = drawn_patterns(wheel, scene_scatter(scene), scene.mistuning.wheels, made)
     held = scene.model.static == "uncoupled"
     free = None if held else with_free_means(wheel)
-    return DrawnWheels(scene, wheel, curve, patterns, spread, free)
+    return DrawnWheels(scene, wheel, curve, patterns, spread, free, kept)
 
 
 def drawn_statistics(
@@ -125,10 +168,11 @@ def drawn_statistics(
     truncation = float("nan")
     tuned, compared = on_root(comm, lambda: _compared(drawn, balance))
     if compared.agrees:
-        chosen = on_root(comm, lambda: _chosen_balance(drawn))
-        truncation = chosen.truncation
-        if (chosen.harmonics, chosen.samples) != balance:
-            balance = chosen.harmonics, chosen.samples
+        harmonics, samples, truncation = on_root(
+            comm, lambda: drawn.kept(lambda: _chosen_balance(drawn), "balance", balance)
+        )
+        if (harmonics, samples) != balance:
+            balance = harmonics, samples
             tuned, compared = on_root(comm, lambda: _compared(drawn, balance))
     if not compared.agrees:
         wheels = len(drawn.patterns)
@@ -161,12 +205,13 @@ def _search(
     return lambda pattern: tuned if pattern is TUNED_PATTERN else drawn.peak(pattern, balance, free)
 
 
-def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
-    """Harmonics and samples that the first wheel needs: all have the same contacts. With held
-    means, since a richer balance with free ones takes longer than all that follows.
+def _chosen_balance(drawn: DrawnWheels) -> tuple[int, int, float]:
+    """Harmonics and samples that the first wheel needs, and the error that they leave: all have the
+    same contacts. With held means, since a richer balance with free ones takes longer than all that
+    follows.
     """
     pattern = drawn.patterns[0]
-    return chosen_peak(
+    found = chosen_peak(
         drawn.wheel,
         pattern,
         drawn.grid(pattern),
@@ -176,6 +221,7 @@ def _chosen_balance(drawn: DrawnWheels) -> ChosenPeak:
         wanted_truncation(drawn.scene),
         SCATTER_HARMONICS,
     )
+    return found.harmonics, found.samples, found.truncation
 
 
 def _by_damper_law(

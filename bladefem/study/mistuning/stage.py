@@ -33,7 +33,7 @@ from ..pipeline.run_records import SolvedRun
 from ..pipeline.stage_inputs import stage_key
 from .blade_material import deviation_pattern
 from .blade_stress import SolvedWheel, WheelShapes, all_modes, blade_motion
-from .drawn_wheels import drawn_statistics, drawn_wheels
+from .drawn_wheels import KeptWheels, drawn_statistics, drawn_wheels
 from .engine_orders import own_harmonic
 from .odd_blade import odd_blade_stress
 from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
@@ -218,14 +218,19 @@ def _kept_statistics(
     comm: Communicator | None,
     progress: Progress,
 ) -> Amplification:
-    """Statistics under the load of one curve, computed or found in the folder."""
+    """Statistics under the load of one curve, computed or found in the folder, where each wheel is
+    kept until all are there.
+    """
+    key = stage_key("scatter", run.scene, curve.load, curve.peak.omega, *_blade_keys(run.scene))
+    name = f"scatter_{curve.load:g}N"
+    kept = KeptWheels(run.folder, f"{name}_wheels", key)
 
     def compute() -> Amplification:
-        drawn = drawn_wheels(run.scene, sector.families, wheel, curve, others)
+        drawn = drawn_wheels(run.scene, sector.families, wheel, curve, others, kept)
         return drawn_statistics(drawn, comm, progress)
 
-    key = stage_key("scatter", run.scene, curve.load, curve.peak.omega, *_blade_keys(run.scene))
-    found, _ = cached_stage(run.folder, f"scatter_{curve.load:g}N", key, compute, comm)
+    found, _ = cached_stage(run.folder, name, key, compute, comm)
+    on_root(comm, kept.remove)
     return found
 
 
