@@ -20,6 +20,7 @@ import scipy.sparse as sp
 from geometry.topology import FAMILY
 from geometry.whole_cells import OwnCells
 
+from ..data import ModeSet
 from ..scene.tables import Material
 from .body import Body
 from .cell_functions import order_of, quadrature, tabulate
@@ -54,6 +55,13 @@ def stiffness_error(body: Body, shapes: np.ndarray) -> np.ndarray:
             d = fields[:m] + 1j * fields[m:]
             total += d.conj() @ d.T
     return SAFETY_FACTOR * total
+
+
+def frequency_errors(body: Body, modes: ModeSet) -> np.ndarray:
+    """(m,) estimated relative errors of the frequencies; NaN of rigid modes."""
+    energies = stiffness_error(body, modes.shapes).diagonal().real
+    squares = (2 * np.pi * modes.frequencies) ** 2
+    return energies / np.where(squares > 0, 2 * squares, np.nan)
 
 
 def _weighted_differences(

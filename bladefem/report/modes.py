@@ -272,8 +272,17 @@ def _numbers(
     if result.convergence is not None:
         known = result.convergence.summary
         # of the mesh of the tables, which a study of a file's mesh halves
-        column = "given_error" if "given_error" in known else "error"
-        errors = dict(zip(known["mode"], known[column], strict=True))
+        if "given_error" in known:
+            errors = dict(zip(known["mode"], known["given_error"], strict=True))
+        else:
+            # sizes that are asked for may end at another mesh
+            errors = {
+                mode: error + abs(excited.frequencies[mode - 1] / frequency - 1)
+                for mode, frequency, error in zip(
+                    known["mode"], known["frequency"], known["error"], strict=True
+                )
+                if mode <= len(excited.frequencies) and frequency > 0
+            }
     diameter = (
         "" if excited.nodal_diameter is None else f"nodal diameter {excited.nodal_diameter}; "
     )

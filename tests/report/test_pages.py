@@ -49,12 +49,15 @@ def test_chart_page_names_the_automatic_choice(tmp_path):
 @pytest.mark.parametrize("studied", [True, False])
 def test_frequencies_say_whether_the_mesh_was_studied(studied):
     modes = ModeSet(np.array([100.0, 250.0]), np.zeros((2, 1, 3)), 3, np.array([1e-9, 1e-8]))
-    summary = pd.DataFrame({"mode": [1, 2], "error": [0.004, 0.01]})
+    # the second frequency is of another mesh
+    summary = pd.DataFrame({"mode": [1, 2], "frequency": [100.0, 245.1], "error": [0.004, 0.01]})
     result = SimpleNamespace(convergence=SimpleNamespace(summary=summary) if studied else None)
     first, second = _numbers(modes, ["flap", "edge"], result)
     assert first.what == "mode 1, flap"
     assert second.value == "250 Hz"
     assert first.uncertainty == ("± 0.4 % (mesh)" if studied else "mesh error not studied")
+    if studied:
+        assert second.uncertainty == "± 3 % (mesh)"
 
 
 def test_captions_are_sentences():

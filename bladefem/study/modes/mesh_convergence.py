@@ -1,17 +1,10 @@
-"""Mesh refinement: frequencies on finer and finer meshes, observed order, Richardson's estimate of
-the limit.
+"""Mesh refinement: frequencies on finer and finer meshes, and what they say about the finest.
 
 Every element size of the finest mesh is scaled, so that the meshes are as similar as unstructured
-ones can be. With three of them f(h) = f + C h^p goes through all (Roache, J. Fluids Eng. 116
-(1994), doi:10.1115/1.2910291); with more it is fitted by least squares, and what is left is the
-scatter of the meshes (Eca and Hoekstra, J. Comput. Phys. 262 (2014),
-doi:10.1016/j.jcp.2014.01.006). h is the size that the elements really have. Modes are paired with
-those of the finest mesh by their shapes (MAC), so two that cross while the mesh is refined keep
-their names. A mesh that comes from a file is halved instead, once or twice as its size allows:
-that shows the error of its elements, not that of a boundary which is faceted in the file. Where the
-values do not fall into line, or the order is none that the elements can
-have, ``reason`` says so and the error is three times the last change (Roache's safety factor for
-two meshes), of more than three meshes the largest between the last three.
+ones can be. Modes are paired with those of the finest mesh by their shapes (MAC), so two that cross
+while the mesh is refined keep their names. A mesh that comes from a file is halved instead, once or
+twice as its size allows: that shows the error of its elements, not that of a boundary which is
+faceted in the file. Error, order and limit are those of `frequency_error`.
 """
 
 from __future__ import annotations
@@ -22,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 import pandas as pd
-from scipy.optimize import brentq, linear_sum_assignment, minimize_scalar
+from scipy.optimize import linear_sum_assignment
 
 from geometry.mesh import Mesh
 from geometry.whole_cells import own_cells
@@ -38,20 +31,11 @@ from ..pipeline.bodies import Bodies, blade_dofs
 from ..pipeline.normal_modes import find_modes
 from ..pipeline.scene_mesh import build_mesh
 from .comparison import mac_of
+from .frequency_error import convergence_summary
 from .mesh_transfer import nodal_volumes, transfer_fields
 
 # of the scene's own element sizes
 SIZE_RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
-# order that is looked for
-MAX_ORDER = 12.0
-# orders that frequencies can have: from sharp re-entrant edges to 4 for P2, and some luck
-PLAUSIBLE_ORDERS = (1.0, 6.0)
-# error over change where no order is believed
-UNTRUSTED_FACTOR = 3.0
-# scatter over trend from which there is no trend
-MAX_SCATTER = 0.5
-# MAC of the same mode on two meshes
-MIN_MAC = 0.8
 # modes beyond those asked for, candidates for pairs
 SPARE_MODES = 3
 # a mesh of a file and its halves
@@ -66,13 +50,24 @@ COMPARED_NODES = 4000
 class Convergence:
     """SI columns."""
 
-    # size [m], cells, dofs, nodal_diameter, mode, frequency [Hz], mac: one row a mesh
-    # and mode
+    # size [m], cells, dofs, nodal_diameter, mode, frequency [Hz], recovered: its error [1] by the
+    # recovered stress, mac: one row a mesh and mode
     points: pd.DataFrame
     # nodal_diameter, mode, frequency, limit [Hz], order [1], error [1] of the finest mesh,
     # scatter [1] about the fit, reason: why the order is not believed, empty when it is; of a mesh
     # from a file also its own frequency, given [Hz], and the error of that, given_error [1]
     summary: pd.DataFrame
+
+
+@dataclass(frozen=True)
+class SolvedMesh:
+    """A mesh and its modes."""
+
+    mesh: Mesh
+    # one a nodal diameter
+    sets: Sequence[ModeSet]
+    # (modes,) errors of the frequencies [1] by the recovered stress, of each set
+    errors: Sequence[np.ndarray]
 
 
 def mesh_convergence(
@@ -116,9 +111,24 @@ def mesh_convergence(
         refined = replace(
             scene, mesh=replace(scene.mesh, size=finest or scene.mesh.size, scale=scale)
         )
-        mesh = build_mesh(refined, comm)
-        runs.append((mesh, find_modes(Bodies(refined, mesh, comm), diameters, count + SPARE_MODES)))
+        runs.append(solved_mesh(refined, build_mesh(refined, comm), diameters, count, comm))
     return of_meshes(runs, count)
+
+
+def solved_mesh(
+    scene: Scene,
+    mesh: Mesh,
+    diameters: Sequence[int] | None,
+    count: int,
+    comm: Communicator | None = None,
+) -> SolvedMesh:
+    """Modes of one mesh, some more than asked for, and their errors by the recovered stress."""
+    from ...fem.stiffness_error import frequency_errors
+
+    bodies = Bodies(scene, mesh, comm)
+    sets = find_modes(bodies, diameters, count + SPARE_MODES)
+    errors = [frequency_errors(bodies.still_blade, found) for found in sets]
+    return SolvedMesh(mesh, sets, errors)
 
 
 def _halved_mesh_convergence(
@@ -136,25 +146,21 @@ def _halved_mesh_convergence(
         len(meshes) == 1 or blade_dofs(meshes[-1]) <= MAX_DOFS_HALVED_AGAIN
     ):
         meshes.append(refine_uniformly(meshes[-1]))
-    runs = [
-        (mesh, find_modes(Bodies(scene, mesh, comm), diameters, count + SPARE_MODES))
-        for mesh in progress(meshes, "meshes")
-    ]
+    runs = [solved_mesh(scene, mesh, diameters, count, comm) for mesh in progress(meshes, "meshes")]
     found = of_meshes(runs, count)
     keys = [key for key in ("nodal_diameter", "mode") if key in found.points]
     given = found.points[found.points["dofs"] == found.points["dofs"].min()]
     summary = found.summary.merge(
-        given[[*keys, "frequency"]].rename(columns={"frequency": "given"}), on=keys
+        given[[*keys, "frequency", "recovered"]].rename(columns={"frequency": "given"}), on=keys
     )
-    # where no limit is known, from the finest mesh
-    own = abs(summary["given"] / summary["limit"].fillna(summary["frequency"]) - 1)
-    summary["given_error"] = np.where(
-        summary["reason"] == "", own + summary["scatter"], UNTRUSTED_FACTOR * own
-    )
+    # down to the finest mesh, and from there
+    below = abs(summary["given"] / summary["frequency"] - 1) + summary["error"]
+    summary["given_error"] = np.fmax(below, summary["recovered"])
+    summary = summary.drop(columns="recovered")
     return replace(found, summary=summary)
 
 
-def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Convergence:
+def of_meshes(runs: Sequence[SolvedMesh], count: int) -> Convergence:
     """The study from meshes and their modes, coarse to fine.
 
     Args:
@@ -163,13 +169,13 @@ def of_meshes(runs: Sequence[tuple[Mesh, Sequence[ModeSet]]], count: int) -> Con
     finest = runs[-1]
     points = pd.concat(
         [
-            _mesh_rows(mesh, found, finest[0], reference, count)
-            for mesh, sets in runs
-            for found, reference in zip(sets, finest[1], strict=True)
+            _mesh_rows(run.mesh, found, errors, finest.mesh, reference, count)
+            for run in runs
+            for found, errors, reference in zip(run.sets, run.errors, finest.sets, strict=True)
         ],
         ignore_index=True,
     )
-    return Convergence(points, _convergence_summary(points))
+    return Convergence(points, convergence_summary(points))
 
 
 def paired_modes(
@@ -198,6 +204,7 @@ def paired_modes(
 def _mesh_rows(
     mesh: Mesh,
     modes: ModeSet,
+    errors: np.ndarray,
     finest: Mesh,
     reference: ModeSet,
     count: int,
@@ -213,6 +220,7 @@ def _mesh_rows(
             **diameter,
             "mode": np.arange(1, len(numbers) + 1),
             "frequency": modes.frequencies[numbers],
+            "recovered": errors[numbers],
             "mac": match,
         }
     )
@@ -236,95 +244,3 @@ def element_size(mesh: Mesh, body: str) -> float:
     d = mesh.dimension
     size = body_volume(mesh, body) / (mesh.depth if d == 2 else 1.0)
     return float((size / len(mesh.bodies[body])) ** (1 / d))
-
-
-def richardson(h: np.ndarray, f: np.ndarray) -> tuple[float, float]:
-    """Limit and order from three meshes, coarse to fine.
-
-    Returns:
-        the limit, and the order; where the values do not fall into line the finest value and NaN.
-    """
-    first = f[0] - f[1]
-    second = f[1] - f[2]
-    if first * second <= 0:
-        return float(f[2]), np.nan
-    wanted = first / second
-
-    def miss(p: float) -> float:
-        return (h[0] ** p - h[1] ** p) / (h[1] ** p - h[2] ** p) - wanted
-
-    if miss(0.05) * miss(MAX_ORDER) >= 0:
-        return float(f[2]), np.nan
-    p = brentq(miss, 0.05, MAX_ORDER)
-    return float(f[2] - second * h[2] ** p / (h[1] ** p - h[2] ** p)), float(p)
-
-
-def fitted_order(h: np.ndarray, f: np.ndarray) -> tuple[float, float, float]:
-    """Limit, order and scatter (standard deviation) of f + C h^p by least squares.
-
-    Returns:
-        the finest value and NaN where the values have no trend, or three of them do not fall into
-        line.
-    """
-    if len(f) < 3:
-        return float(f[-1]), np.nan, 0.0
-    if len(f) == 3:
-        return *richardson(h, f), 0.0
-
-    def fit(p: float) -> tuple[np.ndarray, float]:
-        A = np.stack([np.ones(len(h)), h**p], axis=1)
-        x = np.linalg.lstsq(A, f, rcond=None)[0]
-        return x, float(np.sum((A @ x - f) ** 2))
-
-    coarse = np.linspace(0.25, MAX_ORDER, 48)
-    start = coarse[np.argmin([fit(p)[1] for p in coarse])]
-    p = minimize_scalar(
-        lambda p: fit(p)[1], bounds=(max(start - 0.5, 0.05), start + 0.5), method="bounded"
-    ).x
-    (limit, slope), left = fit(p)
-    scatter = float(np.sqrt(left / (len(f) - 3)))
-    if scatter > MAX_SCATTER * abs(slope) * (h.max() ** p - h.min() ** p):
-        return float(f[-1]), np.nan, scatter
-    return float(limit), float(p), scatter
-
-
-def _convergence_summary(points: pd.DataFrame) -> pd.DataFrame:
-    keys = [key for key in ("nodal_diameter", "mode") if key in points]
-    rows = []
-    for _, line in points.groupby(keys):
-        line = line.sort_values("size", ascending=False)
-        f = line["frequency"].to_numpy()
-        limit, order, scatter = fitted_order(line["size"].to_numpy() / line["size"].iloc[-1], f)
-        reason = _order_doubt(order, line["mac"].min(), len(f))
-        change = np.ptp(f[-2:] if len(f) == 3 else f[-3:])
-        error = (
-            UNTRUSTED_FACTOR * change / f[-1]
-            if reason
-            else abs(f[-1] / limit - 1) + scatter / f[-1]
-        )
-        rows.append(
-            {
-                **{name: int(line[name].iloc[0]) for name in keys},
-                "frequency": f[-1],
-                "limit": np.nan if reason else limit,
-                "order": order,
-                "error": error,
-                "scatter": scatter / f[-1],
-                "reason": reason,
-            }
-        )
-    return pd.DataFrame(rows)
-
-
-def _order_doubt(order: float, mac: float, meshes: int) -> str:
-    """Why an order is not believed."""
-    if mac < MIN_MAC:
-        return f"the shapes of two meshes differ, MAC {mac:.2f}"
-    if meshes < 3:
-        return "two meshes show no order"
-    if np.isnan(order):
-        return "the frequencies do not fall into line"
-    if not PLAUSIBLE_ORDERS[0] <= order <= PLAUSIBLE_ORDERS[1]:
-        low, high = PLAUSIBLE_ORDERS
-        return f"order {order:.1f} is not plausible for such elements, expected {low:g} to {high:g}"
-    return ""
