@@ -204,9 +204,15 @@ def test_a_wheel_moves_at_the_probe_as_in_the_balance(order, fast):
 
 @pytest.mark.parametrize(("error", "warns"), [(0.05, False), (0.5, True)])
 def test_a_stress_that_the_mesh_does_not_carry_is_a_warning(error, warns):
-    stress = SimpleNamespace(load=80.0, largest=2e7, place=np.zeros(3), mesh_error=error)
+    stress = SimpleNamespace(
+        load=80.0, largest=2e7, place=np.zeros(3), mesh_error=error, mismatch=1e-6
+    )
     said = stress_message(stress)
     assert "20 MPa" in said
     # in proportion where a march gives another amplitude than the balance
     assert "18 MPa" in stress_message(stress, 0.9)
     assert ("too large to rely on" in said) == warns
+    # of another motion than the balance's
+    stress.mismatch = 0.3
+    said = stress_message(stress)
+    assert "differs by 30 %" in said and said.level == "warning"
