@@ -51,6 +51,21 @@ MOST_EVENTS = 512
 MOST_EVENTS_IN_BRACKET = 25
 
 
+def _load_coefficients(load: np.ndarray | None, nodes: np.ndarray, K: int) -> np.ndarray:
+    """(n, K) coefficients of the normal load at zero displacement [N].
+
+    Raises:
+        InputError: a shape that does not fit, or numbers that are not finite.
+    """
+    if load is None:
+        base = np.zeros((len(nodes), K))
+        base[:, 0] = nodes[:, 3]
+        return base
+    if np.shape(load) != (len(nodes), K):
+        raise InputError(f"load: shape {np.shape(load)}, expected coefficients ({len(nodes)}, {K})")
+    return finite_load(load)
+
+
 def evaluate_exact(
     elements: Elements,
     w: np.ndarray,
@@ -81,12 +96,7 @@ def evaluate_exact(
         )
     require_coulomb(elements, "the location of events")
     H = harmonics_of(w)
-    base = np.zeros((n, K))
-    base[:, 0] = nodes[:, 3]
-    if load is not None:
-        if np.shape(load) != (n, K):
-            raise InputError(f"load: shape {np.shape(load)}, expected coefficients ({n}, {K})")
-        base = finite_load(load)
+    base = _load_coefficients(load, nodes, K)
     brackets = 12 * (H + 1) if brackets is None else brackets
     if brackets < 4 * (H + 1):
         raise InputError(

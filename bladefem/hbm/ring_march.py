@@ -157,12 +157,9 @@ def march_ring(
             break
         # what follows a leap has to tell where it led
         if whole and leaps and periods - done >= 3 * at_once:
-            amplitudes = first_amplitudes(motion[done - at_once : done].transpose(0, 2, 1))
-            envelope.append(amplitudes.mean())
-            leap = leap_from_end(envelope, scatter(amplitudes))
-            if leap:
-                _leap(_system(model), start.drive.omega, leap, y, prepared)
-                envelope, leapt = [], done
+            part_marched = motion[done - at_once : done].transpose(0, 2, 1)
+            if _leapt(_system(model), start.drive.omega, envelope, part_marched, y, prepared):
+                leapt = done
     marched = motion[leapt:done].transpose(0, 2, 1)
     end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
     spent = friction_work[leapt:done] / r
@@ -187,6 +184,31 @@ def _marched(
         motion[:] = np.nan
         return False
     return found and bool(np.isfinite(motion).all())
+
+
+def _leapt(
+    system: SectorModes,
+    omega: float,
+    envelope: list[complex],
+    motion: np.ndarray,
+    y: np.ndarray,
+    prepared: tuple[Any, ...],
+) -> bool:
+    """Leap along the envelope where it tells how far; whether it did.
+
+    Args:
+        envelope: amplitudes of the parts since the last leap; takes that of this part, and is
+            emptied by a leap.
+        motion: (periods, r, instants) of this part.
+    """
+    amplitudes = first_amplitudes(motion)
+    envelope.append(amplitudes.mean())
+    leap = leap_from_end(envelope, scatter(amplitudes))
+    if not leap:
+        return False
+    _leap(system, omega, leap, y, prepared)
+    envelope.clear()
+    return True
 
 
 def _leap(

@@ -12,6 +12,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TypeAlias
 
+from ..errors import InputError
+from .stage_cache import write_text
+
 # size and time of change [ns]: a file that was changed since is no longer the one that was written
 FileState: TypeAlias = tuple[int, int]
 
@@ -64,8 +67,9 @@ def note_results(folder: str | Path, before: dict[str, FileState], written: set[
     """
     now = result_states(folder)
     ours = {name: now[name] for name in now if name in written or before.get(name) != now[name]}
-    with suppress(OSError):
-        (Path(folder) / RESULTS_FILE).write_text(json.dumps(ours, indent=1) + "\n")
+    # a command that could not write its results has said so already
+    with suppress(InputError):
+        write_text(Path(folder) / RESULTS_FILE, json.dumps(ours, indent=1) + "\n")
 
 
 def save_user_files(folder: str | Path) -> None:

@@ -22,6 +22,7 @@ from bladefem.report.response_arrays import (
     resonance_arrays,
     stability_arrays,
 )
+from bladefem.report.run_pictures import _motions
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump_scene
 from bladefem.study.pipeline import pipeline
@@ -132,6 +133,29 @@ def test_harmonics_beyond_a_balance_are_not_numbers(run):
     assert np.array_equal(motion.sel(load=80), (1 + 1j) * np.arange(4))
     assert np.isnan(motion.sel(load=20)[2:]).all()
     assert np.array_equal(motion.sel(load=20)[:2], (1 + 1j) * np.arange(2))
+
+
+def test_a_limit_has_the_motion_of_its_resonance():
+    """Not that of a higher one which the band has as well."""
+    limit = SimpleNamespace(
+        load=0.0,
+        frequency=np.array([300.0, 310.0, 900.0]),
+        first=np.array([1e-6, 5e-6, 9e-6j]),
+        peak_frequency=309.0,
+    )
+    found = resonance_arrays(curves(), [limit])
+    assert complex(found["motion"].sel(load=0.0, harmonic=1)) == 5e-6
+
+
+def test_a_picture_of_a_motion_has_the_amplitude_that_is_given():
+    """In proportion where a march keeps to another one than the balance."""
+    curve = SimpleNamespace(peak_amplitude=1.5e-6, peak_frequency=380.0, over_balance=1.5)
+    motion = SimpleNamespace(load=80.0, motion=np.full((1, 2, 3), 1e-6))
+    result = SimpleNamespace(
+        response=SimpleNamespace(curves=[curve]), damped={0: motion}, wheel=None
+    )
+    (shown,) = _motions(result).values()
+    np.testing.assert_allclose(shown, 1.5e-6)
 
 
 def test_nodes_keep_their_place_and_patch(run):

@@ -18,7 +18,8 @@ from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.report.best_load import best_load_table, reasons_against
 from bladefem.report.statements import response_answer
-from bladefem.scene.toml import load_scene
+from bladefem.scene.tables import Scene
+from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import best_load as best_load_module
@@ -28,7 +29,9 @@ from bladefem.study.pipeline.best_load import (
     chart_loads,
     find_best_load,
     load_variation,
+    search_range,
 )
+from bladefem.study.pipeline.loads import default_loads
 
 HZ = 2 * np.pi
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
@@ -269,3 +272,10 @@ def test_a_headline_tells_its_tolerance_and_the_loads_that_do_as_well(best):
     found = response_answer(summary, searched=table).numbers
     assert found[0][1] == f"{best.load:.4g} N" and "by exact search" in found[0][2]
     assert "search closed to" in found[1][2] and "estimated error" in found[1][2]
+
+
+def test_the_range_of_the_search_is_that_of_the_friction_of_the_seats():
+    """contact.mu counts only for seats that have no value of their own."""
+    own = vary(Scene(), contact__mu=0.0, contact__left__mu=0.2, contact__right__mu=0.4)
+    assert search_range(own) == pytest.approx(search_range(vary(Scene(), contact__mu=0.3)))
+    assert default_loads(own) == default_loads(vary(Scene(), contact__mu=0.3))

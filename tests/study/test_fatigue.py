@@ -15,6 +15,7 @@ from bladefem.report.wheel import use_sentences
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
 from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram
+from bladefem.study.mistuning import stage
 from bladefem.study.mistuning.scatter_use import scattered_use
 from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.utilisation import (
@@ -26,6 +27,8 @@ from bladefem.study.pipeline.utilisation import (
 from bladefem.wheel.statistics import Amplification
 
 MPA = 1e6
+# [N], [m]: the second is the searched one
+LOWER_BESIDE = ((73.0, 141e-6), (78.9, 147e-6))
 TABLE = ["0 MPa: 300 MPa", "400 MPa: 180 MPa"]
 
 
@@ -198,3 +201,24 @@ def test_compression_is_negative():
     assert signed_von_mises(stress) == pytest.approx([5.0, -5.0])
     shear = np.array([0, 0, 0, 2.0, 0, 0])
     assert signed_von_mises(shear) == pytest.approx(von_mises(shear))
+
+
+def test_the_wheel_is_solved_under_the_load_that_the_report_begins_with(monkeypatch):
+    """The searched load, also where another one is lower by less than its error: utilisations of
+    both wheels stand next to each other.
+    """
+    curves = [SimpleNamespace(load=load, peak_amplitude=height) for load, height in LOWER_BESIDE]
+    run = SimpleNamespace(
+        response=SimpleNamespace(curves=curves, best_curve=1),
+        scene=Scene(),
+        mesh=None,
+    )
+    monkeypatch.setattr(stage, "Bodies", lambda *_: None)
+    monkeypatch.setattr(stage, "_run_deviations", lambda _: SimpleNamespace(of_material=False))
+
+    def asked(run, wanted, *_):
+        raise InputError(f"under {wanted[0].load:g} N")
+
+    monkeypatch.setattr(stage, "_kept_sector", asked)
+    with pytest.raises(InputError, match="under 78.9 N"):
+        stage.with_whole_wheel(run)

@@ -188,3 +188,14 @@ def test_roughness_takes_the_place_of_a_stiffness_that_is_not_given():
     assert "Persson" in found["roughness"].range_from
     given = {p.name for p in parameters_of(Scene(contact=Contact(kn=1e7)))}
     assert {"kt", "kn"} <= given and "roughness" not in given
+
+
+def test_seat_friction_is_that_of_the_seats():
+    seats = Contact(mu=0.0, left=Seat(mu=0.2), right=Seat(mu=0.4))
+    angles = (np.deg2rad(65), np.deg2rad(65))
+    found, same = (
+        {one.name: (one.low, one.high) for one in parameters_of(Scene(contact=contact), angles)}
+        for contact in (seats, Contact(mu=0.3))
+    )
+    assert found["seat friction"] == pytest.approx(same["seat friction"])
+    assert found["seat friction"][0] < 1 < found["seat friction"][1]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.normal_modes import find_modes, responding_diameters
+from bladefem.study.pipeline.pipeline import run
 from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
@@ -19,6 +21,20 @@ def test_a_response_has_the_modes_that_it_excites():
     for given, wanted in (([0, 1, 6], [0, 1, 6, 9, 18]), ([0, 3, 9, 18], None), (None, None)):
         listed = vary(wedge, "model.nodal_diameters", given)
         assert responding_diameters(listed, mesh) == wanted
+
+
+def test_listed_diameters_change_no_stress_and_no_error_of_a_response():
+    """Those of the excited diameter, 9, whatever the mode tables list."""
+    settings = ["mesh.size=24 mm", "aerofoil.fillet=0 mm", "study.loads=80 N", "model.modes=6"]
+    settings += ["study.own_load=false", "study.stability=false", "model.harmonics=1"]
+    settings += ["model.samples=64", "model.damper=rigid", "contact.points=2"]
+    plain, listed = (
+        run(load_scene("scenes/wedge.toml", [*settings, *more]), None, "reduction")
+        for more in ([], ["model.nodal_diameters=0, 1, 6"])
+    )
+    assert [one.nodal_diameter for one in listed.modes] == [0, 1, 6, 9, 18]
+    assert listed.strength.alternating == pytest.approx(plain.strength.alternating, rel=1e-6)
+    assert listed.mode_errors.diameter == plain.mode_errors.diameter == 9
 
 
 def test_the_reduction_takes_the_modes_that_are_solved_already():

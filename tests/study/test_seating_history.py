@@ -9,6 +9,7 @@ import pytest
 
 from bladefem.contact.interface_elements import friction_elements
 from bladefem.errors import InputError
+from bladefem.report.opened import _patches
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump_scene, load_scene, vary
 from bladefem.study.pipeline.damper_contact import contact_patches
@@ -73,6 +74,12 @@ def test_flat_seats_are_loaded_alike_with_and_without_friction(seated):
     assert mass.mass == pytest.approx(mass.frictionless, rel=1e-6)
     assert mass.lightest == pytest.approx(mass.heaviest, rel=1e-6)
     assert "friction, which carries" in history_sentence(spun.contact.masses)
+
+
+def test_patches_are_found_in_the_folder_after_a_history(seated):
+    for one in seated:
+        stored = _patches(one.scene, one.folder)
+        assert [patch.name for patch in stored] == ["this", "next"]
 
 
 def test_elements_carry_what_the_seating_left_and_rest_there(seated):
