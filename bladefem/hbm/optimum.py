@@ -91,6 +91,7 @@ def optimum(
         lambda value: vary(model, name, value),
         lambda changed, peak, value: with_slope(changed, peak, name, value),
         name,
+        "m" if name == "gap" else "",
     )
     return lowest_peak(along, band, bounds, H, samples, tolerance=tolerance)
 
@@ -191,7 +192,7 @@ def _first_level(
             known = add_peak(search.along.with_slope(model, peak, value), known)
     if not known:
         raise NotSolvedError(
-            f"no peak in the band {search.band} with {search.name} at {value:.4g}: {reason}"
+            f"no peak in the band of {search.band_in_words} with {search.said(value)}: {reason}"
         )
     return known, points
 
@@ -239,7 +240,8 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
         step *= 2
         points += count
     raise NotSolvedError(
-        f"optimum of {search.name} not closed in with {MOST_LEVELS} values, last at {value:.4g}"
+        f"the optimum was not closed in with {MOST_LEVELS} values, the last of them "
+        f"{search.said(value)}"
     )
 
 

@@ -37,6 +37,8 @@ class Variation:
     with_slope: Callable[[ReducedModel, Peak, float], Peak]
     # decides the coordinate, and is named in messages
     name: str = "load"
+    # of the parameter, for messages; "" of a factor
+    unit: str = "N"
 
 
 @dataclass(frozen=True)
@@ -60,6 +62,16 @@ class PeakSearch:
     def name(self) -> str:
         """Name of the parameter."""
         return self.along.name
+
+    def said(self, value: float) -> str:
+        """A value of the parameter in words: "load 78.9 N"."""
+        return f"{self.name} {value:.4g} {self.along.unit}".rstrip()
+
+    @property
+    def band_in_words(self) -> str:
+        """The band: "360 to 400 Hz"."""
+        low, high = (omega / (2 * np.pi) for omega in self.band)
+        return f"{low:.6g} to {high:.6g} Hz"
 
     def peak(
         self,
@@ -192,7 +204,7 @@ def solve_level(
     met, count = look_over_band(search, value)
     if met is None:
         raise NotSolvedError(
-            f"the peaks leave the band {search.band} with {search.name} at {value:.4g}"
+            f"the peaks leave the band of {search.band_in_words} with {search.said(value)}"
         )
     return [met], points + count
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from .style import COLOURS, canvas
+from .style import COLOURS, canvas, headline
 
 PANELS = (
     ("load", "best load [N]", 1.0),
@@ -55,8 +55,8 @@ def draw_influences(table: pd.DataFrame, file: str | Path | None = None) -> obje
             ax.margins(x=0.08)
             ax.tick_params(axis="x", labelsize=9)
         axes[0].set_yticks(rows, names)
-        axes[1].set_title("what the best load depends on")
-        handles, labels = axes[0].get_legend_handles_labels()
         figure = axes[0].figure
+        headline(figure, "what the best load depends on")
+        handles, labels = axes[0].get_legend_handles_labels()
         figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
         return figure

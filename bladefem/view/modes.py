@@ -134,10 +134,11 @@ def say_exaggeration(
     ax: Axes,
     mesh: Mesh,
     modes: ModeSet,
+    also: str = "",
 ) -> None:
-    """How much the picture exaggerates."""
+    """How much the picture exaggerates, and what else there is to say."""
     wave = ",\nat the phase of the largest motion" if np.iscomplexobj(modes.shapes) else ""
-    ax.figure.supxlabel(f"{exaggeration(mesh)}{wave}", fontsize=7.5, color="#555555")
+    ax.figure.supxlabel(f"{exaggeration(mesh)}{wave}{also}", fontsize=7.5, color="#555555")
 
 
 def exaggeration(mesh: Mesh) -> str:
@@ -386,7 +387,9 @@ def draw_wheel_mode(
     lines = surface.contour([0.0], scalars="signed").threshold(
         NEGLIGIBLE_DISPLACEMENT_SHARE, scalars="envelope"
     )
+    marked = ""
     if lines.n_points:
+        marked = "; black: nodal lines"
         lines.points += 2e-3 * np.ptp(moved[:, 0]) * np.asarray(WHEEL_VIEW)
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
@@ -400,7 +403,7 @@ def draw_wheel_mode(
             DIVERGING_COLOURS,
             f"{name} displacement over its largest value [1]",
         )
-        say_exaggeration(ax, mesh, modes)
+        say_exaggeration(ax, mesh, modes, marked)
         return ax.figure
 
 

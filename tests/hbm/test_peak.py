@@ -126,6 +126,16 @@ def test_optima_of_light_and_heavy_dampers(kt, mass, band, height):
     )  # two peaks less than 2 % apart count as one
 
 
+def test_a_band_without_a_peak_is_named_in_hertz_and_the_load_in_newtons():
+    along = Variation(
+        lambda load: vary(reference_model(2e7, 0.06, 1.0, harmonics=3), "load", load),
+        lambda changed, peak, load: with_slope(changed, peak, "load", load),
+    )
+    band = (HZ * 1500, HZ * 1600)
+    with pytest.raises(NotSolvedError, match=r"1500 to 1600 Hz with load \S+ N"):
+        lowest_peak(along, band, (0.5, 2.0), 3, 128)
+
+
 def test_a_level_that_missed_a_peak_gets_it_from_its_neighbour():
     """Two peaks: that of the blade that slips is 25 times as high as that of the stuck one."""
     along = Variation(
