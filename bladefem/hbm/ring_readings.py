@@ -1,8 +1,9 @@
 """Displacements in contact of all blades from the modes of their ring, and forces in these modes.
 
-What a blade sees of a motion is what the first one sees of it handed back so many blades. With the
-readings of the first blade, and what handing back does to the two modes of a pair, those of all are
-known: they fit into the fastest memory of a processor, where a matrix of all of them does not.
+What a blade sees of a motion is what the first one sees of it handed back so many blades, which
+turns the two modes of a pair into each other by the angle of their nodal diameter. Modes that turn
+alike are read together, once, and handed to all blades after that: of r blades with as many modes
+each that takes at most 2 / r of the operations of a product with the readings of all of them.
 """
 
 from __future__ import annotations
@@ -21,16 +22,21 @@ ROUNDING = 1e-9
 
 
 class RingReadings(NamedTuple):
-    """Of the k displacements of each of r blades in M modes."""
+    """Of the k displacements of each of r blades in M modes, which are sorted by how they turn into
+    G groups.
+    """
 
-    # (M, k) displacements of the first blade by each mode [kg^-1/2], and the transpose
+    # (M, k) displacements of the first blade by each mode [kg^-1/2]
     by_mode: np.ndarray
-    by_displacement: np.ndarray
-    # (r, M): a motion q handed back is along q + across q[partner]
-    along: np.ndarray
-    across: np.ndarray
-    # (M,) number of the other mode of a pair, or of the mode itself where it has none
-    partner: np.ndarray
+    # (G + 1,) place of the first mode of each group
+    starts: np.ndarray
+    # (2, M) number of the mode in each place, and of the other one of its pair
+    modes: np.ndarray
+    # (2, G, r): a blade sees of the modes of a group as much of their own coordinates, and of those
+    # of the others of their pairs
+    turns: np.ndarray
+    # (G,) 2, or 1 where modes have no pair
+    parts: np.ndarray
 
 
 def ring_readings(system: SectorModes, places: np.ndarray) -> RingReadings:
@@ -38,39 +44,109 @@ def ring_readings(system: SectorModes, places: np.ndarray) -> RingReadings:
     r, M = system.blades, len(system.stiffness)
     own = np.arange(M)
     apart = abs(system.turn - np.diag(np.diag(system.turn)))
-    partner = np.where(apart.max(axis=1) > ROUNDING, apart.argmax(axis=1), own)
+    paired = apart.max(axis=1) > ROUNDING
+    partner = np.where(paired, apart.argmax(axis=1), own)
     back = np.array([np.linalg.matrix_power(system.turn.T, b) for b in range(r)])
-    first = in_places(system.contact[: len(system.contact) // r].T, places)
+    along, across = back[:, own, own], np.where(paired, back[:, own, partner], 0.0)
+    alike = np.round(np.concatenate([along, across]) / ROUNDING)
+    _, first, group = np.unique(alike, axis=1, return_index=True, return_inverse=True)
+    order = np.argsort(group, kind="stable")
+    by_mode = in_places(system.contact[: len(system.contact) // r].T, places)[order]
     return RingReadings(
-        first,
-        first.T.copy(),
-        back[:, own, own].copy(),
-        np.where(partner == own, 0.0, back[:, own, partner]),
-        partner,
+        by_mode,
+        np.searchsorted(group[order], np.arange(len(first) + 1)),
+        np.array([order, partner[order]]),
+        np.array([along.T[first], across.T[first]]),
+        1 + paired[first].astype(int),
     )
 
 
 @njit(**KERNEL)
 def displacements(readings, q):
     """(r, k) displacements of modal coordinates q (M,)."""
-    r, M = readings.along.shape
-    seen = np.empty((r, M))
-    for b in range(r):
-        for i in range(M):
-            other = q[readings.partner[i]]
-            seen[b, i] = readings.along[b, i] * q[i] + readings.across[b, i] * other
-    return np.dot(seen, readings.by_mode)
+    M, size = readings.by_mode.shape
+    blades = readings.turns.shape[2]
+    moved = np.zeros((blades, size))
+    sorted_q = np.empty(M)
+    seen = np.empty(size)
+    for group in range(len(readings.parts)):
+        first, last = readings.starts[group], readings.starts[group + 1]
+        for part in range(readings.parts[group]):
+            for i in range(first, last):
+                sorted_q[i] = q[readings.modes[part, i]]
+            seen[:] = 0.0
+            _add_product(sorted_q[first:last], readings.by_mode[first:last], seen)
+            for b in range(blades):
+                _add_multiple(readings.turns[part, group, b], seen, moved[b])
+    return moved
 
 
 @njit(**INNER_KERNEL)
 def modal_forces(readings, forces):
     """(M,) forces in the modes of forces (r, k) on the blades."""
-    r, M = readings.along.shape
-    seen = np.dot(forces, readings.by_displacement)
+    blades, size = forces.shape
+    M = len(readings.by_mode)
     total = np.zeros(M)
-    for b in range(r):
-        for i in range(M):
-            # of a pair each mode's part across is the other's with the sign turned
-            other = seen[b, readings.partner[i]]
-            total[i] += readings.along[b, i] * seen[b, i] - readings.across[b, i] * other
+    joined = np.empty(size)
+    seen = np.empty(M)
+    for group in range(len(readings.parts)):
+        first, last = readings.starts[group], readings.starts[group + 1]
+        for part in range(readings.parts[group]):
+            joined[:] = 0.0
+            for b in range(blades):
+                _add_multiple(readings.turns[part, group, b], forces[b], joined)
+            _product(readings.by_mode[first:last], joined, seen[first:last])
+            for i in range(first, last):
+                total[readings.modes[part, i]] += seen[i]
     return total
+
+
+@njit(**INNER_KERNEL)
+def _add_multiple(factor, values, target):
+    """target (k,) becomes target + factor * values (k,)."""
+    if factor != 0.0:
+        for k in range(len(target)):
+            target[k] += factor * values[k]
+
+
+# Matrices this small take BLAS several times as long as plain loops. Sums may be taken in another
+# order and in one instruction with a product, so that they are vectorised.
+
+
+@njit(fastmath={"contract"}, **INNER_KERNEL)
+def _add_product(x, matrix, target):
+    """target (k,) becomes target plus x (n,) times the matrix (n, k), four of its rows at a time:
+    the target is read and written once for all of them.
+    """
+    together = len(x) // 4 * 4
+    for i in range(0, together, 4):
+        a, b, c, d = x[i], x[i + 1], x[i + 2], x[i + 3]
+        for k in range(len(target)):
+            target[k] += (
+                a * matrix[i, k]
+                + b * matrix[i + 1, k]
+                + c * matrix[i + 2, k]
+                + d * matrix[i + 3, k]
+            )
+    for i in range(together, len(x)):
+        for k in range(len(target)):
+            target[k] += x[i] * matrix[i, k]
+
+
+@njit(fastmath={"contract", "reassoc"}, **INNER_KERNEL)
+def _product(matrix, x, target):
+    """target (n,) becomes the matrix (n, k) times x (k,), four of its rows at a time."""
+    together = len(target) // 4 * 4
+    for i in range(0, together, 4):
+        a = b = c = d = 0.0
+        for k in range(len(x)):
+            a += matrix[i, k] * x[k]
+            b += matrix[i + 1, k] * x[k]
+            c += matrix[i + 2, k] * x[k]
+            d += matrix[i + 3, k] * x[k]
+        target[i], target[i + 1], target[i + 2], target[i + 3] = a, b, c, d
+    for i in range(together, len(target)):
+        total = 0.0
+        for k in range(len(x)):
+            total += matrix[i, k] * x[k]
+        target[i] = total

@@ -44,8 +44,9 @@ INSTANT_REFINEMENT = 4
 NEAR_ONE = 0.003
 # growth from which on more instants do not make it stable
 DECIDED_GROWTH = 0.1
-# and below which it is that of a motion that nothing holds, such as a damper's walk
-NEUTRAL_GROWTH = 1e-7
+# distance from one below which a multiplier is that of a motion that nothing holds, such as a
+# damper's walk: single precision and its power for all blades leave so much of it
+NEUTRAL_DISTANCE = 1e-4
 # operations of one verdict up to which many are made, some 0.03 s
 AFFORDABLE_OPERATIONS = 1e9
 # and above which none is made, some 1.5 s
@@ -86,8 +87,9 @@ def stability_verdict(
     system = _system(model)
     if isinstance(system, InputError):
         return Verdict(UNKNOWN, reason=str(system))
-    leading = _leading(model, solution, system, INSTANTS_PER_PERIOD, most)
-    if leading is not None and _needs_a_closer_look(abs(leading) - 1):
+    # what single precision leaves open is looked at closer
+    leading = _leading(model, solution, system, INSTANTS_PER_PERIOD, most, single=True)
+    if leading is not None and _needs_a_closer_look(leading):
         finer = _leading(model, solution, system, INSTANT_REFINEMENT * INSTANTS_PER_PERIOD, most)
         leading = leading if finer is None else finer
     if leading is None:
@@ -101,10 +103,10 @@ def stability_verdict(
     return Verdict(UNSTABLE, float(abs(leading)), _bifurcation(leading))
 
 
-def _needs_a_closer_look(growth: float) -> bool:
+def _needs_a_closer_look(leading: complex) -> bool:
     """The multiplier is so close to one that more instants may decide otherwise."""
-    close = UNSTABLE_GROWTH - NEAR_ONE < growth < DECIDED_GROWTH
-    return close and abs(growth) > NEUTRAL_GROWTH
+    close = UNSTABLE_GROWTH - NEAR_ONE < abs(leading) - 1 < DECIDED_GROWTH
+    return close and abs(leading - 1) > NEUTRAL_DISTANCE
 
 
 def has_one_motion(model: ReducedModel) -> bool:
@@ -151,8 +153,11 @@ def _leading(
     system: SectorModes,
     instants: int,
     most: float,
+    single: bool = False,
 ) -> complex | None:
-    """The multiplier of largest modulus; None where it would take too many operations."""
+    """The multiplier of largest modulus, by a map in single precision or in double; None where it
+    would take too many operations.
+    """
     if _sticks(solution):
         rate = model.once("rate in full stick", lambda: _rate_in_full_stick(model, system))
         return complex(np.exp(rate * 2 * np.pi / solution.omega))
@@ -163,7 +168,8 @@ def _leading(
     contacts, nodes = linearised_contacts(model, solution, system, S)
     if map_operations(contacts, system.blades, S) > most:
         return None
-    part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // system.blades)
+    dt = 2 * np.pi / solution.omega / S
+    part = flow_map(contacts, nodes, dt, S // system.blades, single=single)
     values = linalg.eigvals(_handed_on(system, part), check_finite=False) ** system.blades
     return complex(values[np.argmax(abs(values))])
 
