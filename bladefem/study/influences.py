@@ -202,6 +202,7 @@ def influences(
                 best.mass,
                 start=best.load,
                 tolerance=HEIGHT_TOLERANCE,
+                with_range=False,
             )
         if quick.reason:
             raise NotSolvedError(quick.reason)
@@ -220,16 +221,16 @@ def influences(
     ]
     found = share_work(lambda p: study.influence(p, base, sides), parameters, comm)
     found.sort(key=lambda one: -one.span)
-    checked = _solved_again(study, found[:MAX_CHECKED_PARAMETERS], comm)
+    checked = _solved_again(study, found[:MAX_CHECKED_PARAMETERS], base, comm)
     return checked + found[MAX_CHECKED_PARAMETERS:]
 
 
 def _solved_again(
-    study: _Study, found: Sequence[Influence], comm: Communicator | None
+    study: _Study, found: Sequence[Influence], base: Peak, comm: Communicator | None
 ) -> list[Influence]:
     """Influences whose predictions at both ends of the range are compared with another search."""
     ends = [(one, i) for one in found for i in (0, 1)]
-    again = share_work(lambda end: study.solved_again(*end), ends, comm)
+    again = share_work(lambda end: study.solved_again(*end, base), ends, comm)
     return [
         replace(
             one,
@@ -392,9 +393,12 @@ class _Study:
             solved=np.full((2, 3), np.nan),
         )
 
-    def solved_again(self, one: Influence, end: int) -> tuple[np.ndarray, str]:
+    def solved_again(self, one: Influence, end: int, base: Peak) -> tuple[np.ndarray, str]:
         """Load [N], amplitude [m] and frequency [Hz] of the best load searched again at one end of
         a range, 0 the low and 1 the high one; and why it was not found.
+
+        Args:
+            base: the peak of the best load with the parameter as it is.
         """
         name = one.parameter.name
         factor = (one.parameter.low, one.parameter.high)[end]
@@ -418,6 +422,8 @@ class _Study:
             self.best.mass,
             start=one.predicted[end, 0],
             tolerance=HEIGHT_TOLERANCE,
+            near=base,
+            with_range=False,
         )
         # of a point that was not solved: one of several attempts tells enough here
         first = found.reason.split("; ")[0]

@@ -174,11 +174,11 @@ def test_a_search_begins_with_few_harmonics_and_ends_with_those_that_are_needed(
     search = best_load_module._search
     used = []
 
-    def watched(scene, case_at, family_of, settings, *others):
+    def watched(scene, case_at, family_of, settings, *others, **limits):
         used.append(settings)
         if settings.harmonics <= 3 and not solved:
             raise NotSolvedError("no peak")
-        return search(scene, case_at, family_of, settings, *others)
+        return search(scene, case_at, family_of, settings, *others, **limits)
 
     monkeypatch.setattr(best_load_module, "_search", watched)
     rich = replace(SETTINGS, harmonics=7, samples=256, chosen=("harmonics", "samples"))
@@ -209,6 +209,20 @@ def test_a_chart_reaches_from_an_eighth_of_the_best_to_thirty_times_it(best):
     assert loads[0] == pytest.approx(best.load / 8, rel=0.05)
     assert loads[-1] == pytest.approx(30 * best.load, rel=0.05)
     assert float(f"{best.load:.4g}") in loads
+
+
+def test_a_search_near_a_known_resonance_and_without_a_range_is_short(best):
+    """It ends at the same load, and spends fewer points."""
+    model = load_variation(case_at, family, SETTINGS).model_at(best.load)
+    known = find_peak(model, HZ * best.frequency, 3, 0)
+    start = 0.9 * best.load
+    with_range, short = (
+        find_best_load(scene(), case_at, family, SETTINGS, None, start, **how)
+        for how in ({}, {"near": known, "with_range": False})
+    )
+    assert short.amplitude == pytest.approx(best.amplitude, rel=2 * best.tolerance)
+    assert short.load == pytest.approx(with_range.load, rel=0.03)
+    assert short.points < with_range.points
 
 
 def test_a_search_that_fails_says_why():

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache
+from functools import cache, lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -103,6 +103,8 @@ def find_best_load(
     mass: float | None,
     start: float | None = None,
     tolerance: float | None = None,
+    near: Peak | None = None,
+    with_range: bool = True,
 ) -> BestLoad:
     """The load with the smallest resonance, and how sure it is.
 
@@ -113,17 +115,20 @@ def find_best_load(
         start: load near the best one [N]; searched farther only where the best of its
             neighbourhood lies at an end of that.
         tolerance: of the height, relative; HEIGHT_TOLERANCE_SHARE of the accuracy when left out.
+        near: the resonance under the start, of these models or similar ones, where it is known.
+        with_range: loads around are tried as well, until the resonance is higher by the accuracy.
     """
     tolerance = tolerance or HEIGHT_TOLERANCE_SHARE * scene.accuracy
     case_at = lru_cache(maxsize=None)(case_at)
     searched = search_range(scene)
     family = family_of(case_at(start or _middle(searched)))
+    rise = scene.accuracy if with_range else 0.0
     reason = ""
     # where the resonance is not solved with few harmonics, it may be with those that were asked for
     for begun in dict.fromkeys((_first_search_settings(family, settings), settings)):
         try:
             found, chosen = _repeated_search(
-                scene, case_at, family_of, begun, searched, start, tolerance
+                scene, case_at, family_of, begun, searched, start, tolerance, near, rise
             )
         except NotSolvedError as error:
             reason = str(error)
@@ -153,24 +158,28 @@ def _repeated_search(
     searched: tuple[float, float],
     start: float | None,
     tolerance: float,
+    known: Peak | None,
+    rise: float,
 ) -> tuple[Optimum, Settings]:
     """The best load by settings that hold there, and these.
 
     Where MAX_SEARCHES were not enough, the resonance under the load that they ended at.
 
+    Args:
+        known: the resonance under the start, where it is known.
+        rise: relative, of the resonances under the lowest and the highest load that are tried.
+
     Raises:
         NotSolvedError: a resonance was not.
     """
     bounds = searched if start is None else _near(start, searched)
-    known = None
     points = 0
+    search = partial(_search, scene, case_at, family_of, tolerance=tolerance, rise=rise)
     for left in reversed(range(MAX_SEARCHES)):
-        found = _search(scene, case_at, family_of, settings, bounds, start, known, tolerance)
+        found = search(settings, bounds, start, known)
         points += found.points
         if found.value in bounds and bounds != searched:
-            found = _search(
-                scene, case_at, family_of, settings, searched, found.value, found.peak, tolerance
-            )
+            found = search(settings, searched, found.value, found.peak)
             points += found.points
         if not settings.chosen and settings.error is not None:
             break
@@ -254,7 +263,9 @@ def _search(
     bounds: tuple[float, float],
     start: float | None,
     known: Peak | None,
+    *,
     tolerance: float,
+    rise: float,
 ) -> Optimum:
     """The search with these settings, from a load and the resonance there, where they are known."""
     along = load_variation(case_at, family_of, settings)
@@ -269,7 +280,7 @@ def _search(
         start=middle,
         near=known,
         tolerance=tolerance,
-        rise=scene.accuracy,
+        rise=rise,
         options=solver_options(scene.accuracy),
     )
 
