@@ -32,7 +32,7 @@ from ..scene.units import newtons
 from ..util.arrays import RealArray
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
-from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
+from .seating import ContactProblem, condense_body, held_motions, rigid_and_load, spin_axis
 
 # number of the translation along the engine axis among the rigid motions of a body in space
 AXIAL_TRANSLATION = 2
@@ -240,17 +240,27 @@ def _refined(
 ) -> FrictionalSeating:
     """With as many load steps as the tangential forces need."""
     steps = FIRST_STEPS
-    before = _history(problem, face, speeds, scale, bedded, steps)
+    solved = problem if face.mu.any() else _held_problem(problem)
+    before = _history(solved, face, speeds, scale, bedded, steps)
     while True:
         steps *= 2
-        after = _history(problem, face, speeds, scale, bedded, steps)
+        after = _history(solved, face, speeds, scale, bedded, steps)
         limit = float((face.mu * after.force[:, 0]).max())
         apart = float(np.abs(after.force[:, 1:] - before.force[:, 1:]).max())
-        change = apart / max(limit, float(np.finfo(float).tiny))
+        change = apart / limit if limit > 0 else 0.0
         if change < FORCE_CHANGE_TOLERANCE or steps >= MOST_STEPS:
             break
         before = after
     return _seating(problem, face, after, scale * speeds[-1] ** 2, scale, steps, change)
+
+
+def _held_problem(problem: FrictionalProblem) -> FrictionalProblem:
+    """The problem without the motions that seats do not hold which have no friction at all: nothing
+    would bound these, and what rounding leaves of their gaps then counts.
+    """
+    d = len(problem.flexibility) // len(problem.clearance)
+    held = held_motions(problem.rigid[::d], problem.load)
+    return replace(problem, rigid=problem.rigid @ held, load=problem.load @ held)
 
 
 def _history(

@@ -264,14 +264,8 @@ def _state(
     active: np.ndarray | None,
 ) -> LCPSolution:
     """One contact solve with `scale` times the unit load on the damper."""
-    _, _, held = held_directions(problem.rigid)
+    held = held_motions(problem.rigid, problem.load)
     load = held @ (held.T @ problem.load)
-    sideways = np.linalg.norm(problem.load - load) / np.linalg.norm(problem.load)
-    if sideways > UNHELD_LOAD_SHARE:
-        raise NotSolvedError(
-            f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
-            f"can't hold it, expected below {UNHELD_LOAD_SHARE:.0%}"
-        )
     solution = _on_layer(problem, g0 + scale * problem.damper_swell, -scale * load, active)
     if solution.reason:
         raise NotSolvedError(
@@ -279,6 +273,26 @@ def _state(
             f"{solution.reason}"
         )
     return solution
+
+
+def held_motions(rigid: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """(d, r) motions of the damper that frictionless seats hold, orthonormal.
+
+    Args:
+        rigid: (n, d) gap opened by unit rigid motions.
+        load: (d,) on the damper along these.
+
+    Raises:
+        NotSolvedError: too much of the load is along the other motions.
+    """
+    _, _, held = held_directions(rigid)
+    sideways = np.linalg.norm(load - held @ (held.T @ load)) / np.linalg.norm(load)
+    if sideways > UNHELD_LOAD_SHARE:
+        raise NotSolvedError(
+            f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
+            f"can't hold it, expected below {UNHELD_LOAD_SHARE:.0%}"
+        )
+    return held
 
 
 def _on_layer(

@@ -68,6 +68,18 @@ def test_without_friction_it_is_the_frictionless_seating(problems):
         assert rubbed.force == pytest.approx(free.force, rel=5e-3, abs=1e-3 * free.force.max())
 
 
+@pytest.mark.parametrize("speeds", [(SPEED,), (SPEED, 1.2 * SPEED, SPEED)])
+def test_no_friction_at_all_is_the_frictionless_seating(problems, speeds):
+    """Nothing then holds the damper along the engine axis, and no history remains."""
+    rough, smooth = problems
+    law, _ = layer(rough)
+    plain = solve_seating(replace(smooth, layer=law), SPEED)
+    found = seated(rough, mu=0.0, speeds=speeds, bedded=False)
+    for rubbed, free in zip(found.maps, plain, strict=True):
+        assert rubbed.force == pytest.approx(free.force, rel=1e-7, abs=1e-7 * free.force.max())
+    assert found.change == 0.0 and abs(found.share) < 1e-9
+
+
 def test_the_damper_is_in_equilibrium_and_no_force_exceeds_its_limit(problems):
     rough, _ = problems
     for bedded in (True, False):
