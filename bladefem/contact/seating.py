@@ -50,6 +50,8 @@ UNHELD_LOAD_SHARE = 0.01
 # steps of Newton's method on a layer that stiffens, and the relative change of force that ends them
 MAX_LAYER_STEPS = 50
 LAYER_TOLERANCE = 1e-12
+# what rounding may leave of that change where gaps are far wider than displacements
+ROUNDED_LAYER_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
@@ -319,6 +321,8 @@ def _on_layer(
         settled = change <= LAYER_TOLERANCE * np.abs(force).max()
         if solution.reason or settled or not np.isfinite(law.doubling).any():
             return solution
+    if change <= ROUNDED_LAYER_TOLERANCE * np.abs(force).max():
+        return solution
     return replace(
         solution,
         reason=f"the stiffening interface layer changed by {change:.1e} N in its last step",
