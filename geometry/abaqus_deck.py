@@ -4,12 +4,16 @@ order marks and blanks are dealt with here.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 from bladefem.errors import InputError
 
+# also where it goes on after a comma
+INCLUDE_LINE = re.compile(r"^\s*\*\s*include\b[^*]*?\binput\s*=([^,\n]*)", re.I | re.M)
 # files inside files; more is a circle
 MAX_INCLUDE_DEPTH = 20
 
@@ -68,6 +72,24 @@ def keywords_of(file: Path, depth: int = 0) -> Iterator[Keyword]:
             current.data.append((number, [part.strip() for part in line.split(",")]))
     if current is not None:
         yield current
+
+
+def included_files(file: Path, depth: int = 0) -> list[Path]:
+    """The files that a deck includes, and those that these do, as far as they are there."""
+    if depth >= MAX_INCLUDE_DEPTH:
+        return []
+    found = []
+    for name in _included_names(file, file.stat().st_mtime_ns):
+        inner = file.parent / name
+        if name and inner.is_file():
+            found += [inner, *included_files(inner, depth + 1)]
+    return found
+
+
+@lru_cache(maxsize=64)
+def _included_names(file: Path, changed: int) -> tuple[str, ...]:
+    """What the *INCLUDE lines of a deck name, read once for each time of its change."""
+    return tuple(name.strip().strip("\"'") for name in INCLUDE_LINE.findall(_read_text(file)))
 
 
 def _read_text(file: Path) -> str:

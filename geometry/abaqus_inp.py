@@ -7,6 +7,7 @@ without volume or area (springs, masses, beams, rigid bodies) are left out and c
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from bladefem.errors import InputError
 
 from .abaqus_deck import Keyword, deck_error, keywords_of
 from .raw_mesh import RawMesh, from_vtk_order
+from .second_order_cells import edges_of_quads
+from .topology import CORNERS, NODES, QUADS
 
 # element type up to its first letter behind the number of nodes -> meshio's word
 SOLID_TYPES = {
@@ -46,6 +49,8 @@ CELL_FACES: dict[str, list[tuple[int, ...]]] = {
     "wedge": [(0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)],
     "pyramid": [(0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)],
 }
+# keywords that make nodes and elements without listing them, or change what coordinates mean
+MESH_MAKERS = ("ELCOPY", "ELGEN", "NCOPY", "NFILL", "NGEN", "NMAP", "SYSTEM")
 # of one range of a set: more is a slip of the pen, and fills the memory
 MOST_MEMBERS = 50_000_000
 # a node or element: instance ("" outside instances), its number there
@@ -85,13 +90,34 @@ def read_inp(file: Path) -> RawMesh:
             scope = root
         elif keyword.name == "INSTANCE":
             _add_instance(root, parts, keyword)
+        elif keyword.name in MESH_MAKERS and keyword.data:
+            raise deck_error(
+                keyword.file,
+                keyword.line,
+                f"*{keyword.name} is not followed, expected a deck that lists all nodes and "
+                "elements, in one system of coordinates",
+            )
         elif keyword.name in KEYWORD_READERS:
+            if "INPUT" in keyword.options:
+                raise deck_error(
+                    keyword.file,
+                    keyword.line,
+                    f"*{keyword.name} with INPUT is not followed, expected its lines in the deck, "
+                    "or *INCLUDE",
+                )
             KEYWORD_READERS[keyword.name](scope, keyword)
     return _raw_mesh(root, file)
 
 
 def _read_nodes(scope: _Scope, keyword: Keyword) -> None:
     name = keyword.options.get("NSET", "")
+    system = keyword.options.get("SYSTEM", "").upper() or "R"
+    if system not in CARTESIAN:
+        raise deck_error(
+            keyword.file,
+            keyword.line,
+            f"*NODE, SYSTEM={system}: expected R, C or S (rectangular, cylindrical, spherical)",
+        )
     for line, fields in keyword.data:
         try:
             tag = int(fields[0])
@@ -100,9 +126,29 @@ def _read_nodes(scope: _Scope, keyword: Keyword) -> None:
             raise deck_error(
                 keyword.file, line, f"'{', '.join(fields)}' is no node, expected number, x, y, z"
             ) from None
-        scope.nodes["", tag] = [*place, 0.0, 0.0, 0.0][:3]
+        scope.nodes["", tag] = CARTESIAN[system](*[*place, 0.0, 0.0, 0.0][:3])
         if name:
             scope.node_sets.setdefault(name, []).append(("", tag))
+
+
+def _of_cylinder(radius: float, angle: float, height: float) -> list[float]:
+    """x, y, z of radius, angle from x [degrees] and z."""
+    turn = np.radians(angle)
+    return [radius * float(np.cos(turn)), radius * float(np.sin(turn)), height]
+
+
+def _of_sphere(radius: float, angle: float, elevation: float) -> list[float]:
+    """x, y, z of radius, angle from x and elevation above the x-y plane [degrees]."""
+    up = np.radians(elevation)
+    return _of_cylinder(radius * float(np.cos(up)), angle, radius * float(np.sin(up)))
+
+
+# x, y, z from the three coordinates of *NODE, SYSTEM=...
+CARTESIAN: dict[str, Callable[[float, float, float], list[float]]] = {
+    "R": lambda x, y, z: [x, y, z],
+    "C": _of_cylinder,
+    "S": _of_sphere,
+}
 
 
 def _read_elements(scope: _Scope, keyword: Keyword) -> None:
@@ -357,15 +403,47 @@ def _raw_mesh(root: _Scope, file: Path) -> RawMesh:
         f"{count} elements of type {kind or 'unknown'} were left out"
         for kind, count in root.left_out.items()
     )
+    points = np.array(list(root.nodes.values()), dtype=float).reshape(-1, 3)
     return RawMesh(
-        np.array(list(root.nodes.values()), dtype=float).reshape(-1, 3),
-        [(word, from_vtk_order(word, np.array(rows))) for word, rows in kinds.items()],
+        points,
+        [(word, _gmsh_order(word, np.array(rows), points, file)) for word, rows in kinds.items()],
         groups,
         sets | _node_surfaces(root, sets, place),
         {name: _surface_facets(root, lines, place) for name, lines in root.surfaces.items()},
         notes,
         _node_numbers(root),
     )
+
+
+def _gmsh_order(
+    word: str,
+    cells: np.ndarray,
+    points: np.ndarray,
+    file: Path,
+) -> np.ndarray:
+    """Cells (nc, k) with their nodes in gmsh's order.
+
+    Of 27 nodes Abaqus lists the middle of the cell before those of the faces, programs that follow
+    VTK at the end: the places of the last seven decide.
+    """
+    if word != "hexahedron27":
+        return from_vtk_order(word, cells)
+    listed = NODES["hexahedron20"]
+    outer = from_vtk_order("hexahedron20", cells[:, :listed])
+    corner = points[outer[:, : CORNERS["hexahedron"]]]
+    middle = points[outer[:, CORNERS["hexahedron"] :]]
+    around = middle[:, np.array(edges_of_quads("hexahedron"))].sum(axis=2) / 2
+    faces = around - corner[:, np.array(QUADS["hexahedron"])].sum(axis=2) / 4
+    inside = (middle.sum(axis=1) - corner.sum(axis=1)) / 4
+    wanted = np.concatenate([faces, inside[:, None]], axis=1)
+    rest = cells[:, listed:]
+    nearest = np.linalg.norm(wanted[:, :, None] - points[rest][:, None], axis=3).argmin(axis=2)
+    if (np.sort(nearest, axis=1) != np.arange(rest.shape[1])).any():
+        raise InputError(
+            f"imported.file = '{file}': the last seven nodes of an element C3D27 are not near the "
+            "middles of its faces and its own, expected each of them there"
+        )
+    return np.hstack([outer, np.take_along_axis(rest, nearest, axis=1)])
 
 
 def _node_numbers(root: _Scope) -> np.ndarray | None:

@@ -157,8 +157,10 @@ def read_by_meshio(file: Path) -> RawMesh:
     import meshio
 
     # the reader itself: meshio.read hides why one failed
-    reader = meshio.vtu if file.suffix.lower() == ".vtu" else meshio.nastran
-    mesh = reader.read(file)
+    vtu = file.suffix.lower() == ".vtu"
+    if not vtu:
+        _check_coordinate_systems(file)
+    mesh = (meshio.vtu if vtu else meshio.nastran).read(file)
     blocks = [(block.type, from_vtk_order(block.type, block.data)) for block in mesh.cells]
     groups = {
         name: [
@@ -175,6 +177,25 @@ def read_by_meshio(file: Path) -> RawMesh:
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     return RawMesh(points, blocks, groups, sets)
+
+
+def _check_coordinate_systems(file: Path) -> None:
+    """Refuse bulk data whose nodes are given in other coordinates than the basic ones: meshio reads
+    radius and angle as x and y.
+    """
+    for number, line in enumerate(file.read_text(errors="replace").splitlines(), 1):
+        card = line[:8].split(",")[0].strip().upper()
+        if card not in ("GRID", "GRID*", "GRDSET", "GRDSET*"):
+            continue
+        if "," in line:
+            system = [*line.split(","), "", ""][2]
+        else:
+            system = line[24:40] if card.endswith("*") else line[16:24]
+        if system.strip() not in ("", "0"):
+            raise InputError(
+                f"imported.file = '{file}', line {number}: coordinates in the system "
+                f"{system.strip()}, expected the basic one (CP blank or 0) for all nodes"
+            )
 
 
 def from_vtk_order(word: str, cells: np.ndarray) -> np.ndarray:

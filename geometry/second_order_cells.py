@@ -82,7 +82,7 @@ def _with_face_centres(
         first = CORNERS[family] + len(EDGES[family])
         count = len(QUADS[family])
         corner = cells[:, np.array(QUADS[family])]
-        around = middle[:, np.array(_edges_of_quads(family))]
+        around = middle[:, np.array(edges_of_quads(family))]
         keys.append(np.sort(corner.reshape(-1, 4), axis=1))
         places.append((points[around].sum(2) / 2 - points[corner].sum(2) / 4).reshape(-1, 3))
         has_centres = NODES[word] >= first + count
@@ -116,7 +116,7 @@ def _with_cell_centres(
     return np.vstack([points, place]), number[:, None]
 
 
-def _edges_of_quads(family: str) -> list[list[int]]:
+def edges_of_quads(family: str) -> list[list[int]]:
     """Rows of EDGES round each quadrilateral face."""
     row = {frozenset(pair): i for i, pair in enumerate(EDGES[family])}
     return [[row[frozenset((quad[i - 1], quad[i]))] for i in range(4)] for quad in QUADS[family]]

@@ -16,8 +16,9 @@ system of projections, solved by Newton's method (Alart, Curnier 1991, DOI
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
@@ -32,7 +33,7 @@ from ..scene.units import newtons
 from ..util.arrays import RealArray
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
-from .seating import ContactProblem, condense_body, rigid_and_load, spin_axis
+from .seating import ContactProblem, condense_body, held_motions, rigid_and_load, spin_axis
 
 # number of the translation along the engine axis among the rigid motions of a body in space
 AXIAL_TRANSLATION = 2
@@ -41,6 +42,8 @@ RESIDUAL_TOLERANCE = 1e-10
 # Newton steps of a load step, and halvings of one
 MAX_NEWTON_STEPS = 60
 MAX_HALVINGS = 8
+# halvings of a load step that is not solved
+MAX_SPLITS = 3
 # load steps of each change of speed: first and most tried
 FIRST_STEPS = 4
 MOST_STEPS = 64
@@ -240,17 +243,27 @@ def _refined(
 ) -> FrictionalSeating:
     """With as many load steps as the tangential forces need."""
     steps = FIRST_STEPS
-    before = _history(problem, face, speeds, scale, bedded, steps)
+    solved = problem if face.mu.any() else _held_problem(problem)
+    before = _history(solved, face, speeds, scale, bedded, steps)
     while True:
         steps *= 2
-        after = _history(problem, face, speeds, scale, bedded, steps)
+        after = _history(solved, face, speeds, scale, bedded, steps)
         limit = float((face.mu * after.force[:, 0]).max())
         apart = float(np.abs(after.force[:, 1:] - before.force[:, 1:]).max())
-        change = apart / max(limit, float(np.finfo(float).tiny))
+        change = apart / limit if limit > 0 else 0.0
         if change < FORCE_CHANGE_TOLERANCE or steps >= MOST_STEPS:
             break
         before = after
     return _seating(problem, face, after, scale * speeds[-1] ** 2, scale, steps, change)
+
+
+def _held_problem(problem: FrictionalProblem) -> FrictionalProblem:
+    """The problem without the motions that seats do not hold which have no friction at all: nothing
+    would bound these, and what rounding leaves of their gaps then counts.
+    """
+    d = len(problem.flexibility) // len(problem.clearance)
+    held = held_motions(problem.rigid[::d], problem.load)
+    return replace(problem, rigid=problem.rigid @ held, load=problem.load @ held)
 
 
 def _history(
@@ -270,11 +283,16 @@ def _history(
         gap[:, 0] = problem.clearance
         swell = (problem.blade_swell + scale * problem.damper_swell).reshape(n, d)
     state = _State(np.zeros((n, d)), np.zeros(problem.rigid.shape[1]), gap, 0)
+
+    def step_to(square: float, before: _State) -> _State:
+        return _step(problem, face, before, gap + square * swell, scale * square)
+
     last = 0.0
     for speed in speeds:
-        for square in last + (speed**2 - last) * np.arange(1, steps + 1) / steps:
+        ends = last + (speed**2 - last) * np.arange(steps + 1) / steps
+        for first, square in pairwise(ends):
             try:
-                state = _step(problem, face, state, gap + square * swell, scale * square)
+                state = _split_step(step_to, first, square, state)
             except NotSolvedError as error:
                 raise NotSolvedError(
                     f"seating with friction at {np.sqrt(square) * 30 / np.pi:.5g} rpm on the way "
@@ -282,6 +300,29 @@ def _history(
                 ) from error
         last = speed**2
     return state
+
+
+def _split_step(
+    step_to: Callable[[float, _State], _State],
+    first: float,
+    last: float,
+    state: _State,
+    halvings: int = MAX_SPLITS,
+) -> _State:
+    """A load step from one squared speed to another, in halves where Newton's method fails: it may
+    go in circles under one load and not under those beside it.
+
+    Raises:
+        NotSolvedError: the smallest parts fail too.
+    """
+    try:
+        return step_to(last, state)
+    except NotSolvedError:
+        if not halvings:
+            raise
+    middle = (first + last) / 2
+    state = _split_step(step_to, first, middle, state, halvings - 1)
+    return _split_step(step_to, middle, last, state, halvings - 1)
 
 
 def _step(

@@ -12,8 +12,9 @@ from .body import Body
 from .stress import nodal_stress, stress_jumps, von_mises
 from .stress_error import mesh_error
 
-# instants of a period for each harmonic, the highest one included
-INSTANTS_PER_HARMONIC = 16
+# instants of a period for each harmonic, the highest one included: between two of them a stress is
+# larger by 0.12 % at most
+INSTANTS_PER_HARMONIC = 64
 # nodes that are followed in time: those with the largest sum of the harmonics' own stresses
 MAX_NODES_IN_TIME = 4000
 # places where the mesh may hide a larger stress
@@ -63,8 +64,10 @@ def alternating_stress(
     instants = INSTANTS_PER_HARMONIC * (kept[-1] + 1)
     angle = 2 * np.pi * np.arange(instants) / instants
     turns = np.exp(1j * np.outer(angle, np.array(kept) + 1))
-    in_time = [von_mises(np.einsum("h,hns->ns", turn, found[:, nodes]).real) for turn in turns]
-    largest = np.max(in_time, axis=0)
+    largest = np.zeros(count)
+    for turn in turns:
+        now = von_mises(np.einsum("h,hns->ns", turn, found[:, nodes]).real)
+        largest = np.maximum(largest, now)
     field = bound.copy()
     field[nodes] = largest
     worst = int(largest.argmax())

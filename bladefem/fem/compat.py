@@ -222,7 +222,9 @@ def cell_dofs(space: Any) -> np.ndarray:
     table = space.dofmap.list
     index_map = space.mesh.topology.index_map(space.mesh.topology.dim)
     rows = index_map.size_local + index_map.num_ghosts
-    return np.asarray(getattr(table, "array", table)).reshape(rows, -1)
+    # a rank may have no cells, and then no width either
+    width = space.dofmap.dof_layout.num_dofs
+    return np.asarray(getattr(table, "array", table)).reshape(rows, width)
 
 
 def compile_form(form: Any) -> Any:

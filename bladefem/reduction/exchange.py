@@ -5,7 +5,9 @@ library.
 from __future__ import annotations
 
 import re
+from cmath import rect
 from collections.abc import Iterator
+from math import radians
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,6 +27,8 @@ class _Header(NamedTuple):
 
     form: int
     type: int
+    # complex terms are amplitude and phase [degrees], not real and imaginary part
+    polar: bool
 
     @property
     def is_complex(self) -> bool:
@@ -65,10 +69,17 @@ def read_dmig(path: str | Path) -> dict[str, np.ndarray]:
         header = headers[term.name]
         i = place[term.row]
         j = place[term.column]
-        matrix[i, j] = term.value if header.is_complex else term.value.real
+        matrix[i, j] = _matrix_value(term.value, header)
         if header.form == SYMMETRIC_FORM:
             matrix[j, i] = matrix[i, j]
     return matrices | {"dofs": np.array(dofs)}
+
+
+def _matrix_value(value: complex, header: _Header) -> complex:
+    """The value that two fields of a term stand for."""
+    if not header.is_complex:
+        return value.real
+    return rect(value.real, radians(value.imag)) if header.polar else value
 
 
 def _headers_and_terms(path: Path) -> tuple[dict[str, _Header], list[_Term]]:
@@ -84,7 +95,8 @@ def _headers_and_terms(path: Path) -> tuple[dict[str, _Header], list[_Term]]:
             name = fields[1].upper()
             point = int(fields[2])
             if point == 0:
-                headers[name] = _Header(int(fields[3]), int(fields[4]))
+                polar = int([*fields, "", ""][6] or 0) > 0
+                headers[name] = _Header(int(fields[3]), int(fields[4]), polar)
             else:
                 column = point, int(fields[3] or 0)
                 terms += [_Term(name, column, *term) for term in _column_terms(fields[5:])]

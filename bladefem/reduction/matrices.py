@@ -15,8 +15,15 @@ from ..data import PortModel
 from ..errors import InputError
 from .exchange import read_ansys, read_dmig
 
-# eigenvalues below this share of the largest one are rigid modes: omega = 0
-RIGID_EIGENVALUE_SHARE = 1e-10
+# eigenvalues below this share of the largest one may be those of rigid modes: omega = 0
+LOW_EIGENVALUE_SHARE = 1e-10
+# energy of a rigid motion over the sum of its absolute terms: rounding leaves 1e-17, files of ten
+# digits 1e-12 at most; the first mode of a beam of 400 elements has 1e-11
+RIGID_ENERGY_SHARE = 1e-12
+# the same below zero, which no elastic motion has: what entries of single precision may leave
+NEGATIVE_ENERGY_SHARE = 6e-8
+# stiffness of massless motions below this share of the largest entry is none
+SLACK_STIFFNESS_SHARE = 1e-10
 # eigenvalues of M below this share of the largest one belong to massless motions
 MASSLESS_EIGENVALUE_SHARE = 1e-13
 # negative damping below this share of the largest one is rounding
@@ -27,18 +34,36 @@ HERMITIAN_ROUNDING_SHARE = 1e-8
 CIRCULATION_ROUNDING_SHARE = 1e-9
 
 
-def _with_rigid_zeros(values: np.ndarray) -> np.ndarray:
-    """Ascending eigenvalues (n,) [rad^2/s^2] with those of rigid modes set to zero.
+def _with_rigid_zeros(
+    K: np.ndarray, values: np.ndarray, vectors: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Ascending eigenvalues (n,) [rad^2/s^2] of the stiffness K with those of rigid modes set to
+    zero, and the modes (dofs, n).
+
+    A small eigenvalue alone says little: a fine mesh of a slender body, or a light mass, stretches
+    the spectrum by more than what rounding leaves of zero. A rigid motion is one whose energy is
+    small against the terms that cancel in it.
 
     Raises:
         InputError: the stiffness is not positive semidefinite.
     """
-    smallest = RIGID_EIGENVALUE_SHARE * values[-1]
-    if values[0] < -smallest:
+    low = np.flatnonzero(values < LOW_EIGENVALUE_SHARE * values[-1])
+    if not len(low):
+        return values, vectors
+    # told apart anew by the energies themselves, whose rounding is smaller
+    some = vectors[:, low]
+    energies, turn = linalg.eigh(some.conj().T @ K @ some)
+    some = some @ turn
+    terms = (abs(some) * (abs(K) @ abs(some))).sum(axis=0)
+    if (energies < -NEGATIVE_ENERGY_SHARE * terms).any():
         raise InputError(
-            f"K has the eigenvalue {values[0]:.3g}: expected a positive semidefinite stiffness"
+            f"K has the eigenvalue {energies[0]:.3g}: expected a positive semidefinite stiffness"
         )
-    return np.where(values < smallest, 0.0, values)
+    energies[energies < RIGID_ENERGY_SHARE * terms] = 0.0
+    order = np.argsort(energies, kind="stable")
+    values, vectors = values.copy(), vectors.copy()
+    values[low], vectors[:, low] = energies[order], some[:, order]
+    return values, vectors
 
 
 def port_model_from_matrices(
@@ -82,7 +107,7 @@ def port_model_from_matrices(
     except linalg.LinAlgError:
         M, K, C, P, massless, circulation = _without_massless(M, K, C, P, circulation)
         values, vectors = linalg.eigh(K, M)
-    values = _with_rigid_zeros(values)
+    values, vectors = _with_rigid_zeros(K, values, vectors)
     count = len(values) if count is None else count
     if not np.count_nonzero(values == 0) <= count <= len(values):
         raise InputError(
@@ -226,7 +251,7 @@ def _without_massless(
     light = motions[:, still]
     heavy = motions[:, ~still]
     own = light.conj().T @ K @ light
-    if linalg.eigvalsh(own)[0] <= RIGID_EIGENVALUE_SHARE * abs(K).max():
+    if linalg.eigvalsh(own)[0] <= SLACK_STIFFNESS_SHARE * abs(K).max():
         raise InputError(
             "M and K: a motion has neither mass nor stiffness, expected one of them in each"
         )
@@ -249,6 +274,8 @@ def _without_massless(
 
 def _square_matrix(matrix: np.ndarray, name: str) -> np.ndarray:
     matrix = np.atleast_2d(_dense_array(matrix))
+    # the algebra of single precision would lose the low modes
+    matrix = matrix.astype(np.result_type(matrix, float))
     if matrix.ndim != 2 or matrix.shape[0] != matrix.shape[1] or not np.isfinite(matrix).all():
         raise InputError(
             f"{name} of shape {matrix.shape}: expected a square matrix of finite numbers"

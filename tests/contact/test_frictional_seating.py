@@ -14,6 +14,7 @@ from bladefem.contact.frictional_seating import (
 )
 from bladefem.contact.interface_law import InterfaceLaw
 from bladefem.contact.patch import make_patch
+from bladefem.contact.rough_layer import TOUCHING_PRESSURE, decay_length
 from bladefem.contact.seating import contact_problem, solve_seating
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem.body import assemble
@@ -68,6 +69,18 @@ def test_without_friction_it_is_the_frictionless_seating(problems):
         assert rubbed.force == pytest.approx(free.force, rel=5e-3, abs=1e-3 * free.force.max())
 
 
+@pytest.mark.parametrize("speeds", [(SPEED,), (SPEED, 1.2 * SPEED, SPEED)])
+def test_no_friction_at_all_is_the_frictionless_seating(problems, speeds):
+    """Nothing then holds the damper along the engine axis, and no history remains."""
+    rough, smooth = problems
+    law, _ = layer(rough)
+    plain = solve_seating(replace(smooth, layer=law), SPEED)
+    found = seated(rough, mu=0.0, speeds=speeds, bedded=False)
+    for rubbed, free in zip(found.maps, plain, strict=True):
+        assert rubbed.force == pytest.approx(free.force, rel=1e-7, abs=1e-7 * free.force.max())
+    assert found.change == 0.0 and abs(found.share) < 1e-9
+
+
 def test_the_damper_is_in_equilibrium_and_no_force_exceeds_its_limit(problems):
     rough, _ = problems
     for bedded in (True, False):
@@ -90,6 +103,22 @@ def test_a_wedge_that_slides_outwards_carries_the_closed_form(problems):
         assert one.force.sum() == pytest.approx(expected, rel=2e-3)
     carried = MU * np.cos(ALPHA) / (np.sin(ALPHA) + MU * np.cos(ALPHA))
     assert found.share == pytest.approx(carried, rel=5e-3)
+
+
+def test_a_layer_that_stiffens_a_thousandfold_is_pressed_on(problems):
+    """Rough faces under 10 MPa, run up beyond the speed and back, so that the wedge slides inwards:
+    N = F / (2 (sin a - mu cos a)).
+    """
+    rough, _ = problems
+    area = np.concatenate([p.area for p in rough.patches])
+    kn = TOUCHING_PRESSURE / decay_length(3.2e-6)
+    law = InterfaceLaw(kn * area, TOUCHING_PRESSURE * area)
+    mu = np.full(len(area), 0.1)
+    speeds = (SPEED, 1.5 * SPEED, SPEED)
+    found = seat_with_friction(rough, law, 0.8 * kn * area, mu, speeds, bedded=True)
+    expected = pull_of(rough) / (2 * (np.sin(ALPHA) - 0.1 * np.cos(ALPHA)))
+    for one in found.maps:
+        assert one.force.sum() == pytest.approx(expected, rel=1e-3)
 
 
 def test_every_history_stays_between_the_closed_forms(problems):

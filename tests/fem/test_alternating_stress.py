@@ -10,6 +10,7 @@ from bladefem.fem.alternating_stress import alternating_stress
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, expand_to_mesh, restrict_load
 from bladefem.fem.flexibility import compliance, flexible
+from bladefem.fem.stress import nodal_stress, von_mises
 from bladefem.scene.tables import Material
 
 LENGTH, HEIGHT = 0.1, 0.01
@@ -45,3 +46,14 @@ def test_estimated_error_is_not_below_half_of_the_true_one(cells, exact):
 
 def test_estimated_error_falls_with_the_mesh():
     assert bent((40, 4)).mesh_error < 0.5 * bent((5, 1)).mesh_error
+
+
+@pytest.mark.parametrize("turn", [0.0, 1 / 64, 1 / 32, 0.3])
+def test_the_largest_stress_of_one_harmonic_does_not_depend_on_its_phase(turn):
+    """In closed form of the complex stress; whole instants of the period need not meet it."""
+    mesh = box((10, 2), (LENGTH, HEIGHT), "triangle6")
+    body = assemble(mesh, "blade", Material(), None)
+    x, y = mesh.points[:, :2].T
+    u = 1e-3 * np.exp(2j * np.pi * turn) * np.column_stack([-2 * x * y, x**2]) / LENGTH
+    exact = von_mises(nodal_stress(body, u)).max()
+    assert alternating_stress(body, u[None]).largest == pytest.approx(exact, rel=2e-3)

@@ -7,13 +7,14 @@ CalculiX's, whose nine points leave it inexact (test_mixed_cells.py).
 """
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import decks
 import meshio
 import numpy as np
 import pytest
-from structured import box
+from structured import box, sector
 
 from bladefem.errors import InputError
 from bladefem.fem.body import assemble
@@ -276,6 +277,9 @@ def test_a_damper_of_another_file_is_as_hot_as_what_it_touches(tmp_path):
         (["*NSET, NSET=a", "b"], r"line 2: there is no node set 'b'"),
         (["*INSTANCE, NAME=a, PART=b"], "line 1: .*part 'b' that is not there"),
         (["*NODE", "1, 0, 0, 0", "*ELEMENT, TYPE=B31", "1, 1, 1"], "cells are missing"),
+        (["*NODE, SYSTEM=X", "1, 0, 0, 0"], r"line 1: \*NODE, SYSTEM=X: expected R, C or S"),
+        (["*NODE", "1, 0, 0, 0", "*NGEN", "1, 9, 2"], r"line 3: \*NGEN is not followed"),
+        (["*ELEMENT, TYPE=C3D4, INPUT=b.txt"], r"line 1: \*ELEMENT with INPUT is not followed"),
         (["*NODE", "1, 0, 0, nan", "*NSET, NSET=a, GENERATE", "1, x"], "line 4: '1, x'"),
     ],
 )
@@ -284,6 +288,48 @@ def test_what_cannot_be_used_is_one_sentence(lines, words, tmp_path):
     with pytest.raises(InputError, match=words) as caught:
         read_mesh(tmp_path / "a.inp")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("last", ["Abaqus", "VTK"])
+def test_hexahedra_of_27_nodes_with_their_middles_where_programs_list_them(last, tmp_path):
+    """Abaqus' node 21 is in the middle of the cell, 22 to 27 in those of the faces S1 to S6; VTK
+    lists -x +x -y +y -z +z and the cell.
+    """
+    mesh = sector(decks.SECTORS, (3, 2, 2), "hexahedron27", bump=0.2)
+    cells = mesh.bodies["blade"]
+    # gmsh lists the faces z = 0, y = 0, x = 0, x = 1, y = 1, z = 1 of the unit cell, then the cell
+    order = {"Abaqus": [26, 20, 25, 21, 23, 24, 22], "VTK": [22, 23, 21, 24, 20, 25, 26]}[last]
+    outer = decks.abaqus_cells("hexahedron20", cells[:, :20])
+    whole = np.hstack([outer, cells[:, order] + 1])
+    lines = ["*NODE", *decks.node_lines(mesh.points), "*ELEMENT, TYPE=C3D27"]
+    (tmp_path / "a.inp").write_text("\n".join([*lines, *decks.element_lines(whole)]))
+    raw = read_raw(tmp_path / "a.inp")
+    np.testing.assert_array_equal(raw.blocks[0][1], cells)
+
+
+@pytest.mark.parametrize("system", ["C", "S"])
+def test_nodes_in_cylindrical_and_spherical_coordinates(system, tmp_path):
+    """*NODE, SYSTEM=C: radius, angle in degrees, z; S: radius, angle, angle above the x-y plane."""
+    m = decks.model("c3d10")
+    radius, angle = np.hypot(*m.points[:, :2].T), np.degrees(np.arctan2(*m.points[:, 1::-1].T))
+    given = [radius, angle, m.points[:, 2]]
+    if system == "S":
+        far = np.linalg.norm(m.points, axis=1)
+        given = [far, angle, np.degrees(np.arcsin(m.points[:, 2] / far))]
+    lines = decks.flat_deck(replace(m, points=np.column_stack(given)), {})
+    lines[lines.index("*NODE, NSET=NALL")] += f", SYSTEM={system}"
+    (tmp_path / "a.inp").write_text("\n".join(lines))
+    np.testing.assert_allclose(read_raw(tmp_path / "a.inp").points, m.points, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "card",
+    ["GRID,7,3,1.,90.,0.", "GRID           7       3", "GRDSET,,3", f"GRID*   {7:16d}{3:16d}"],
+)
+def test_bulk_data_in_other_coordinates_are_refused(card, tmp_path):
+    (tmp_path / "a.bdf").write_text(f"BEGIN BULK\n{card}\nENDDATA\n")
+    with pytest.raises(InputError, match=r"line 2: coordinates in the system 3, expected the"):
+        read_raw(tmp_path / "a.bdf")
 
 
 def test_a_reader_that_leaves_the_program(tmp_path, monkeypatch):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
+import os
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -119,3 +120,24 @@ def test_another_field_does_not(stage, change):
 def test_every_mesh_depends_on_its_own_tables():
     scene = load_scene(SCENES / "wedge.toml")
     assert set(kind_named(scene.kind).shape) < set(declared_fields("mesh", scene))
+
+
+def test_files_that_a_deck_includes_count_by_their_change(tmp_path):
+    """Two levels of *INCLUDE, one on two lines; what a comment names does not."""
+    deck = ["*HEADING", "** *INCLUDE, INPUT=remark.inc", "*Include,", '  input="inner.inc"']
+    texts = {"a.inp": deck, "inner.inc": ["*INCLUDE, INPUT=nodes.inc"], "nodes.inc": ["*NODE"]}
+    for name, lines in texts.items():
+        (tmp_path / name).write_text("\n".join(lines))
+    (tmp_path / "remark.inc").write_text("")
+    scene = load_scene(SCENES / "plane.toml", ["mesh.scale=3"])
+    scene = replace(
+        scene, kind="imported", imported=replace(scene.imported, file=str(tmp_path / "a.inp"))
+    )
+    before = stage_key("mesh", scene)
+    for name in texts:
+        os.utime(tmp_path / name, (1e9, 1e9))
+        after = stage_key("mesh", scene)
+        assert after != before, name
+        before = after
+    os.utime(tmp_path / "remark.inc", (1e9, 1e9))
+    assert stage_key("mesh", scene) == before

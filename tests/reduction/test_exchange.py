@@ -34,6 +34,15 @@ def test_short_fields(tmp_path):
     )
 
 
+@pytest.mark.parametrize("polar", [0, 1])
+def test_complex_terms_by_parts_or_by_amplitude_and_phase(tmp_path, polar):
+    """The field POLAR of the header decides; the phase is in degrees."""
+    lines = [f"DMIG,DAMP,0,1,3,0,{polar}", "DMIG,DAMP,1,1,,2,1,4.,90."]
+    (tmp_path / "a.bdf").write_text("\n".join(lines))
+    value = read_matrices(tmp_path / "a.bdf")["DAMP"][1, 0]
+    assert value == pytest.approx(4j if polar else 4 + 90j, abs=1e-12)
+
+
 @pytest.mark.parametrize("free", [False, True])
 def test_a_body_through_a_punch_file(tmp_path, free):
     """The beam in long fields, as Nastran punches them, and separated by commas: the same

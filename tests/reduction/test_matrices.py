@@ -80,6 +80,70 @@ def test_free_body_has_rigid_modes():
     assert body.omega[0] == 0 and body.omega[1] == pytest.approx(np.sqrt(2e6))
 
 
+@pytest.mark.parametrize("elements", [80, 200, 400])
+def test_a_fine_slender_beam_is_not_taken_for_a_floating_one(elements):
+    """The spectrum spans more than ten digits; frequencies after Blevins, tip flexibility L^3 / (3
+    E I).
+    """
+    K, M = beam_matrices(elements=elements)
+    body = port_model_from_matrices(M, K, {"contact": np.array([2 * elements - 2])}, count=6)
+    exact = (
+        np.array([1.87510407, 4.69409113, 7.85475744]) ** 2
+        * np.sqrt(2.1e11 * 0.006**2 / 12 / 7850)
+        / 0.15**2
+    )
+    np.testing.assert_allclose(body.omega[:3], exact, rtol=1e-6)
+    tip = 0.15**3 / (3 * 2.1e11 * 0.03 * 0.006**3 / 12)
+    np.testing.assert_allclose(receptance(body, 0.0), [[tip]], rtol=1e-6)
+
+
+def test_a_light_mass_leaves_the_frequency_of_the_heavy_one():
+    """1 kg on two springs in series of 1e6 N/m, with 1e-11 kg between them: 0.5e6 / s^2."""
+    K = np.array([[1e6, -1e6], [-1e6, 2e6]])
+    body = port_model_from_matrices(np.diag([1.0, 1e-11]), K, {"contact": np.arange(2)}, count=1)
+    np.testing.assert_allclose(body.omega**2, 0.5e6, rtol=1e-9)
+    with pytest.raises(InputError, match="semidefinite"):
+        port_model_from_matrices(
+            np.diag([1.0, 1e-11]), K - np.diag([0.6e6, 0]), {"contact": np.arange(2)}
+        )
+
+
+@pytest.mark.parametrize("digits", ["double", "ten", "single"])
+def test_a_fine_free_beam_has_two_rigid_modes(digits):
+    """The others are those of Blevins: (4.7300407, 7.8532046)^2 sqrt(EI / (rho A)) / L^2."""
+    n = 100
+    K, M = free_beam(n)
+    if digits == "single":
+        K, M = (A.astype(np.float32) for A in (K, M))
+    elif digits == "ten":
+        K, M = (np.vectorize(lambda value: float(f"{value:.9e}"))(A) for A in (K, M))
+    body = port_model_from_matrices(M, K, {"contact": np.array([2 * n])}, count=6)
+    np.testing.assert_array_equal(body.omega[:2], 0.0)
+    exact = (
+        np.array([4.73004074, 7.85320462]) ** 2 * np.sqrt(2.1e11 * 0.006**2 / 12 / 7850) / 0.15**2
+    )
+    np.testing.assert_allclose(body.omega[2:4], exact, rtol=1e-2 if digits == "single" else 1e-6)
+
+
+def free_beam(elements):
+    """The reference beam without its clamp: the first element's own matrices complete the rest."""
+    K, M = (np.zeros((2 * elements + 2,) * 2) for _ in range(2))
+    whole = (np.zeros((4, 4)), np.zeros((4, 4)))
+    tip = beam_matrices(elements=1, length=0.15 / elements)
+    turn = np.diag([1.0, -1.0])
+    for out, own, many in zip(
+        whole, tip, beam_matrices(elements=2, length=0.3 / elements), strict=True
+    ):
+        out[2:, 2:] = own
+        out[:2, :2] = turn @ own @ turn
+        out[:2, 2:] = many[:2, 2:]
+        out[2:, :2] = many[2:, :2]
+    for e in range(elements):
+        K[2 * e : 2 * e + 4, 2 * e : 2 * e + 4] += whole[0]
+        M[2 * e : 2 * e + 4, 2 * e : 2 * e + 4] += whole[1]
+    return K, M
+
+
 def test_files(tmp_path):
     K, M = beam_matrices(elements=2)
     np.savez(tmp_path / "a.npz", K=K, M=M)

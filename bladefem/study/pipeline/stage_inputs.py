@@ -11,6 +11,7 @@ from dataclasses import dataclass, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from geometry.abaqus_deck import included_files
 from geometry.joined_files import split_entry
 
 from ...io.stage_cache import code_of, key_of
@@ -206,9 +207,11 @@ def _without(
 
 
 def _file_stamp(scene: Scene) -> list[float]:
-    """Imported files count by their times of change too."""
+    """Imported files, and those that decks include, count by their times of change too."""
     if not scene.imported.file:
         return []
     entries = [split_entry(entry)[1] for entry in scene.imported.more or ()]
     files = [Path(name) for name in (scene.imported.file, *entries)]
+    decks = [file for file in files if file.suffix.lower() == ".inp" and file.exists()]
+    files += [inner for deck in decks for inner in included_files(deck)]
     return [file.stat().st_mtime if file.exists() else 0.0 for file in files]
