@@ -11,6 +11,7 @@ from pylife.strength.meanstress import HaighDiagram as FkmDiagram
 
 from bladefem.errors import InputError
 from bladefem.fem.stress import signed_von_mises, von_mises
+from bladefem.report.fatigue import utilisation_table
 from bladefem.report.wheel import use_sentences
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
@@ -90,6 +91,17 @@ def test_worst_places_are_apart():
     assert apart.min() > 0.01 * count - 1
 
 
+def test_places_where_nothing_lasts_come_first():
+    """A diagram that is zero from 400 MPa on: the table was empty as soon as a node was there."""
+    table = ("-400 MPa: 300 MPa", "0 MPa: 300 MPa", "400 MPa: 0 MPa", "800 MPa: 0 MPa")
+    scene = vary(Scene(), fatigue__haigh=list(table))
+    run = run_of(scene, 600 * MPA)
+    (rows,) = utilisation_table(run).values()
+    assert rows["x"].tolist() == [0.0, 0.5]
+    assert rows["utilisation"].tolist() == [np.inf, pytest.approx(0.1)]
+    assert rows["utilisation_bound"].tolist() == [np.inf, pytest.approx(0.1 * 1.2 * 1.1)]
+
+
 def test_mean_stress_outside_of_the_diagram_names_the_place():
     diagram = haigh_diagram(Fatigue(haigh=("0 MPa: 300 MPa", "400 MPa: 180 MPa")))
     with pytest.raises(InputError, match=r"450 MPa at \(1000.0, 0.0, 0.0\) mm.*0 Pa to 400 MPa"):
@@ -134,6 +146,7 @@ def run_of(scene: Scene, mean: float) -> SimpleNamespace:
         strength=SimpleNamespace(mean=np.array([mean, 0.0, 0.0])),
         damped={0: damped},
         response=SimpleNamespace(curves=[curve], best_curve=0),
+        wheel=None,
     )
 
 
