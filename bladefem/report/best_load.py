@@ -153,6 +153,16 @@ def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | Non
     return pd.concat([best, pd.Series(added, dtype=float)])
 
 
+def of_same_damper(rows: pd.DataFrame, best: pd.Series) -> pd.DataFrame:
+    """The rows of a design table of the same damper mass, where several are studied, and those
+    without damper.
+    """
+    mass = best.get("mass", np.nan)
+    if "mass" not in rows or not np.isfinite(mass):
+        return rows
+    return rows[rows["mass"].isna() | np.isclose(rows["mass"], mass)]
+
+
 def _nearest_studied(best: pd.Series, summary: pd.DataFrame) -> pd.Series | None:
     """The row of the nearest finite load, of the same damper where several are studied."""
     rows = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
@@ -263,7 +273,7 @@ def _without_friction(best: pd.Series) -> list[str]:
 
 def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     error = best.get("error", np.nan)
-    limits = summary[(summary["load"] == 0) | np.isinf(summary["load"])]
+    limits = of_same_damper(summary[(summary["load"] == 0) | np.isinf(summary["load"])], best)
     if limits.empty or np.isnan(error):
         return []
     if np.isinf(error):

@@ -504,7 +504,7 @@ def test_what_is_not_determined_has_no_bracket():
 def test_resonances_above_full_stick_are_explained_by_open_contacts_alone(force, frequency, said):
     """By the rounding of a search, or with all points pressed, there is nothing to explain."""
     curve = SimpleNamespace(load=80.0, mass=None, peak_frequency=frequency)
-    limit = SimpleNamespace(peak_frequency=100.0)
+    limit = SimpleNamespace(peak_frequency=100.0, mass=None)
     result = SimpleNamespace(
         response=SimpleNamespace(curves=[curve], limits=(limit, limit)),
         contact=SimpleNamespace(maps={80.0: (SimpleNamespace(force=np.array([2.0, force])),)}),
