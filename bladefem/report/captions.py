@@ -157,8 +157,9 @@ CAPTIONS = {
     "largest; the enclosed area is the friction work of that motion. Where a march in time gives "
     "the resonance the loops are those of its balance, and are called so; the friction work of the "
     "march is in the design table.",
-    "response/flow": "Waves of the wheel in the flow, without dampers; negative nodal diameters "
-    "run backwards.",
+    "response/flow": "Waves of the wheel in the flow, without dampers; positive nodal diameters "
+    "run against the rotation, as engine orders up to half the number of blades do, negative ones "
+    "with it.",
     "response/flutter": "Limit cycle of each fed wave under each load; the start decides which "
     "stays. Smaller motions grow to it, larger ones decay to it, up to the amplitude from which "
     "flutter grows.",
