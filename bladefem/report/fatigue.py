@@ -17,6 +17,7 @@ from ..scene.units import newtons
 from ..study.fatigue import Utilisation, haigh_diagram
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.wheel_utilisation import BladeUse, wheel_utilisation
+from ..study.pipeline.curve import load_of
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
     blade_nodes,
@@ -59,8 +60,9 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
         return {}
     rows = []
     for number, used in found.items():
-        load = run.response.curves[number].load
-        rows += _worst_rows(run, {"load": load}, used, upper_end(run, number))
+        curve = run.response.curves[number]
+        first = {"load": curve.load, **({} if curve.mass is None else {"mass": curve.mass})}
+        rows += _worst_rows(run, first, used, upper_end(run, number))
     tables = {"modes/fatigue": pd.DataFrame(rows)}
     number = run.response.best_curve
     rows = []
@@ -181,7 +183,7 @@ def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
         return
     fields = {"mean stress [Pa]": run.strength.mean}
     for number, used in found.items():
-        load = newtons(run.response.curves[number].load)
+        load = load_of(run.response.curves[number])
         fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run.mesh, used.alternating)
         fields[f"utilisation, {load} [1]"] = _on_mesh(run.mesh, used.used)
     for response, (worst, *_) in known_wheel_use(run):
