@@ -274,12 +274,15 @@ def _without_friction(best: pd.Series) -> list[str]:
 def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     error = best.get("error", np.nan)
     limits = of_same_damper(summary[(summary["load"] == 0) | np.isinf(summary["load"])], best)
-    if limits.empty or np.isnan(error):
+    if limits.empty:
         return []
     if np.isinf(error):
         return ["the error of its amplitude is unknown: neither richer models nor a march tell it"]
     gain = 1 - best["peak_amplitude"] / limits["peak_amplitude"].min()
-    if gain > error:
+    if gain < 0:
+        # whatever its error is
+        return [f"it lies {percent(-gain)} above the better of the free and the stuck blade"]
+    if np.isnan(error) or gain > error:
         return []
     return [
         f"it lies {percent(gain)} below the better of the free and the stuck blade, which is no "
