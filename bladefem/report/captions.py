@@ -72,8 +72,10 @@ CAPTIONS = {
     "accuracy/methods": "Methods on the same model: time and errors.",
     "accuracy/models": "Models by the full balance of harmonics: time and errors.",
     "accuracy/meshes": "Meshes with the settings of the automatic choice: time and errors.",
-    "modes/stresses": "Where the blade is stressed most: by rotation and heat, by each of the "
-    "first modes in the excited nodal diameter scaled to a largest displacement of 1 mm, and, "
+    "modes/stresses": "Largest von Mises stress of the blade at Gauss points, and where: of "
+    "rotation and heat, and of the mode studied alone with an amplitude of 1 mm at the probe.",
+    "modes/stresses_of_modes": "Where the blade is stressed most: by rotation and heat, by each of "
+    "the first modes in the excited nodal diameter scaled to a largest displacement of 1 mm, and, "
     "where a linear response was asked for, at each of its resonances. Stresses are values at "
     "nodes; von Mises also at Gauss points.",
     "modes/fatigue": "The places of the blade that use most of what the material lasts: "
@@ -191,9 +193,10 @@ SINGLE_BLADE_CAPTIONS = {
     "marked where an order meets a mode. Drawn are orders 1 to 5 and those next to the scene's "
     "own; the table of crossings has all orders.",
     "modes/interference": "Natural frequencies against the engine orders at the operating speed.",
-    "modes/stresses": "Where the blade is stressed most: by rotation and heat, by each of the "
-    "first modes scaled to a largest displacement of 1 mm, and, where a linear response was asked "
-    "for, at each of its resonances. Stresses are values at nodes; von Mises also at Gauss points.",
+    "modes/stresses_of_modes": "Where the blade is stressed most: by rotation and heat, by each of "
+    "the first modes scaled to a largest displacement of 1 mm, and, where a linear response was "
+    "asked for, at each of its resonances. Stresses are values at nodes; von Mises also at Gauss "
+    "points.",
 }
 
 
