@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
     from ..data import ModeSet, PortModel, PressureMap
     from ..study.modes.survey import Survey
+    from ..study.pipeline.linear_limits import Limit
     from ..study.pipeline.reduced_sector import Reduced
     from ..study.pipeline.run_records import Response, Run, SolvedRun
 
@@ -174,8 +175,15 @@ def response_tables(response: Response) -> str:
     curves = response.curves
     rows = pd.DataFrame(design_table(curves, response.limits))
     rows = rows[[name for name in SUMMARY_COLUMNS if name in rows]]
-    rows.insert(0, "seat load", ["no damper", *map(load_of, curves), "full stick"])
+    rows.insert(
+        0, "seat load", ["no damper", *map(load_of, curves), *map(_stuck, response.limits[1:])]
+    )
     return f"{report_table(rows)}\n{_best_load_line(response)}"
+
+
+def _stuck(limit: Limit) -> str:
+    """ "full stick", with the damper's mass where several are studied."""
+    return "full stick" + ("" if limit.mass is None else f" of {1e3 * limit.mass:.4g} g")
 
 
 def _best_load_line(response: Response) -> str:

@@ -153,6 +153,16 @@ def found_best(searched: pd.DataFrame, summary: pd.DataFrame) -> pd.Series | Non
     return pd.concat([best, pd.Series(added, dtype=float)])
 
 
+def of_same_damper(rows: pd.DataFrame, best: pd.Series) -> pd.DataFrame:
+    """The rows of a design table of the same damper mass, where several are studied, and those
+    without damper.
+    """
+    mass = best.get("mass", np.nan)
+    if "mass" not in rows or not np.isfinite(mass):
+        return rows
+    return rows[rows["mass"].isna() | np.isclose(rows["mass"], mass)]
+
+
 def _nearest_studied(best: pd.Series, summary: pd.DataFrame) -> pd.Series | None:
     """The row of the nearest finite load, of the same damper where several are studied."""
     rows = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
@@ -263,13 +273,16 @@ def _without_friction(best: pd.Series) -> list[str]:
 
 def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     error = best.get("error", np.nan)
-    limits = summary[(summary["load"] == 0) | np.isinf(summary["load"])]
-    if limits.empty or np.isnan(error):
+    limits = of_same_damper(summary[(summary["load"] == 0) | np.isinf(summary["load"])], best)
+    if limits.empty:
         return []
     if np.isinf(error):
         return ["the error of its amplitude is unknown: neither richer models nor a march tell it"]
     gain = 1 - best["peak_amplitude"] / limits["peak_amplitude"].min()
-    if gain > error:
+    if gain < 0:
+        # whatever its error is
+        return [f"it lies {percent(-gain)} above the better of the free and the stuck blade"]
+    if np.isnan(error) or gain > error:
         return []
     return [
         f"it lies {percent(gain)} below the better of the free and the stuck blade, which is no "

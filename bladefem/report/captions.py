@@ -72,8 +72,10 @@ CAPTIONS = {
     "accuracy/methods": "Methods on the same model: time and errors.",
     "accuracy/models": "Models by the full balance of harmonics: time and errors.",
     "accuracy/meshes": "Meshes with the settings of the automatic choice: time and errors.",
-    "modes/stresses": "Where the blade is stressed most: by rotation and heat, by each of the "
-    "first modes in the excited nodal diameter scaled to a largest displacement of 1 mm, and, "
+    "modes/stresses": "Largest von Mises stress of the blade at Gauss points, and where: of "
+    "rotation and heat, and of the mode studied alone with an amplitude of 1 mm at the probe.",
+    "modes/stresses_of_modes": "Where the blade is stressed most: by rotation and heat, by each of "
+    "the first modes in the excited nodal diameter scaled to a largest displacement of 1 mm, and, "
     "where a linear response was asked for, at each of its resonances. Stresses are values at "
     "nodes; von Mises also at Gauss points.",
     "modes/fatigue": "The places of the blade that use most of what the material lasts: "
@@ -157,8 +159,9 @@ CAPTIONS = {
     "largest; the enclosed area is the friction work of that motion. Where a march in time gives "
     "the resonance the loops are those of its balance, and are called so; the friction work of the "
     "march is in the design table.",
-    "response/flow": "Waves of the wheel in the flow, without dampers; negative nodal diameters "
-    "run backwards.",
+    "response/flow": "Waves of the wheel in the flow, without dampers; positive nodal diameters "
+    "run against the rotation, as engine orders up to half the number of blades do, negative ones "
+    "with it.",
     "response/flutter": "Limit cycle of each fed wave under each load; the start decides which "
     "stays. Smaller motions grow to it, larger ones decay to it, up to the amplitude from which "
     "flutter grows.",
@@ -175,20 +178,49 @@ CAPTIONS = {
     "fallback.",
 }
 
+# where they differ for a single blade, which has no nodal diameters, and whose modes do not travel
+SINGLE_BLADE_CAPTIONS = {
+    "modes/first_modes": "First mode shapes of the blade, coloured by displacement over its "
+    "largest value; grey lines show the shape at rest. On the screen: choose a mode, drag to "
+    "rotate, move the phase through one period.",
+    "modes/modes": "Modes, named after those of the clamped blade. On the screen: choose a mode, "
+    "drag to rotate, move the phase through one period.",
+    "modes/excited_modes": "Modes, named after those of the clamped blade.",
+    "modes/frequencies": "Natural frequencies, without damper.",
+    "modes/nodal_diameters": "Natural frequencies, without damper.",
+    "modes/wave": "The excited mode through one period.",
+    "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
+    "marked where an order meets a mode. Drawn are orders 1 to 5 and those next to the scene's "
+    "own; the table of crossings has all orders.",
+    "modes/interference": "Natural frequencies against the engine orders at the operating speed.",
+    "modes/stresses_of_modes": "Where the blade is stressed most: by rotation and heat, by each of "
+    "the first modes scaled to a largest displacement of 1 mm, and, where a linear response was "
+    "asked for, at each of its resonances. Stresses are values at nodes; von Mises also at Gauss "
+    "points.",
+}
 
-def caption_of(name: str) -> str:
+
+def caption_of(name: str, of_wheel: bool = True) -> str:
     """The caption of "section/name"; a name without one is written out.
+
+    Args:
+        of_wheel: the scene has a bladed wheel; else a single blade.
 
     >>> caption_of("modes/some_curve")
     'Some curve.'
     >>> caption_of("modes/mode_2_wheel")
     'Mode 2 on the whole wheel; displacement over its largest value.'
+    >>> caption_of("modes/mode_2", of_wheel=False)
+    'Mode 2 of the blade, at rest in grey lines; displacement over its largest value.'
     """
+    if not of_wheel and name in SINGLE_BLADE_CAPTIONS:
+        return SINGLE_BLADE_CAPTIONS[name]
     if name in CAPTIONS:
         return CAPTIONS[name]
     mode = MODE_PICTURE.fullmatch(name)
     if mode:
-        where = "on the whole wheel" if mode["wheel"] else "on the sector, at rest in grey lines"
+        body = "on the sector" if of_wheel else "of the blade"
+        where = "on the whole wheel" if mode["wheel"] else f"{body}, at rest in grey lines"
         return f"Mode {mode['number']} {where}; displacement over its largest value."
     head, _, tail = name.rpartition("_")
     if head in CAPTIONS and tail[:1].isdigit():

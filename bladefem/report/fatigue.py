@@ -17,12 +17,14 @@ from ..scene.units import newtons
 from ..study.fatigue import Utilisation, haigh_diagram
 from ..study.mistuning.pattern_response import PatternResponse
 from ..study.mistuning.wheel_utilisation import BladeUse, wheel_utilisation
+from ..study.pipeline.curve import load_of
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.utilisation import (
     blade_nodes,
-    highest_use,
     highest_wheel_use,
     run_utilisation,
+    upper_end,
+    upper_wheel_end,
 )
 from ..view.fatigue import draw_utilisation
 from ..view.mesh import save_vtu
@@ -58,15 +60,16 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
         return {}
     rows = []
     for number, used in found.items():
-        load = run.response.curves[number].load
-        rows += _worst_rows(run, {"load": load}, used, highest_use(run, number, used))
+        curve = run.response.curves[number]
+        first = {"load": curve.load, **({} if curve.mass is None else {"mass": curve.mass})}
+        rows += _worst_rows(run, first, used, upper_end(run, number))
     tables = {"modes/fatigue": pd.DataFrame(rows)}
     number = run.response.best_curve
     rows = []
     blades = []
     for response, uses in known_wheel_use(run):
         for use in uses:
-            bound = highest_wheel_use(run, number, use.used, use.blade.worst.mesh_error)
+            bound = upper_wheel_end(run, number, use.blade.worst.mesh_error)
             first = {"load": response.load, "blade": use.blade.blade + 1}
             if use is uses[0]:
                 rows += _worst_rows(run, first, use.used, bound)
@@ -78,7 +81,7 @@ def utilisation_table(run: SolvedRun) -> dict[str, pd.DataFrame]:
                         "peak_frequency": use.blade.frequency,
                         "alternating_stress": use.blade.worst.largest,
                         "utilisation": use.highest,
-                        "utilisation_bound": bound,
+                        "utilisation_bound": bound * use.highest,
                     }
                 )
     if rows:
@@ -92,18 +95,17 @@ def _worst_rows(
     run: SolvedRun,
     first: dict[str, float],
     used: Utilisation,
-    highest: float,
+    bound: float,
 ) -> list[dict[str, float]]:
     """One row a place.
 
     Args:
         first: columns that all rows share.
-        highest: utilisation of the worst place with the upper ends of its errors.
+        bound: upper ends of the errors over the utilisation [1].
     """
     diagram = haigh_diagram(run.scene.fatigue)
     # the utilisation is known only with a diagram
     assert diagram is not None
-    bound = highest / max(used.used[used.worst], 1e-300)
     allowed = diagram.allowed(used.mean)
     return [
         {
@@ -181,7 +183,7 @@ def save_fatigue_vtu(run: SolvedRun, file: Path) -> None:
         return
     fields = {"mean stress [Pa]": run.strength.mean}
     for number, used in found.items():
-        load = newtons(run.response.curves[number].load)
+        load = load_of(run.response.curves[number])
         fields[f"alternating stress, {load} [Pa]"] = _on_mesh(run.mesh, used.alternating)
         fields[f"utilisation, {load} [1]"] = _on_mesh(run.mesh, used.used)
     for response, (worst, *_) in known_wheel_use(run):

@@ -62,8 +62,8 @@ SECTION_OF = {
     "forced_response": "response",
     "resonances": "response",
 }
-# entries of the page whose files have the name of another figure
-ENTRY_OF = {"forced_response": "forced_response_linear"}
+# entries of the page whose files have the name of another figure or table
+ENTRY_OF = {"forced_response": "forced_response_linear", "stresses": "stresses_of_modes"}
 # lowest engine orders, which a Campbell diagram has whatever the scene's own order is
 LOWEST_ORDERS = 5
 # pictures and files that take longest, by their names

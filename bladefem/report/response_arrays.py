@@ -123,7 +123,7 @@ def _flag(verdict: str, kind: str) -> str:
 
 
 def _for_each_mass(points: pd.DataFrame) -> pd.DataFrame:
-    """The linear limits do not know the damper's mass: they are repeated for each."""
+    """Without damper there is no mass: that response is repeated for each."""
     masses = points["mass"].dropna().unique()
     limits = points[points["mass"].isna()]
     return pd.concat(
@@ -150,7 +150,8 @@ def resonance_arrays(curves: Sequence[Curve], limits: Sequence[Limit] = ()) -> x
         probe = np.full(most + 1, np.nan + 0j)
         # the highest point of all may be that of another mode
         probe[1] = limit.first[np.argmin(abs(limit.frequency - limit.peak_frequency))]
-        parts += [_one_resonance(limit.load, m, limit.peak_frequency, probe) for m in masses]
+        own = masses if limit.mass is None else [limit.mass]
+        parts += [_one_resonance(limit.load, m, limit.peak_frequency, probe) for m in own]
     data = xr.combine_by_coords(parts)
     data["motion"].attrs |= {"units": "m", "long_name": "complex amplitude at the probe"}
     data["frequency"].attrs |= {"units": "Hz", "long_name": "frequency of the motion"}

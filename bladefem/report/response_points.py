@@ -84,9 +84,11 @@ def _with_marched(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:
 
 def linear_points(limit: Limit) -> pd.DataFrame:
     """One row a point of a linear limit, with the columns of :func:`points_of`."""
+    mass = {} if limit.mass is None else {"mass": limit.mass}
     return pd.DataFrame(
         {
             "load": limit.load,
+            **mass,
             "frequency": limit.frequency,
             "amplitude": abs(limit.first),
             "phase": np.angle(limit.first),

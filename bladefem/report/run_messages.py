@@ -10,6 +10,7 @@ from ..contact.state_table import quasi_static
 from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.coriolis import CORIOLIS_SHARE, has_coriolis
 from ..study.pipeline.curve import load_of
+from ..study.pipeline.linear_limits import full_stick
 from ..study.pipeline.run_records import SolvedRun
 from ..study.pipeline.state_check import state_sentence
 from ..util.message import method, warning
@@ -98,7 +99,6 @@ def _states(result: SolvedRun) -> str:
 
 def beyond_stick(result: SolvedRun) -> list[str]:
     """Why resonances lie above that of full stick, where the static load leaves points open."""
-    stuck = result.response.limits[1].peak_frequency
     opened = {
         load
         for load, maps in result.contact.maps.items()
@@ -107,7 +107,9 @@ def beyond_stick(result: SolvedRun) -> list[str]:
     above = [
         load_of(curve)
         for curve in result.response.curves
-        if curve.load in opened and curve.peak_frequency > (1 + SAME_FREQUENCY) * stuck
+        if curve.load in opened
+        and curve.peak_frequency
+        > (1 + SAME_FREQUENCY) * full_stick(result.response.limits, curve.mass).peak_frequency
     ]
     if not above:
         return []

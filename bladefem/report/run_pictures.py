@@ -75,11 +75,18 @@ def live_figures(
             named=_names_optimum(tables),
         ),
         "response/hysteresis": live_loops(seat_loops(cycles)),
-        "modes/frequencies_by_nodal_diameter": live_diameters(tables["modes/nodal_diameters"]),
+        **_live_frequencies(tables["modes/nodal_diameters"]),
         **({} if shapes is None else {"modes/first_modes": shapes}),
         **({} if motions is None else {MOTION_FIGURE: motions}),
         **_live_wheel(result),
     }
+
+
+def _live_frequencies(table: pd.DataFrame) -> dict[str, Any]:
+    """Over the nodal diameters of a wheel."""
+    if "nodal_diameter" not in table:
+        return {}
+    return {"modes/frequencies_by_nodal_diameter": live_diameters(table)}
 
 
 def _names_optimum(tables: dict[str, pd.DataFrame]) -> bool:

@@ -58,7 +58,7 @@ def _study_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
     return {
         "mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
         "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
-        "modes/nodal_diameters": mode_table(result.modes, result.mesh, result.clamped),
+        "modes/nodal_diameters": _frequencies(result),
         "modes/stresses": _stresses(result.strength),
         **utilisation_table(result),
         "contact/pressure": pressure_table(result.contact.maps),
@@ -71,6 +71,13 @@ def _study_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
             [*map(points_of, curves), *map(linear_points, result.response.limits)]
         ),
     }
+
+
+def _frequencies(result: SolvedRun) -> pd.DataFrame:
+    """Natural frequencies; a single blade has no nodal diameters."""
+    table = mode_table(result.modes, result.mesh, result.clamped)
+    single = excited_set(result).nodal_diameter is None
+    return table.drop(columns="nodal_diameter") if single else table
 
 
 def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:

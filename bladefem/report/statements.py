@@ -17,7 +17,7 @@ from ..scene.units import newtons
 from ..util.counted import counted
 from ..view.optimum import at_band_end
 from ..view.response import FOLLOWED, MARCHED
-from .best_load import certainty, flat_range, lowest_resonance
+from .best_load import certainty, flat_range, lowest_resonance, of_same_damper
 from .response_points import LINEAR
 
 # of the resonance frequency: farther off, an engine order does not drive it
@@ -103,7 +103,7 @@ def _optimum_numbers(
         (
             "resonance frequency there",
             f"{best['peak_frequency']:.5g} Hz",
-            linear_limits_text(summary),
+            linear_limits_text(of_same_damper(summary, best)),
         ),
     ]
     if np.isfinite(best.get("friction_damping", np.nan)):

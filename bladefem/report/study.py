@@ -214,8 +214,10 @@ def study_tables(variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFram
     for variant in variants:
         rows = pd.DataFrame(design_table(variant.response.curves, variant.response.limits))
         rows.insert(0, "value", variant.text)
-        rows["given_by"] = [LINEAR, *map(given_by, variant.response.curves), LINEAR]
-        damped = rows.iloc[1:-1]
+        curves = variant.response.curves
+        linear = [LINEAR] * (len(rows) - 1 - len(curves))
+        rows["given_by"] = [LINEAR, *map(given_by, curves), *linear]
+        damped = rows.iloc[1 : 1 + len(curves)]
         best.append(
             {
                 "value": variant.text,

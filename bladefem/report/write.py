@@ -9,9 +9,10 @@ import mimetypes
 import os
 import re
 import struct
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from importlib import resources
 from itertools import count
 from pathlib import Path
@@ -22,6 +23,7 @@ import pandas as pd
 from bladefem.errors import InputError
 from bladefem.io.run_folder import given_fields
 from bladefem.io.stage_cache import library_versions, open_folder, write_text
+from bladefem.scene.fields import value_at
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import Row, dump_scene, resolved_rows
@@ -172,8 +174,9 @@ def page_contents(
         (name for known in LEAD_FIGURES for name in figures if name.startswith(known)), None
     )
     numbers = count(1)
+    caption = partial(caption_of, of_wheel=_has_wheel(scene))
     parts = {
-        "lead": None if lead is None else _figure(lead, figures[lead], numbers, keys),
+        "lead": None if lead is None else _figure(lead, figures[lead], numbers, keys, caption),
         "title": scene.title,
         "subject": page.subject or scene.kind,
         "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
@@ -195,8 +198,14 @@ def page_contents(
         **_answer(scene, tables, page),
     }
     rest = {name: file for name, file in figures.items() if name != lead}
-    parts["sections"] = _sections(parts, shown, rest, numbers, keys)
+    parts["sections"] = _sections(parts, shown, rest, numbers, keys, caption)
     return parts
+
+
+def _has_wheel(scene: Scene) -> bool:
+    """The scene's blade is a sector of a wheel."""
+    sectors = kind_named(scene.kind).sectors
+    return sectors is not None and value_at(scene, sectors) > 0
 
 
 def _typeset(sentence: str) -> str:
@@ -249,8 +258,13 @@ def _sections(
     figures: Mapping[str, str | Path],
     numbers: Iterator[int],
     keys: Mapping[str, str],
+    caption: Callable[[str], str],
 ) -> list[dict[str, Any]]:
-    """Sections that have something to say, with numbered figures and tables."""
+    """Sections that have something to say, with numbered figures and tables.
+
+    Args:
+        caption: of "section/name".
+    """
     table_numbers = count(1)
     extra = {
         "answer": any(
@@ -267,12 +281,12 @@ def _sections(
             "key": key,
             "title": title,
             "figures": [
-                _figure(name, file, numbers, keys)
+                _figure(name, file, numbers, keys, caption)
                 for name, file in figures.items()
                 if name.split("/")[0] == key
             ],
             "tables": [
-                page_table(part, piece, next(table_numbers))
+                page_table(part, piece, next(table_numbers), caption)
                 for name, table in tables.items()
                 if name.split("/")[0] == key
                 for part, piece in page_tables(name, table)
@@ -288,10 +302,11 @@ def _figure(
     file: str | Path,
     numbers: Iterator[int],
     keys: Mapping[str, str],
+    caption: Callable[[str], str],
 ) -> dict[str, Any]:
     return {
         "number": next(numbers),
-        "caption": caption_of(name),
+        "caption": caption(name),
         "file": Path(file),
         "live": keys.get(name),
         "broad": name not in keys and _width_over_height(Path(file)) > BROAD_PICTURE,
@@ -311,12 +326,13 @@ def page_table(
     name: str,
     table: pd.DataFrame,
     number: int,
+    caption: Callable[[str], str],
 ) -> dict[str, Any]:
     """A table as text, cut to the longest that a page should hold."""
     text = readable_texts(table.head(MAX_PAGE_ROWS))
     return {
         "number": number,
-        "caption": caption_of(name),
+        "caption": caption(name),
         "frame": table.head(MAX_PAGE_ROWS),
         "head": list(text.columns),
         "right": numeric_columns(text),

@@ -21,8 +21,8 @@ def has_flow(scene: Scene) -> bool:
 
 
 def wave_influence(scene: Scene, count: int) -> ComplexArray:
-    """(N,) relative frequency shift + i damping of waves of 0..N-1 nodal diameters, those beyond
-    N/2 running backwards.
+    """(N,) relative frequency shift + i damping of waves of 0..N-1 nodal diameters d, whose blade s
+    moves by e^{j 2 pi d s / N}: against the rotation up to N/2, with it beyond.
 
     Raises:
         InputError: an entry cannot be read, or does not fit the wheel.

@@ -372,7 +372,8 @@ class Aerodynamics:
     waves: tuple[str, ...] | None = quantity(
         None,
         help="damping and frequency shift of waves, texts like '-5: -0.12 %; 0.05 %' (nodal "
-        "diameter, backward ones negative); linear between those given",
+        "diameter: positive ones run against the rotation, as engine orders up to half the number "
+        "of blades do, negative ones with it); linear between those given",
     )
     influence: tuple[str, ...] | None = quantity(
         None,

@@ -64,8 +64,8 @@ class Utilisation:
         """Nodes that are used most, each the worst of its surroundings."""
         apart = SAME_PLACE * float(np.ptp(self.points, axis=0).max())
         found: list[int] = []
-        for node in np.argsort(-np.nan_to_num(self.used, nan=-1.0)):
-            if len(found) == count or not np.isfinite(self.used[node]):
+        for node in np.argsort(-np.nan_to_num(self.used, nan=-1.0), kind="stable"):
+            if len(found) == count or np.isnan(self.used[node]):
                 break
             away = np.linalg.norm(self.points[found] - self.points[node], axis=1)
             if away.min(initial=np.inf) > apart:

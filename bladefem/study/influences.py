@@ -148,7 +148,9 @@ def seat_friction_range(mu: float, angles: tuple[float, float]) -> tuple[float, 
     which is F / (2 (sin a +- mu cos a)) for equal angles.
 
     Returns:
-        The least and the largest of both seats; None for a self-locking wedge.
+        The least and the largest of both seats; None for a self-locking wedge, and for unequal
+        angles where friction of one way is in balance only with a seat that pulls: there the
+        damper turns, and neither seat has a load by these formulas.
     """
     turn = float(np.arctan(mu))
     if sum(angles) <= 2 * turn:
@@ -158,6 +160,8 @@ def seat_friction_range(mu: float, angles: tuple[float, float]) -> tuple[float, 
         for side in (0, 1)
         for way in (turn, -turn)
     ]
+    if not min(ratios) > 0:
+        return None
     return float(min(ratios)), float(max(ratios))
 
 

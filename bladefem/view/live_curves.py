@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..scene.units import newtons
 from ..util.percent import percent
-from .optimum import exact_optimum
+from .optimum import exact_optimum, limit_name
 from .response import FOLLOWED, MARCHED, load_colours, load_name, pieces_of, smooth_curve
 from .style import COLOURS, FAILED_COLOUR, MICRO
 
@@ -295,10 +295,9 @@ def _level_lines(summary: pd.DataFrame) -> list[dict[str, Any]]:
     # the two often lie close together: their names are at both ends
     places = dict(zip(DASHES, ("start", "end"), strict=True))
     for load, dash in DASHES.items():
-        row = summary[summary["load"] == load]
-        if len(row):
-            value = MICRO * float(row["peak_amplitude"].iloc[0])
-            lines.append(_level_line("y", value, dash, load_name(load), places[load]))
+        for _, row in summary[summary["load"] == load].iterrows():
+            value = MICRO * float(row["peak_amplitude"])
+            lines.append(_level_line("y", value, dash, limit_name(row), places[load]))
     return lines
 
 

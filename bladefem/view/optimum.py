@@ -265,13 +265,18 @@ def _draw_hollow(
 def draw_limits(axes: Any, summary: pd.DataFrame) -> None:
     """The free and the fully stuck blade as level lines, when the table has them."""
     for load, style in ((0.0, "--"), (np.inf, "-.")):
-        row = summary[summary["load"] == load]
-        if len(row):
+        for _, row in summary[summary["load"] == load].iterrows():
             axes[0].axhline(
-                MICRO * row["peak_amplitude"].iloc[0],
+                MICRO * row["peak_amplitude"],
                 color="#555555",
                 ls=style,
                 lw=1,
-                label=load_name(load),
+                label=limit_name(row),
             )
-            axes[1].axhline(row["peak_frequency"].iloc[0], color="#555555", ls=style, lw=1)
+            axes[1].axhline(row["peak_frequency"], color="#555555", ls=style, lw=1)
+
+
+def limit_name(row: pd.Series) -> str:
+    """ "∞ (full stick)", with the damper's mass where several are studied."""
+    mass = row.get("mass", np.nan)
+    return load_name(row["load"]) + ("" if np.isnan(mass) else f", {1e3 * mass:.4g} g")

@@ -163,7 +163,7 @@ def draw_waves(
     """Damping of the waves of a wheel in a flow.
 
     Args:
-        diameters: (N,) ascending, backward ones negative.
+        diameters: (N,) ascending, negative ones run with the rotation.
         net: (N,) share of critical damping of blade and flow, without dampers.
         blade: the same of the blade alone.
         excited: nodal diameter of the engine order.
@@ -184,7 +184,7 @@ def draw_waves(
                 ends = dict.fromkeys(f"{100 * end:.3g}" for end in (min(friction), max(friction)))
                 label += f"; friction damps a wave by up to {' to '.join(ends)} %"
             ax.plot([], [], "s", color=COLOURS[1], label=label)
-        ax.set_xlabel("nodal diameter, negative: backward")
+        ax.set_xlabel("nodal diameter; negative: with the rotation")
         ax.set_ylabel("damping without dampers [%]")
         ax.set_title("Damping of the waves in the flow")
         ax.legend(loc="best")

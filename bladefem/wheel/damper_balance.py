@@ -25,6 +25,9 @@ MAX_NEWTON_STEPS = 40
 RESIDUAL_TOLERANCE = 1e-7
 # halvings of a step
 MAX_HALVINGS = 8
+# of the largest motion imposed on a pair: a smaller one is rounding, of two blades that move alike,
+# and residuals are measured by this share of it
+NEGLIGIBLE_MOTION = 1e-9
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,7 @@ class DamperMotion:
     # (B, m, H) complex displacements [m] and forces [N]
     displacement: ComplexArray
     force: ComplexArray
-    # (B,) residual over the size of what is imposed
+    # (B,) residual over the size of what is imposed, at least NEGLIGIBLE_MOTION of the largest
     residual: RealArray
 
     @property
@@ -92,6 +95,7 @@ def solve_damper(
     H = len(family.flexibility)
     maps = [_real_map(G) for G in family.flexibility]
     scale = np.linalg.norm(imposed, axis=1)
+    scale = np.maximum(scale, max(NEGLIGIBLE_MOTION * scale.max(), np.finfo(float).tiny))
     first = with_harmonics(imposed[:, :, None], H)
     w = start.copy()
     force, change = _contact(wheel, e, w, samples)

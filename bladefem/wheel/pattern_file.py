@@ -17,6 +17,9 @@ FREQUENCY = "frequency"
 STIFFNESS = "stiffness"
 MASS = "mass"
 QUANTITIES = (FREQUENCY, STIFFNESS, MASS)
+# words of the name of a first column that numbers the blades
+NUMBERING = ({"blade"}, {"blade", "no"}, {"blade", "nr"}, {"blade", "number"})
+PERCENT = 0.01
 
 
 @dataclass(frozen=True)
@@ -91,11 +94,11 @@ def read_deviations(path: str | Path, count: int, families: int) -> BladeDeviati
 def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     """Names and relative deviations (N, columns) of a CSV file.
 
-    The first row names the columns, each further row is a blade; a first column "blade" numbers
-    them. "#" starts a comment.
+    The first row names the columns, those in per cent with "%" in the name; each further row is a
+    blade; a first column "blade" or "blade no." numbers them. "#" starts a comment.
 
     Raises:
-        InputError: the file is missing, not numbers, or has another number of blades.
+        InputError: the file is missing, not numbers, or has another number of blades or unit.
     """
     path = Path(path)
     if not path.is_file():
@@ -107,7 +110,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
         raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")
     names = cells[0]
     values = _read_numbers(path, cells[1:], len(names))
-    if names[0].lower() == "blade":
+    if set(re.findall("[a-z]+", names[0].lower())) in NUMBERING:
         _check_order(path, values[:, 0])
         names = names[1:]
         values = values[:, 1:]
@@ -117,7 +120,24 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
         )
     if not names:
         raise InputError(f"pattern file {path.name}: expected a column of deviations")
-    return names, values
+    return names, values * [_unit(path, name) for name in names]
+
+
+def _unit(path: Path, name: str) -> float:
+    """What the numbers of a column count by its name: "1F [%]" hundredths; 1 without a unit.
+
+    Raises:
+        InputError: a relative deviation has no such unit.
+    """
+    if "%" in name:
+        return PERCENT
+    found = re.search(r"\[(.*?)\]", name)
+    if found is not None and found[1].strip() not in ("", "1"):
+        raise InputError(
+            f"pattern file {path.name}: column '{name}', expected relative deviations, without a "
+            "unit or in %"
+        )
+    return 1.0
 
 
 def _quantity(name: str) -> str:

@@ -73,6 +73,7 @@ def fake_limit(load, frequency):
         error=0.002,
         halved=np.nan,
         body_mesh=0.001,
+        mass=None,
     )
 
 

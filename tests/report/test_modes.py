@@ -101,6 +101,16 @@ def test_a_linear_response_has_captions_of_its_own(folder):
     assert "scaled to a largest displacement of 1 mm" in page
 
 
+def test_captions_of_a_single_blade_speak_of_no_wheel(folder):
+    """Pictures and tables of a plane blade: it has no sector, and no wave turns on it."""
+    lines = (folder / "report_modes.md").read_text().splitlines()
+    captions = [line for line in lines if line.startswith(("Figure ", "Table "))]
+    assert len(captions) > 10
+    for caption in captions:
+        for word in ("nodal diameter", "wheel", "sector", "wave"):
+            assert word not in caption.lower(), caption
+
+
 def test_the_terminal_tells_resonances_without_a_maximum():
     table = pd.DataFrame(
         {

@@ -142,6 +142,7 @@ def test_a_limit_has_the_motion_of_its_resonance():
         frequency=np.array([300.0, 310.0, 900.0]),
         first=np.array([1e-6, 5e-6, 9e-6j]),
         peak_frequency=309.0,
+        mass=None,
     )
     found = resonance_arrays(curves(), [limit])
     assert complex(found["motion"].sel(load=0.0, harmonic=1)) == 5e-6

@@ -15,9 +15,11 @@ from bladefem.data import ModeSet
 from bladefem.report.captions import caption_of
 from bladefem.report.chart import write_chart
 from bladefem.report.modes import _numbers
+from bladefem.report.run_tables import _stresses
 from bladefem.report.write import LEAD_FIGURES
 from bladefem.scene.tables import Scene
 from bladefem.study.chart.chart import Chart
+from bladefem.study.modes.stress import Strength
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 
@@ -58,6 +60,19 @@ def test_frequencies_say_whether_the_mesh_was_studied(studied):
     assert first.uncertainty == ("± 0.4 % (mesh)" if studied else "mesh error not studied")
     if studied:
         assert second.uncertainty == "± 3 % (mesh)"
+
+
+def test_stresses_of_a_run_are_those_of_its_table():
+    """A run has the mode studied alone, for 1 mm at the probe, at Gauss points; the modes' page
+    has several states, for a largest displacement.
+    """
+    found = Strength(2, 1e9, np.zeros(3), 2e8, np.zeros(3), np.zeros(1), 0.0)
+    table = _stresses(found)
+    assert table["state"].tolist() == ["rotation", "mode 2, 1 mm at the probe"]
+    for of_wheel in (True, False):
+        caption = caption_of("modes/stresses", of_wheel)
+        assert "1 mm at the probe" in caption and "largest displacement" not in caption
+        assert "largest displacement of 1 mm" in caption_of("modes/stresses_of_modes", of_wheel)
 
 
 def test_captions_are_sentences():

@@ -137,6 +137,23 @@ def test_answer_names_the_optimum():
     assert found.cautions == []
 
 
+@pytest.mark.parametrize("error", [np.nan, 0.01, 0.5])
+def test_no_load_is_best_that_is_worse_than_no_damper(error):
+    """90 um with the best load, 80 without damper and 70 in full stick: whatever the error is."""
+    table = pd.DataFrame(
+        {
+            "load": [0.0, 10.0, 20.0, 40.0, np.inf],
+            "peak_frequency": [1000.0, 1010.0, 1020.0, 1030.0, 1040.0],
+            "peak_amplitude": [8e-5, 9.5e-5, 9e-5, 9.2e-5, 7e-5],
+            "error": error,
+        }
+    )
+    optimum, lowest = response_answer(table).numbers
+    assert optimum[1] == "not determined"
+    assert optimum[2] == "it lies 29 % above the better of the free and the stuck blade"
+    assert lowest[1] == "90 µm"
+
+
 def test_answer_says_which_mass_would_press_best():
     """Without an exact search the best of the loads studied is named as that, no parabola."""
     summary = pd.DataFrame(
@@ -504,7 +521,7 @@ def test_what_is_not_determined_has_no_bracket():
 def test_resonances_above_full_stick_are_explained_by_open_contacts_alone(force, frequency, said):
     """By the rounding of a search, or with all points pressed, there is nothing to explain."""
     curve = SimpleNamespace(load=80.0, mass=None, peak_frequency=frequency)
-    limit = SimpleNamespace(peak_frequency=100.0)
+    limit = SimpleNamespace(peak_frequency=100.0, mass=None)
     result = SimpleNamespace(
         response=SimpleNamespace(curves=[curve], limits=(limit, limit)),
         contact=SimpleNamespace(maps={80.0: (SimpleNamespace(force=np.array([2.0, force])),)}),

@@ -16,6 +16,7 @@ def linear_limits():
             error=0.002,
             halved=np.nan,
             body_mesh=0.001,
+            mass=None,
         )
         for load in (0.0, np.inf)
     ]

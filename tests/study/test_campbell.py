@@ -8,6 +8,7 @@ from bladefem.errors import InputError
 from bladefem.fem.constraint import constrain
 from bladefem.fem.gyroscopic import coupling, waves
 from bladefem.fem.modes import modes
+from bladefem.hbm.linear_resonances import wave_frequencies
 from bladefem.study.modes.campbell import campbell_table, campbell_tables, read_speeds
 
 
@@ -41,16 +42,29 @@ def test_orders_cross_the_wave_that_they_excite(wheel):
     found = campbell_tables(wheel, np.linspace(0, 12000, 7), [2, 3, 4], count=2)
     assert set(found.table["nodal_diameter"]) == {2, 3}
     assert 2500.0 in set(found.table["speed"])
-    for order, column in ((2, "backward"), (4, "forward")):
+    for order, n, column in ((2, 2, "backward"), (4, 2, "forward"), (3, 3, "forward")):
         for _, row in found.crossings[found.crossings["engine_order"] == order].iterrows():
             assert row["frequency"] == pytest.approx(order * row["speed"] / (2 * np.pi))
             line = found.table[
-                (found.table["nodal_diameter"] == 2) & (found.table["mode"] == row["mode"])
+                (found.table["nodal_diameter"] == n) & (found.table["mode"] == row["mode"])
             ]
             squares = np.interp(row["speed"] ** 2, line["speed"] ** 2, line[column] ** 2)
             assert row["frequency"] == pytest.approx(np.sqrt(squares), rel=1e-9)
     assert len(found.crossings) and list(found.margins["engine_order"]) == [2, 3, 4]
     assert len(found.interference) == 6
+
+
+def test_standing_waves_have_coriolis_forces(wheel):
+    """Nodal diameter N/2 of 6 blades at one speed, by the equation of its waves in 20 modes."""
+    found = campbell_tables(wheel, [0.0, 1000.0, 2500.0], [3], count=2)
+    exact = modes(constrain(wheel.blade_at(2500.0), "clamp", 3), 20)
+    moved = wave_frequencies(2 * np.pi * exact.frequencies, 2500.0 * coupling(wheel.blade, exact))
+    expected = moved[:2] / (2 * np.pi)
+    shift = abs(expected / exact.frequencies[:2] - 1)
+    assert shift.max() > 1e-4
+    for table in (found.interference, found.margins):
+        off = [abs(f / expected - 1).min() for f in table["frequency"]]
+        assert max(off) < 0.1 * shift.max()
 
 
 @pytest.mark.parametrize(

@@ -11,6 +11,8 @@ from pylife.strength.meanstress import HaighDiagram as FkmDiagram
 
 from bladefem.errors import InputError
 from bladefem.fem.stress import signed_von_mises, von_mises
+from bladefem.report import fatigue
+from bladefem.report.fatigue import save_fatigue_vtu, utilisation_table
 from bladefem.report.wheel import use_sentences
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
@@ -90,6 +92,35 @@ def test_worst_places_are_apart():
     assert apart.min() > 0.01 * count - 1
 
 
+def test_places_where_nothing_lasts_come_first():
+    """A diagram that is zero from 400 MPa on: the table was empty as soon as a node was there."""
+    table = ("-400 MPa: 300 MPa", "0 MPa: 300 MPa", "400 MPa: 0 MPa", "800 MPa: 0 MPa")
+    scene = vary(Scene(), fatigue__haigh=list(table))
+    run = run_of(scene, 600 * MPA)
+    (rows,) = utilisation_table(run).values()
+    assert rows["x"].tolist() == [0.0, 0.5]
+    assert rows["utilisation"].tolist() == [np.inf, pytest.approx(0.1)]
+    assert rows["utilisation_bound"].tolist() == [np.inf, pytest.approx(0.1 * 1.2 * 1.1)]
+
+
+def test_utilisation_of_two_masses_under_one_load(monkeypatch):
+    """Rows and fields tell the masses apart; of two fields of one name the first was lost."""
+    scene = vary(Scene(), fatigue__endurance="300 MPa", fatigue__ultimate="900 MPa")
+    run = run_of(scene, 300 * MPA)
+    (curve,) = run.response.curves
+    run.response.curves = [
+        SimpleNamespace(**{**vars(curve), "mass": mass}) for mass in (0.005, 0.05)
+    ]
+    run.damped[1] = SimpleNamespace(field=2 * run.damped[0].field, mesh_error=0.1)
+    (rows,) = utilisation_table(run).values()
+    assert rows.groupby("mass")["utilisation"].max().tolist() == pytest.approx([0.3, 0.6])
+    saved = {}
+    monkeypatch.setattr(fatigue, "save_vtu", lambda mesh, file, fields: saved.update(fields))
+    save_fatigue_vtu(run, None)
+    names = [f"utilisation, 80 N of {mass} g [1]" for mass in (5, 50)]
+    assert [saved[name].max() for name in names] == pytest.approx([0.3, 0.6])
+
+
 def test_mean_stress_outside_of_the_diagram_names_the_place():
     diagram = haigh_diagram(Fatigue(haigh=("0 MPa: 300 MPa", "400 MPa: 180 MPa")))
     with pytest.raises(InputError, match=r"450 MPa at \(1000.0, 0.0, 0.0\) mm.*0 Pa to 400 MPa"):
@@ -122,6 +153,7 @@ def run_of(scene: Scene, mean: float) -> SimpleNamespace:
     damped = SimpleNamespace(field=np.array([60.0, 30.0, 900.0]) * MPA, mesh_error=0.1)
     curve = SimpleNamespace(
         load=80.0,
+        mass=None,
         peak_amplitude=1.0,
         balance_amplitude=1.0,
         over_balance=1.0,
@@ -134,6 +166,7 @@ def run_of(scene: Scene, mean: float) -> SimpleNamespace:
         strength=SimpleNamespace(mean=np.array([mean, 0.0, 0.0])),
         damped={0: damped},
         response=SimpleNamespace(curves=[curve], best_curve=0),
+        wheel=None,
     )
 
 

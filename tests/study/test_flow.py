@@ -6,6 +6,7 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 from mistuned import COARSE_MISTUNED, MISTUNED
 
@@ -17,6 +18,7 @@ from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_member
 from bladefem.study.mistuning.blade_stress import SolvedWheel, WheelShapes, all_modes, blade_motion
 from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, whole_wheel
+from bladefem.study.modes.campbell import _excited_waves as excited_waves
 from bladefem.study.pipeline import flutter as subject
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
@@ -29,7 +31,7 @@ from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
 from bladefem.wheel.model import frequency_pattern
 from bladefem.wheel.solve import solve_wheel
 
-# waves of ten nodal diameters backwards are fed, those of the engine order are damped
+# waves of ten nodal diameters that run with the rotation are fed, those of the engine order are damped
 INFLUENCE = ("0: 0.05 %; 90 deg", "1: 0.15 %; 20 deg", "-1: 0.12 %; 200 deg")
 COUNT = 36
 
@@ -81,6 +83,24 @@ def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced, finest):
     solved = SolvedWheel(shapes, wheel, pattern, case, found, settings.points)
     blade = blade_motion(solved, 5)
     assert blade.mismatch < 2e-3
+
+
+@pytest.mark.parametrize("order", [1, 5, 17, 18, 19, 31, 36, 40])
+def test_waves_are_called_as_in_campbell_diagrams(order):
+    """Blades are counted in the sense of the rotation: a wave whose crest comes to the next blade
+    later runs forward. The wave of an engine order has one name in flow and Campbell diagram.
+    """
+    diameters = subject.FlutterResult(*np.zeros((3, COUNT)), ()).diameters
+    wave = int(diameters[order % COUNT])
+    blades = np.arange(COUNT)
+    turn = 2 * np.pi * order * blades / COUNT
+    # delay of the crest at the next blade, in turns of the phase, between -1/2 and 1/2
+    delay = (-(turn[1] - turn[0]) / (2 * np.pi) + 0.5) % 1.0 - 0.5
+    sense = "standing" if 2 * order % COUNT == 0 else "forward" if delay > 0 else "backward"
+    assert subject.wave_words(wave, COUNT).endswith(sense)
+    table = pd.DataFrame({"frequency": [0.0], "forward": [1.0], "backward": [2.0]})
+    (excited,) = excited_waves(table, order, COUNT)["frequency"]
+    assert sense == "standing" or excited == {"forward": 1.0, "backward": 2.0}[sense]
 
 
 @pytest.mark.parametrize("coriolis", [False, True])

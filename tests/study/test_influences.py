@@ -157,6 +157,30 @@ def test_seat_friction_of_a_wedge():
     assert seat_friction_range(0.6, (np.radians(30), np.radians(30))) is None
 
 
+def reactions(mu, angles, way):
+    """Normal loads of both seats under a unit radial force, by the balance of forces: friction of
+    the same way on both, along each flank, and none without it.
+    """
+    first, second = angles
+    radial = [np.sin(a) + way * mu * np.cos(a) for a in (first, second)]
+    across = [np.cos(first) - way * mu * np.sin(first), way * mu * np.sin(second) - np.cos(second)]
+    return np.linalg.solve([radial, across], [1.0, 0.0])
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.3, 0.5])
+@pytest.mark.parametrize("degrees", [(65, 65), (70, 50), (75, 60), (70, 45)])
+def test_seat_friction_of_an_asymmetric_wedge(mu, degrees):
+    """No range where a seat would have to pull: its logarithm ended the run."""
+    angles = np.radians(degrees)
+    without = reactions(mu, angles, 0.0)
+    ratios = np.array([reactions(mu, angles, way) / without for way in (1.0, -1.0)])
+    found = seat_friction_range(mu, tuple(angles))
+    if (ratios > 0).all():
+        assert found == pytest.approx((ratios.min(), ratios.max()))
+    else:
+        assert found is None
+
+
 @pytest.mark.parametrize(
     "contact",
     [

@@ -13,6 +13,7 @@ from bladefem.errors import InputError
 from bladefem.hbm.model import Damping
 from bladefem.reduction.assemble import recombine_contact
 from bladefem.study.mistuning.law_level import changed_law
+from bladefem.wheel import damper_law as damper_law_module
 from bladefem.wheel.damper_balance import solve_damper, stuck_displacements
 from bladefem.wheel.damper_law import damper_law, law_harmonics, scaled_elements
 from bladefem.wheel.family import family_of_modes
@@ -72,6 +73,26 @@ def test_law_does_not_see_a_shift_of_time(made):
     np.testing.assert_allclose(
         law.forces(a * turn, b * turn)[0], turn * law.forces(a, b)[0], rtol=1e-9
     )
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_blades_that_move_alike_leave_their_damper_at_rest(made, monkeypatch):
+    """The damper of lumped blades feels their difference alone: exactly none of two alike, where
+    rounding leaves none. Such a pair was not solved, and had the mean of its neighbours.
+    """
+    wheel, family, law = made
+    exact = damper_law_module.pairs_of_motions(family)
+    alike = np.linalg.norm(exact, axis=1) < 1e-12 * np.linalg.norm(exact, axis=1).max()
+    assert np.count_nonzero(alike) == 1
+    exact[alike] = 0.0
+    monkeypatch.setattr(damper_law_module, "pairs_of_motions", lambda _: exact)
+    found = damper_law(wheel, family, SIZES, 64)
+    a = np.geomspace(*SIZES, 20) / np.sqrt(2) * np.exp(0.4j)
+    size = np.linalg.norm([a, a], axis=0)
+    stiff = 1e5 * np.linalg.norm(family.before) ** 2
+    assert abs(found.forces(a, a)[0] / size).max() < 1e-9 * stiff
+    one, other = amplitudes()
+    np.testing.assert_allclose(found.forces(one, other)[0], law.forces(one, other)[0], rtol=1e-6)
 
 
 def test_derivatives_are_those_of_the_splines(made):

@@ -10,7 +10,7 @@ from scipy import linalg, stats
 
 from bladefem.errors import InputError
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
-from bladefem.wheel.pattern_file import read_pattern
+from bladefem.wheel.pattern_file import read_deviations, read_pattern
 from bladefem.wheel.resonance import find_wheel_peak
 from bladefem.wheel.scatter import Scatter, drawn_patterns
 from bladefem.wheel.statistics import (
@@ -185,6 +185,32 @@ def test_draws_are_the_same_everywhere_and_cut_off():
     )
     mu = np.array([p.elements.mu for p in dampers])
     assert abs(mu.std() - 0.1) < 0.01 and (dampers[0].elements.n0 == 2.0).all()
+
+
+@pytest.mark.parametrize("head", ["blade", "Blade", "Blade No", "blade no.", "Blade number"])
+def test_numbers_of_blades_are_no_deviations(head, tmp_path):
+    """They counted as a family of 100, 200 and 300 % where two families were wanted."""
+    file = tmp_path / "pattern.csv"
+    file.write_text(f"{head}, 1F\n1, 0.001\n2, -0.002\n3, 0.003\n")
+    names, values = read_pattern(file, 3)
+    assert names == ["1F"] and values[:, 0].tolist() == [0.001, -0.002, 0.003]
+
+
+@pytest.mark.parametrize("head", ["1F [%]", "1F (%)", "1F, %"])
+def test_deviations_in_percent(head, tmp_path):
+    """0.4 % counted as 40 %."""
+    file = tmp_path / "pattern.csv"
+    rows = "0.4\n-0.2\n0.1\n" if "," not in head else "0.001, 0.4\n0.002, -0.2\n0.0, 0.1\n"
+    file.write_text(f"{head}\n{rows}")
+    found = read_deviations(file, 3, 2 if "," in head else 1).frequency[:, -1]
+    assert found == pytest.approx([0.004, -0.002, 0.001])
+
+
+def test_deviations_in_another_unit_are_refused(tmp_path):
+    file = tmp_path / "pattern.csv"
+    file.write_text("blade, 1F [Hz]\n1, 2.0\n2, -1.0\n3, 0.5\n")
+    with pytest.raises(InputError, match=r"column '1F \[Hz\]', expected relative deviations"):
+        read_pattern(file, 3)
 
 
 def test_pattern_files(tmp_path):

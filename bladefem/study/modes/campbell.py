@@ -286,13 +286,11 @@ def _excited_waves(
     """The table with the frequency of the wave that an order excites.
 
     A pattern at rest in space runs against the rotation for a rider on the wheel; orders
-    beyond half the number of blades are seen by the blades as a wave in the other sense.
+    beyond half the number of blades are seen by the blades as a wave in the other sense. Coriolis
+    forces move standing waves and single blades too, which have the same frequency in both columns.
     """
-    if not sectors or wave_sense(order, sectors) == "standing":
-        return table
-    return table.assign(
-        frequency=table["backward" if wave_sense(order, sectors) == "with" else "forward"]
-    )
+    backward = sectors and wave_sense(order, sectors) == "with"
+    return table.assign(frequency=table["backward" if backward else "forward"])
 
 
 def _order_interference(

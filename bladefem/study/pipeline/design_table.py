@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,18 +12,21 @@ from .curve import Curve
 from .linear_limits import Limit
 
 
-def design_table(curves: list[Curve], limits: tuple[Limit, Limit]) -> dict[str, np.ndarray]:
-    """The design table: one row a load, from no damper (load 0) to full stick (load inf)."""
-    free, stuck = (_linear_row(limit) for limit in limits)
-    rows = [free, *map(_row, curves), stuck]
+def design_table(curves: list[Curve], limits: Sequence[Limit]) -> dict[str, np.ndarray]:
+    """The design table: one row a load, from no damper (load 0) to full stick (load inf), of each
+    mass of the damper where several are studied.
+    """
+    free, *stuck = (_linear_row(limit) for limit in limits)
+    rows = [free, *map(_row, curves), *stuck]
     if any(c.interval is not None for c in curves):
-        ends = [limits[0].peak_amplitude, limits[1].peak_amplitude]
-        added = [_certain(ends[0]), *(_interval_row(c) for c in curves), _certain(ends[1])]
+        first, *last = (_certain(limit.peak_amplitude) for limit in limits)
+        added = [first, *(_interval_row(c) for c in curves), *last]
         rows = [row | more for row, more in zip(rows, added, strict=True)]
         free = rows[0]
     table = {name: np.array([row[name] for row in rows]) for name in free}
     if any(c.mass is not None for c in curves):
-        table["mass"] = np.array([np.nan, *(c.mass for c in curves), np.nan])
+        masses = [None, *(c.mass for c in curves), *(limit.mass for limit in limits[1:])]
+        table["mass"] = np.array([np.nan if mass is None else mass for mass in masses])
     table["reduction"] = free["peak_amplitude"] / table["peak_amplitude"]
     return table
 

@@ -121,7 +121,7 @@ def flowing_modes(
     Args:
         damping: (m,) or (m, m) without the flow [1/s].
         ratio: share of critical damping that is in it.
-        diameter: of the wave, backward ones negative or beyond N/2.
+        diameter: of the wave; those that run with the rotation negative or beyond N/2.
         number: of the family's mode among them.
     """
     if flow is None:

@@ -59,7 +59,7 @@ class HeldFlutter:
     # [N], and of the damper [kg]
     load: float
     mass: float | None
-    # nodal diameter, backward ones negative
+    # nodal diameter, see `FlutterResult.diameters`
     wave: int
     # limit cycle at the probe [m] and where [Hz]
     amplitude: float
@@ -83,7 +83,9 @@ class FlutterResult:
 
     @property
     def diameters(self) -> IntegerArray:
-        """(N,) nodal diameters; negative ones run backwards."""
+        """(N,) nodal diameters. Positive ones run as engine orders up to half the number of blades
+        do, against the rotation; negative ones run with it.
+        """
         d = np.arange(len(self.net_damping))
         return np.where(2 * d <= len(d), d, d - len(d))
 
@@ -217,7 +219,7 @@ def _flutter_sector(
     keep: StageRunner,
 ) -> Reduced:
     """The sector in the nodal diameters of all fed waves and of the engine order."""
-    # of the sector: backward waves are those of the forward ones, mirrored
+    # of the sector: negative waves are the positive ones, mirrored
     wanted = sorted({0, flow.own, *(abs(wave) for wave in found.fed)})
     modes = run.settings.modes
     sector = keep(
@@ -424,12 +426,13 @@ def growing_words(one: HeldFlutter) -> str:
 
 
 def wave_words(wave: int, sectors: int) -> str:
-    """A wave's nodal diameters, and its direction where it does not stand, in words.
+    """A wave's nodal diameters, and its direction on the wheel where it does not stand, in words:
+    forward with the rotation, as in Campbell diagrams.
 
     >>> wave_words(-2, 36), wave_words(1, 36), wave_words(18, 36)
-    ('2 nodal diameters, backward', '1 nodal diameter, forward', '18 nodal diameters, standing')
+    ('2 nodal diameters, forward', '1 nodal diameter, backward', '18 nodal diameters, standing')
     """
-    way = "backward" if wave < 0 else "forward"
+    way = "forward" if wave < 0 else "backward"
     if 2 * wave % sectors == 0:
         way = "standing"
     return f"{counted(abs(wave), 'nodal diameter')}, {way}"

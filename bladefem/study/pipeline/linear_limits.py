@@ -4,7 +4,7 @@ slips.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -57,12 +57,21 @@ class Limit:
     balance: float = np.nan
     halved: float = np.nan
     body_mesh: float = np.nan
+    # of the damper that sticks [kg], where several masses are studied; None without damper
+    mass: float | None = None
 
     @property
     def error(self) -> float:
         """Estimated relative error of the peak amplitude; NaN where nothing was estimated."""
         parts = [self.balance, self.halved, self.body_mesh]
         return float(np.nansum(parts)) if np.isfinite(parts).any() else np.nan
+
+
+def full_stick(limits: Sequence[Limit], mass: float | None) -> Limit:
+    """The limit of the damper of a mass [kg], None where one is studied, among those of a
+    response.
+    """
+    return next(limit for limit in limits[1:] if limit.mass == mass)
 
 
 def judged_limits(

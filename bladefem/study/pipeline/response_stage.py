@@ -29,7 +29,7 @@ from .changed_cases import cases_of, changed_cases
 from .curve import Curve, load_of
 from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
-from .linear_limits import judged_limits
+from .linear_limits import Limit, judged_limits
 from .loads import Search, best_curve, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
@@ -186,10 +186,8 @@ def _load_responses(
             searches,
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
+        limits = _limits_of_masses(scene, cases, family, settings, softer, band)
         models = family(cases[-1])
-        soft = None if softer is None else softer.family(cases[-1])
-        mode, open_points = scene.excitation.mode, not scene.contact.points
-        limits = judged_limits(models, settings, soft, mode, band, open_points)
     best = (*best, *found)
     clock.messages.extend(best_load_remarks(scene, best))
     nodes = -(-len(cases[0].elements.kt) // 2)
@@ -204,6 +202,25 @@ def _load_responses(
     clock.messages.extend(response_remarks(scene, settings, curves, nodes, judged))
     clock.messages.extend(_class_remarks(curves, others, judged))
     return Response(settings, curves, limits, best, others=others), cases
+
+
+def _limits_of_masses(
+    scene: Scene,
+    cases: Sequence[LoadCase],
+    family: Callable[[LoadCase], Family],
+    settings: Settings,
+    softer: SofterBody | None,
+    band: tuple[float, float],
+) -> tuple[Limit, ...]:
+    """No damper, and full stick of each mass of the damper under its largest load."""
+    mode, open_points = scene.excitation.mode, not scene.contact.points
+    found: list[Limit] = []
+    # the last case of each mass
+    for mass, case in {case.mass: case for case in cases}.items():
+        soft = None if softer is None else softer.family(case)
+        free, stuck = judged_limits(family(case), settings, soft, mode, band, open_points)
+        found = [free, *found[1:], replace(stuck, mass=mass)]
+    return tuple(found)
 
 
 def _class_verdicts(

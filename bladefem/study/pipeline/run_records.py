@@ -75,8 +75,8 @@ class Response:
 
     settings: Settings
     curves: list[Curve]
-    # no damper, full stick
-    limits: tuple[Limit, Limit]
+    # no damper, and full stick of each mass of the damper
+    limits: tuple[Limit, ...]
     # of each mass of the damper; empty where a single load was asked for
     best: tuple[BestLoad, ...] = ()
     # what the lowest of them depends on, the largest influence first

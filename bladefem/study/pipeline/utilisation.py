@@ -77,8 +77,7 @@ def highest_use(run: SolvedRun, number: int, used: Utilisation) -> float:
     Args:
         number: of the curve under the same load.
     """
-    highest = float(used.used[used.worst])
-    return highest * _history_share(run, number) * (1 + run.damped[number].mesh_error)
+    return float(used.used[used.worst]) * upper_end(run, number)
 
 
 def highest_wheel_use(run: SolvedRun, number: int, used: Utilisation, mesh_error: float) -> float:
@@ -89,8 +88,18 @@ def highest_wheel_use(run: SolvedRun, number: int, used: Utilisation, mesh_error
         number: of the tuned wheel's curve under the same load.
         mesh_error: estimated relative error of the stress by the mesh.
     """
-    share = _history_share(run, number) * max(run.response.curves[number].over_balance, 1.0)
-    return float(used.used[used.worst]) * share * (1 + mesh_error)
+    return float(used.used[used.worst]) * upper_wheel_end(run, number, mesh_error)
+
+
+def upper_end(run: SolvedRun, number: int) -> float:
+    """The upper ends of the errors of ``highest_use`` over the utilisation [1]."""
+    return _history_share(run, number) * (1 + run.damped[number].mesh_error)
+
+
+def upper_wheel_end(run: SolvedRun, number: int, mesh_error: float) -> float:
+    """The same of ``highest_wheel_use``, with its arguments [1]."""
+    march = max(run.response.curves[number].over_balance, 1.0)
+    return _history_share(run, number) * march * (1 + mesh_error)
 
 
 def _history_share(run: SolvedRun, number: int) -> float:
