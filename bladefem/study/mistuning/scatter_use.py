@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ...wheel.statistics import WHEEL_SHARE, Amplification, Quantile
 from ..pipeline.run_records import SolvedRun
 from ..pipeline.utilisation import highest_use, run_utilisation
@@ -31,8 +33,10 @@ class ScatteredUse:
 
     @property
     def margin(self) -> float:
-        """Times that the alternating stress could grow until the limit; zero where unknown."""
-        return 1 / self.highest if self.highest > 0 else float("inf")
+        """Times that the alternating stress could grow until the limit; NaN with too few wheels."""
+        if np.isinf(self.highest):
+            return np.nan
+        return 1 / self.highest if self.highest > 0 else np.inf
 
 
 def scattered_use(run: SolvedRun, found: Amplification) -> list[ScatteredUse]:
