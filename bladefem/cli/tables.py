@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import pi
 from typing import TYPE_CHECKING, Any
 
@@ -239,15 +239,24 @@ def run_summary(run: Run) -> str:
     table = plain_table(
         [*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"]
     )
-    said = by_level(run.messages)
-    summary_lines = [
+    page = None if run.folder is None else run.folder / "report.html"
+    report = f"report: {page}\n" if page is not None and page.is_file() else ""
+    return "\n\n".join([table, *message_lists(run.messages), f"{report}results: {run.folder}"])
+
+
+def message_lists(messages: Iterable[str]) -> list[str]:
+    """What a run or a command on top of one has to say: a list with a title for each level.
+
+    >>> from bladefem.util.message import warning
+    >>> message_lists([warning("some points are not solved"), "the best load is 80 N"])
+    ['information:\\n  - the best load is 80 N', 'warnings:\\n  - some points are not solved']
+    """
+    said = by_level(messages)
+    return [
         "\n".join([f"{title}:", *(f"  - {text}" for text in said[level])])
         for title, level in MESSAGE_TITLES.items()
         if said[level]
     ]
-    page = None if run.folder is None else run.folder / "report.html"
-    report = f"report: {page}\n" if page is not None and page.is_file() else ""
-    return "\n\n".join([table, *summary_lines, f"{report}results: {run.folder}"])
 
 
 # what a run says, by level; what the reader has to know is last, next to the prompt

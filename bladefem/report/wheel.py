@@ -317,7 +317,7 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
         Headline(
             "highest blade at the robust optimum",
             f"{1e6 * robust.height.value:.4g} µm",
-            f"{INTERVAL} {1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} µm",
+            f"{INTERVAL} {_height_interval(robust)}",
             f"{words} stay below",
         ),
     ]
@@ -331,6 +331,14 @@ def loads_on_both_sides(found: Amplification, load: float) -> str:
         return "an end of the loads studied"
     ends = newton_range(lower.max(), upper.min()).replace(" to ", " and ")
     return f"between {ends} studied"
+
+
+def _height_interval(robust: RobustOptimum) -> str:
+    """Ends of the interval of the highest blade at the robust optimum."""
+    low, high = 1e6 * robust.height.low, 1e6 * robust.height.high
+    if np.isfinite(high):
+        return f"{low:.4g} to {high:.4g} um"
+    return f"from {low:.4g} um, upper end {_upper(high)}"
 
 
 def _upper(value: float) -> str:
@@ -478,7 +486,7 @@ def _optimum_sentences(found: Amplification) -> list[str]:
         f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
         f"{newtons(robust.load.value, 4)} ({INTERVAL} "
         f"{newton_range(robust.load.low, robust.load.high)}), {1e6 * robust.height.value:.4g} um "
-        f"({1e6 * robust.height.low:.4g} to {1e6 * robust.height.high:.4g} um)",
+        f"({_height_interval(robust)})",
         "between the loads studied both optima are those of a parabola, whose error the intervals "
         f"leave out: robust optimum {loads_on_both_sides(found, robust.load.value)}",
     ]
