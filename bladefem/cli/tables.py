@@ -229,8 +229,12 @@ def report_table(rows: pd.DataFrame) -> str:
     return frame_table(readable_texts(rows))
 
 
-def run_summary(run: Run) -> str:
-    """Where the time went, what the run has to say, warnings last, and where the results are."""
+def run_summary(run: Run, page: str | None = "report.html") -> str:
+    """Where the time went, what the run has to say, warnings last, and where the results are.
+
+    Args:
+        page: of the run's folder, named where it is there; None names none.
+    """
     total = sum(run.timings.values())
     rows = [
         [name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"]
@@ -239,8 +243,8 @@ def run_summary(run: Run) -> str:
     table = plain_table(
         [*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"]
     )
-    page = None if run.folder is None else run.folder / "report.html"
-    report = f"report: {page}\n" if page is not None and page.is_file() else ""
+    file = None if run.folder is None or page is None else run.folder / page
+    report = f"report: {file}\n" if file is not None and file.is_file() else ""
     return "\n\n".join([table, *message_lists(run.messages), f"{report}results: {run.folder}"])
 
 

@@ -317,7 +317,7 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
         Headline(
             "highest blade at the robust optimum",
             f"{1e6 * robust.height.value:.4g} µm",
-            f"{INTERVAL} {_height_interval(robust)}",
+            f"{INTERVAL} {_height_interval(robust, 'µm')}",
             f"{words} stay below",
         ),
     ]
@@ -333,12 +333,12 @@ def loads_on_both_sides(found: Amplification, load: float) -> str:
     return f"between {ends} studied"
 
 
-def _height_interval(robust: RobustOptimum) -> str:
+def _height_interval(robust: RobustOptimum, unit: str = "um") -> str:
     """Ends of the interval of the highest blade at the robust optimum."""
     low, high = 1e6 * robust.height.low, 1e6 * robust.height.high
     if np.isfinite(high):
-        return f"{low:.4g} to {high:.4g} um"
-    return f"from {low:.4g} um, upper end {_upper(high)}"
+        return f"{low:.4g} to {high:.4g} {unit}"
+    return f"from {low:.4g} {unit}, upper end {_upper(high)}"
 
 
 def _upper(value: float) -> str:
