@@ -337,8 +337,8 @@ def _left_by_balance(found: Amplification, load: float) -> str:
     error = found.truncation[order][place - 1 : place + 1].max()
     words = "an unknown share" if np.isnan(error) else f"up to {percent(error)}"
     return (
-        f"; the interval leaves out what harmonics and samples are estimated to leave, {words}, and "
-        "mesh and contact points"
+        f"; the interval leaves out what harmonics and samples are estimated to leave, {words}, "
+        "and mesh and contact points"
     )
 
 
@@ -443,7 +443,7 @@ def _law_sentences(found: Amplification) -> list[str]:
         if not known:
             continue
         text = (
-            f"{newtons(load)}: wheels by the law of one damper, harmonics 1 to {harmonics}; "
+            f"{newtons(load)}: wheels by the law of one damper, {_harmonics_up_to(harmonics)}; "
             f"{checks} of them solved in full, from the lowest to the highest: the law is off by "
             f"{error.min():+.2g} to {error.max():+.2g} % in amplification"
         )
@@ -455,6 +455,10 @@ def _law_sentences(found: Amplification) -> list[str]:
             )
         said.append(text)
     return said
+
+
+def _harmonics_up_to(highest: int) -> str:
+    return "harmonic 1" if highest == 1 else f"harmonics 1 to {highest}"
 
 
 def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
@@ -517,8 +521,9 @@ def _optimum_sentences(found: Amplification) -> list[str]:
     if wheels < FEWEST_WHEELS:
         sentences.append(
             warning(
-                f"{wheels} wheels are too few for a bootstrap: the interval of the robust optimum's "
-                f"load is too narrow, expected mistuning.wheels = {FEWEST_WHEELS} at least"
+                f"{wheels} wheels are too few for a bootstrap: the interval of the robust "
+                "optimum's load is too narrow, expected mistuning.wheels = "
+                f"{FEWEST_WHEELS} at least"
             )
         )
     unknown = found.loads[~found.is_known]
