@@ -23,6 +23,10 @@ if TYPE_CHECKING:
     from ..study.pipeline.run_records import Run
 
 
+# after frequencies of one mesh
+MESH_ERROR_UNKNOWN = "error of these frequencies by the mesh: not studied, --converge estimates it"
+
+
 def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     """Print the resolved scene, and what in it is improbable."""
     from geometry.check_parameters import check_file
@@ -102,11 +106,14 @@ def modes(options: argparse.Namespace, comm: Communicator | None) -> None:
     from ..report import modes as report
 
     refuse_pdf(options)
+    if options.pdf and not options.pictures:
+        raise InputError("--pdf: with --pictures 0 there are tables only, expected one of the two")
     scene, folder, bars = prepared(options, comm)
     found = report.report_survey(scene, folder, modes_wanted(options), options.pictures, comm, bars)
-    tell(options, comm, lambda: tables.survey_tables(found), found.run)
-    if options.pictures:
-        print_report(options, comm, folder / "report_modes.html")
+    unknown = "" if found.convergence is not None else f"\n\n{MESH_ERROR_UNKNOWN}"
+    page = "report_modes.html" if options.pictures else None
+    tell(options, comm, lambda: f"{tables.survey_tables(found)}{unknown}", found.run, page)
+    print_report(options, comm, folder / "report_modes.html")
 
 
 def modes_wanted(options: argparse.Namespace) -> Wanted:
@@ -161,7 +168,13 @@ def contact(options: argparse.Namespace, comm: Communicator | None) -> None:
     from ..report import pressure
 
     run = pressure.report_pressure(scene, folder, comm, bars)
-    tell(options, comm, lambda: tables.pressure_table(run.contact.maps), run)
+    tell(
+        options,
+        comm,
+        lambda: tables.pressure_table(run.contact.maps),
+        run,
+        "report_contact.html",
+    )
 
 
 def reduce(options: argparse.Namespace, comm: Communicator | None) -> None:
@@ -337,13 +350,18 @@ def tell(
     comm: Communicator | None,
     table: Callable[[], str],
     run: Run | None = None,
+    page: str | None = "report.html",
 ) -> None:
-    """A table and the summary of a run, on rank 0 unless quiet."""
+    """A table and the summary of a run, on rank 0 unless quiet.
+
+    Args:
+        page: of the run's folder, named where it is there; None names none.
+    """
     if options.quiet or (comm is not None and comm.rank > 0):
         return
     print(table())
     if run is not None:
-        print("\n" + tables.run_summary(run), flush=True)
+        print("\n" + tables.run_summary(run, page), flush=True)
 
 
 def scene_path(given: str) -> Path:

@@ -28,6 +28,8 @@ REPEAT_SECONDS = 0.1
 IDLE_SECONDS = 0.05
 # of the message by which such a rank learns the exit code
 CODE_TAG = 1
+# what an interrupted command keeps besides its finished stages
+ALSO_KEPT = {"scatter": ", each finished wheel too"}
 
 
 def communicator() -> Any:
@@ -48,10 +50,10 @@ def communicator() -> Any:
 def exit_code_of(action: Callable[[Any], None], options: argparse.Namespace) -> int:
     """The exit code of an action that gets the communicator; errors are reported on rank 0."""
     with _catch_signals() as stopped:
-        return _run_guarded(action, stopped)
+        return _run_guarded(action, stopped, ALSO_KEPT.get(getattr(options, "command", ""), ""))
 
 
-def _run_guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
+def _run_guarded(action: Callable[[Any], None], stopped: list[int], also_kept: str) -> int:
     """The exit code of an action on the ranks that have cores of their own, which the others wait
     for.
     """
@@ -60,12 +62,12 @@ def _run_guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
         comm = communicator()
         working = ranks_with_cores(comm) if comm else [0]
         if comm is None or len(working) == comm.size:
-            return _run_on(comm, action, stopped)
+            return _run_on(comm, action, stopped, also_kept)
         part = comm.Split(0 if comm.rank in working else 1, comm.rank)
         if comm.rank not in working:
             return _wait_for_code(comm)
     except KeyboardInterrupt:
-        return _stop_ranks(comm, stopped)
+        return _stop_ranks(comm, stopped, also_kept)
     except InputError as error:
         return _print_error(comm, str(error), 2)
     if comm.rank == 0:
@@ -75,7 +77,7 @@ def _run_guarded(action: Callable[[Any], None], stopped: list[int]) -> int:
             file=sys.stderr,
             flush=True,
         )
-    code = _run_on(part, partial(_after_petsc, action), stopped)
+    code = _run_on(part, partial(_after_petsc, action), stopped, also_kept)
     if comm.rank == 0:
         for rank in sorted(set(range(comm.size)) - set(working)):
             comm.send(code, rank, CODE_TAG)
@@ -101,6 +103,7 @@ def _run_on(
     comm: Any,
     action: Callable[[Any], None],
     stopped: list[int],
+    also_kept: str,
 ) -> int:
     """The exit code of an action on these ranks, all of which work."""
     try:
@@ -110,11 +113,11 @@ def _run_on(
     except BrokenPipeError:
         return _flush_output()
     except KeyboardInterrupt:
-        return _stop_ranks(comm, stopped)
+        return _stop_ranks(comm, stopped, also_kept)
     except Exception as error:
         # a library made an error of its own out of the interrupt
         if stopped:
-            return _stop_ranks(comm, stopped)
+            return _stop_ranks(comm, stopped, also_kept)
         code, text = _error_sentence(error)
         if comm is None:
             return _print_error(None, text, code)
@@ -204,15 +207,15 @@ def _catch_signals() -> Iterator[list[int]]:
             signal.signal(number, handler)
 
 
-def _stop_ranks(comm: Communicator | None, signals: list[int]) -> int:
+def _stop_ranks(comm: Communicator | None, signals: list[int], also_kept: str) -> int:
     """Ctrl-C, or the end that a batch system asks for: 128 plus the signal's number, as shells have
     it.
     """
     ended = signal.SIGTERM in signals
     return _print_error(
         comm,
-        f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept, the same "
-        "command goes on after them",
+        f"{'ended by SIGTERM' if ended else 'interrupted'}; finished stages are kept{also_kept}; "
+        "the same command goes on after them",
         143 if ended else 130,
     )
 

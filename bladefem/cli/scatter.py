@@ -28,13 +28,19 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     found = scatter_of_run(run, comm, bars)
     used, remarks = scatter_utilisation(run, found)
     held = scene.model.static == "uncoupled"
-    sentences = [*scatter_sentences(found, held), *use_sentences(used), *remarks]
+    # what makes the tuned responses wrong makes the wheels' wrong, which are counted over them
+    sentences = [*run.messages, *scatter_sentences(found, held), *use_sentences(used), *remarks]
     table, files = on_root(comm, lambda: _write_results(found, used, sentences, folder, scene))
     tell(
         options,
         comm,
         lambda: "\n".join(
-            [tables.frame_table(table), "", *sentences, f"written: {', '.join(map(str, files))}"]
+            [
+                tables.frame_table(table),
+                "",
+                *(f"{text}\n" for text in tables.message_lists(sentences)),
+                f"written: {', '.join(map(str, files))}",
+            ]
         ),
     )
 

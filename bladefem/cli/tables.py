@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import pi
 from typing import TYPE_CHECKING, Any
 
@@ -237,8 +237,12 @@ def report_table(rows: pd.DataFrame) -> str:
     return frame_table(readable_texts(rows))
 
 
-def run_summary(run: Run) -> str:
-    """Where the time went, what the run has to say, warnings last, and where the results are."""
+def run_summary(run: Run, page: str | None = "report.html") -> str:
+    """Where the time went, what the run has to say, warnings last, and where the results are.
+
+    Args:
+        page: of the run's folder, named where it is there; None names none.
+    """
     total = sum(run.timings.values())
     rows = [
         [name, f"{t:.2f}", f"{100 * t / total if total else 0:.0f}"]
@@ -247,15 +251,24 @@ def run_summary(run: Run) -> str:
     table = plain_table(
         [*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"]
     )
-    said = by_level(run.messages)
-    summary_lines = [
+    file = None if run.folder is None or page is None else run.folder / page
+    report = f"report: {file}\n" if file is not None and file.is_file() else ""
+    return "\n\n".join([table, *message_lists(run.messages), f"{report}results: {run.folder}"])
+
+
+def message_lists(messages: Iterable[str]) -> list[str]:
+    """What a run or a command on top of one has to say: a list with a title for each level.
+
+    >>> from bladefem.util.message import warning
+    >>> message_lists([warning("some points are not solved"), "the best load is 80 N"])
+    ['information:\\n  - the best load is 80 N', 'warnings:\\n  - some points are not solved']
+    """
+    said = by_level(messages)
+    return [
         "\n".join([f"{title}:", *(f"  - {text}" for text in said[level])])
         for title, level in MESSAGE_TITLES.items()
         if said[level]
     ]
-    page = None if run.folder is None else run.folder / "report.html"
-    report = f"report: {page}\n" if page is not None and page.is_file() else ""
-    return "\n\n".join([table, *summary_lines, f"{report}results: {run.folder}"])
 
 
 # what a run says, by level; what the reader has to know is last, next to the prompt

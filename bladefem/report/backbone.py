@@ -21,8 +21,12 @@ from .tables import write_tables
 from .write import Page, write_report
 
 
-def prediction_table(found: Sequence[Backbone]) -> pd.DataFrame:
-    """One row a load: the resonance by the mode alone next to the balance's."""
+def prediction_table(found: Sequence[Backbone], run: SolvedRun | None = None) -> pd.DataFrame:
+    """One row a load: the resonance by the mode alone next to the balance's.
+
+    Args:
+        run: adds the estimated error of the balance, which judges the mode.
+    """
     return pd.DataFrame(
         [
             {
@@ -33,6 +37,7 @@ def prediction_table(found: Sequence[Backbone]) -> pd.DataFrame:
                 "balance_frequency": one.balance[1],
                 "balance_amplitude": one.balance[0],
                 "off": one.error,
+                **({} if run is None else {"balance_error": balance_error(run, one)["error"]}),
                 "most_friction": one.friction[one.converged].max(initial=0.0),
                 "unconverged": int((~one.converged).sum()),
             }
@@ -140,15 +145,28 @@ def balance_error(run: SolvedRun, one: Backbone) -> pd.Series:
     return pd.Series({"error": error, "body_mesh": curve.body_mesh}, dtype=float)
 
 
-def write_backbones(
+def backbone_messages(
     run: SolvedRun,
     found: Sequence[Backbone],
     remarks: Sequence[str] = (),
+) -> list[str]:
+    """What the page and the terminal say: what makes the balance wrong makes its modes wrong."""
+    return [*run.messages, *remarks, *backbone_sentences(found)]
+
+
+def write_backbones(
+    run: SolvedRun,
+    found: Sequence[Backbone],
+    messages: Sequence[str],
 ) -> list[Path]:
-    """Tables, the design map and a page in the run's folder; returns the files."""
+    """Tables, the design map and a page in the run's folder; returns the files.
+
+    Args:
+        messages: `backbone_messages`.
+    """
     folder = folder_of(run)
     moved = take_folder(folder, run.scene)
-    tables = {"response/backbone_resonances": prediction_table(found)}
+    tables = {"response/backbone_resonances": prediction_table(found, run)}
     write_tables(tables["response/backbone_resonances"], folder / "backbone_resonances", "backbone")
     write_tables(backbone_table(found), folder / "backbone", "backbone")
     points = [(c.frequency[c.converged], c.amplitude[c.converged]) for c in run.response.curves]
@@ -159,8 +177,7 @@ def write_backbones(
         run.scene,
         tables,
         {"response/design_map": picture},
-        # what makes the balance wrong makes its modes wrong
-        [*filter(None, [moved]), *run.messages, *remarks, *backbone_sentences(found)],
+        [*filter(None, [moved]), *messages],
         run.timings,
         page=Page(numbers=backbone_headlines(run, found), stem="report_backbone"),
     )

@@ -94,6 +94,7 @@ COLUMNS = {
     "balance_frequency": Column("resonance by the balance", "Hz"),
     "balance_amplitude": Column("amplitude by the balance", "m", "µm", 1e6),
     "off": Column("off the balance", "1", "%", 100.0, 2),
+    "balance_error": Column("estimated error of the balance", "1", "%", 100.0, 2),
     "off_reading": Column("off the reading", "1", "%", 100.0, 2),
     "most_friction": Column("largest friction damping", "1", "%", 100.0, 3),
     "own_damping": Column("damping of the blade", "1", "%", 100.0, 3),

@@ -113,7 +113,9 @@ class Contact:
         "tangential contact stiffness per unit area; by Mindlin from the normal one, and from "
         "roughness and pressure without either",
     )
-    kt: float | None = quantity(None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch")
+    kt: float | None = quantity(
+        None, "N/m", 1.0, 1e12, "tangential stiffness of one whole patch, in place of kt_area"
+    )
     kn_area: float | None = quantity(
         None,
         "N/m^3",
@@ -121,7 +123,9 @@ class Contact:
         1e15,
         "normal contact stiffness per unit area; by Mindlin from the tangential",
     )
-    kn: float | None = quantity(None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch")
+    kn: float | None = quantity(
+        None, "N/m", 1.0, 1e12, "normal stiffness of one whole patch, in place of kn_area"
+    )
     roughness: float | None = quantity(
         None,
         "m",

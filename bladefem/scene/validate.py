@@ -217,6 +217,11 @@ def _check_excitation(scene: Scene) -> Iterator[str]:
     # its length must not vanish in rounding
     if not hypot(*scene.excitation.direction) > SHORTEST_DIRECTION:
         yield "excitation.direction = 0, 0, 0: expected a direction, not all zero, such as 0, 1, 0"
+    elif kind_named(scene.kind).is_plane and not any(scene.excitation.direction[:2]):
+        yield (
+            f"excitation.direction: {scene.kind} do not move along z, expected a direction with a "
+            "part in their plane, such as 0, 1, 0"
+        )
     modes = scene.model.modes
     mode = scene.excitation.mode
     if modes is not None and mode > modes:

@@ -24,6 +24,7 @@ MAX_RIM_SPEED = 900.0
 def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_doubtful_materials(scene), *_doubtful_masses(scene), *_doubtful_mesh(scene)]
+    said += _unused_stiffnesses(scene)
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
@@ -65,6 +66,20 @@ def _doubtful_masses(scene: Scene) -> Iterator[str]:
                 f"{name} = {', '.join(show(mass, 'kg') for mass in outside)}: underplatform "
                 "dampers have 0.1 g to 1 kg"
             )
+
+
+def _unused_stiffnesses(scene: Scene) -> Iterator[str]:
+    """Stiffnesses per unit area in whose place that of the whole seat is taken."""
+    contact = scene.contact
+    tables = {"contact": contact, "contact.left": contact.left, "contact.right": contact.right}
+    for name, table in tables.items():
+        for total, areal in (("kt", "kt_area"), ("kn", "kn_area")):
+            whole, per_area = getattr(table, total), getattr(table, areal)
+            if whole is not None and per_area is not None:
+                yield (
+                    f"{name}.{areal} = {show(per_area, 'N/m^3')} is not used: {name}.{total} = "
+                    f"{show(whole, 'N/m')}, the stiffness of the whole seat, takes its place"
+                )
 
 
 def _doubtful_speed(scene: Scene) -> Iterator[str]:

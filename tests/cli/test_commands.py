@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import subprocess
 import sys
@@ -266,6 +267,36 @@ def test_options_of_modes(pipeline, tmp_path, capsys):
     capsys.readouterr()
     assert main(["modes", WEDGE, "-o", str(tmp_path), "--converge", "8, 6, 4"]) == 2
     assert "converge = 8 m: expected 10 um to 1 m; did you mean '8 mm'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("command", "page"),
+    [
+        ("modes", "report_modes.html"),
+        ("contact", "report_contact.html"),
+        ("run", "report.html"),
+    ],
+)
+def test_the_page_that_a_command_wrote_is_named(command, page, pipeline, tmp_path, capsys):
+    """Not that of another command in the same folder."""
+
+    def behaviour(folder):
+        for name in ("report.html", "report_modes.html", "report_contact.html"):
+            (folder / name).write_text("")
+        return fake_run(folder)
+
+    pipeline.state.behaviour = behaviour
+    assert main([command, WEDGE, "-o", str(tmp_path)]) == 0
+    said = capsys.readouterr().out
+    assert re.findall(r"^report: (.*)$", said, re.MULTILINE) == [str(tmp_path / page)]
+    assert ("by the mesh: not studied" in said) == (command == "modes")
+
+
+def test_tables_alone_make_no_print(pipeline, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("bladefem.report.pdf.browser_command", lambda: ["chromium"])
+    assert main(["modes", WEDGE, "-o", str(tmp_path), "--pdf", "--pictures", "0"]) == 2
+    assert "--pdf: with --pictures 0 there are tables only" in capsys.readouterr().err
+    assert not pipeline.calls
 
 
 def test_quiet_prints_no_summary(pipeline, tmp_path, capsys):

@@ -106,6 +106,10 @@ TOGETHER = [
     ({"kind": "hertz", "hertz": {"contact_radius": "20 mm"}}, "hertz.contact_radius"),
     ({"kind": "hertz", "mesh": {"contact_size": "5 mm"}}, "mesh.contact_size"),
     ({"kind": "plane blades", "mesh": {"seat_elements": 8}}, "mesh.seat_elements"),
+    (
+        {"kind": "plane blades", "excitation": {"direction": [0, 0, 1]}},
+        "excitation.direction: plane blades do not move along z",
+    ),
     ({"kind": "punch", "punch": {"radius": "30 mm"}}, "punch.radius"),
     (
         {"kind": "punch", "study": {"loads": [0]}},

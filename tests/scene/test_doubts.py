@@ -59,6 +59,20 @@ def test_of_the_wedge(override, sentence):
     assert sentence in said
 
 
+def test_stiffnesses_that_nothing_reads_are_named():
+    """A stiffness of a whole seat takes the place of that of each unit of area, in its own table."""
+    scene = ROOT / "scenes" / "wedge.toml"
+    own = ["contact.left.kn=2e7 N/m", "contact.left.kn_area=9 N/mm^3"]
+    assert implausible_values(load_scene(scene, ["contact.kt=4e6 N/m", *own])) == [
+        "contact.kt_area = 40 N/mm^3 is not used: contact.kt = 4e+06 N/m, the stiffness of the "
+        "whole seat, takes its place",
+        "contact.left.kn_area = 9 N/mm^3 is not used: contact.left.kn = 2e+07 N/m, the stiffness "
+        "of the whole seat, takes its place",
+    ]
+    assert implausible_values(load_scene(scene, ["contact.kt_area=auto", "contact.kt=4e6"])) == []
+    assert implausible_values(load_scene(scene, ["contact.left.kt=4e6 N/m"])) == []
+
+
 def test_limits_themselves_raise_none():
     text = [
         "material.blade.E=1 GPa",

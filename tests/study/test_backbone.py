@@ -8,6 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from bladefem.cli.main import main
@@ -93,7 +94,9 @@ def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     # under the best load, which is studied as well, the damper bounces
     arguments += ["--set", "model.harmonics=3", "--set", "study.stability=false"]
     assert main(arguments) == 0
-    assert "resonances predicted by the nonlinear mode alone are off by" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "resonances predicted by the nonlinear mode alone are off by" in printed
+    assert "estimated error of the balance [%]" in printed
     for name in ("design_map.png", "backbone.csv", "backbone_resonances.csv"):
         assert (tmp_path / name).is_file()
     # the error of the balance and its warnings stand there, as in the report of the run
@@ -106,5 +109,11 @@ def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     assert any("estimated error of the resonance amplitude above the wanted" in o for o in of_run)
     said = [one for one in of_run if "away from the resonance" in one or "above the wanted" in one]
     assert len(said) == 2 and set(said) <= set(listed(page))
+    # and on the terminal, as warnings
+    shown = printed.split("warnings:\n")[1]
+    assert all(one.removeprefix("- ") in shown for one in said)
+    by_mode = pd.read_csv(tmp_path / "backbone_resonances.csv").set_index("load [N]")
+    of_run = pd.read_csv(tmp_path / "summary.csv").set_index("load [N]")
+    assert by_mode["balance_error"][20] == pytest.approx(of_run["error"][20], rel=1e-6)
     assert main(arguments) == 0
     assert "backbone_20N: found in the folder" in (tmp_path / "report_backbone.html").read_text()

@@ -19,6 +19,7 @@ from bladefem.report.chart import write_chart
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings, first_for, first_settings, scene_line
+from bladefem.study.chart import meshes
 from bladefem.study.chart.chart import method_chart
 from bladefem.study.chart.cpu_clock import running_clock
 from bladefem.study.chart.meshes import mesh_table, mesh_variants
@@ -275,6 +276,24 @@ def test_a_mesh_that_would_take_too_long_is_left_out_and_named():
     table = mesh_table(scene, Settings(10, 1, 64, "rigid", 4), 40.0, variants, 200.0, remarks)
     assert table["left_out"].tolist() == [False, True, False, True]
     assert sum("0.1 mm: left out" in remark for remark in remarks) == 2
+    assert any("mesh of second order, 0.1 mm: left out" in remark for remark in remarks)
+
+
+def test_no_mesh_of_second_order_is_no_comparison(monkeypatch):
+    """The first mesh takes the whole budget: it was solved, and nothing is said against it."""
+    clock = iter([0.0, 0.0, *[9.0] * 99])
+    monkeypatch.setattr(meshes.time, "process_time", lambda: next(clock))
+    monkeypatch.setattr(meshes, "on_mesh", lambda *_: meshes.MeshResonance(100.0, 1e-5, 80, 9.0))
+    scene, remarks = load_scene(PLANE, [*EASY, "mesh.size=12 mm"]), []
+    variants = mesh_variants(scene, [0.012, 0.008], build_mesh(scene))
+    assert mesh_table(scene, Settings(10, 1, 64, "rigid", 4), 40.0, variants, 5.0, remarks).empty
+    assert remarks == [
+        "meshes are not compared: none of second order was solved, the reference of the others",
+        *(
+            f"mesh of {order} order, {size}: left out: the budget was used up"
+            for order, size in (("first", "8 mm"), ("second", "12 mm"), ("second", "8 mm"))
+        ),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from bladefem.errors import InputError
 from bladefem.fem.stress import signed_von_mises, von_mises
 from bladefem.report import fatigue
 from bladefem.report.fatigue import save_fatigue_vtu, utilisation_table
-from bladefem.report.wheel import use_sentences
+from bladefem.report.wheel import use_headlines, use_sentences, use_table
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
 from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram
@@ -219,6 +219,10 @@ def test_too_few_wheels_leave_the_utilisation_open_above():
     (used,) = scattered_use(run_of(scene, 0.0), amplification(np.linspace(1, 2, 20)))
     assert np.isinf(used.highest) and np.isnan(used.margin)
     assert "unknown, too few wheels" in use_sentences([used])[0]
+    # zero would be read as no margin
+    assert np.isnan(use_table([used])["stress_margin"][0])
+    (number,) = use_headlines([used])
+    assert number.uncertainty.startswith("upper end unknown, too few wheels, with")
 
 
 def test_a_diagram_that_is_too_short_is_a_warning_of_the_run():

@@ -46,3 +46,17 @@ def test_failures_name_the_load(load, lifts):
         raise NotSolvedError("line search stalled")
     assert ("lifts off" in str(told.value)) == lifts
     assert ("expected a larger load" in str(told.value)) == lifts
+
+
+@pytest.mark.parametrize(("band", "beside"), [((1.0, 2.0), True), ((150.0, 170.0), False)])
+def test_a_band_without_the_resonance_is_named(band, beside):
+    """The only resonance without damper is at 1000 rad/s = 159.15 Hz; the load is not to blame."""
+    case, model = case_of(1e-3, 1e6)
+    with (
+        pytest.raises(NotSolvedError, match="search found no maximum") as told,
+        naming_the_load(case, model, 1, FORCE, band),
+    ):
+        raise NotSolvedError("search found no maximum")
+    said = str(told.value)
+    assert ("study.band = 1 Hz, 2 Hz" in said and "159.15 Hz without damper" in said) == beside
+    assert ("lifts off" in said) != beside

@@ -513,6 +513,15 @@ def test_scatter_of_several_masses_is_refused_before_long_work():
         refuse_scatter(scene)
 
 
+def test_wheels_that_are_all_alike_are_not_drawn():
+    """They took minutes, and every amplification was 1."""
+    alike = load_scene(MISTUNED, ["mistuning.scatter=0"])
+    with pytest.raises(InputError, match=r"mistuning\.scatter = 0: all wheels .* are alike"):
+        refuse_scatter(alike)
+    # dampers alone may differ
+    refuse_scatter(load_scene(MISTUNED, ["mistuning.scatter=0", "mistuning.load=5 %"]))
+
+
 def test_scatter_of_a_scene_without_a_wheel_names_its_kind():
     with pytest.raises(InputError, match="a scene of kind 'plane blades' has no wheel"):
         refuse_scatter(load_scene(MISTUNED.with_name("plane.toml")))

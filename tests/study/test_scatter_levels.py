@@ -133,6 +133,31 @@ def test_amplification_is_refused_where_the_sector_moves_otherwise():
     assert amplification.what.startswith("amplification at 80 N")
 
 
+@pytest.mark.parametrize("wheels", [10, 40])
+def test_what_an_interval_by_the_sample_leaves_out_is_told(wheels):
+    """Harmonics of the loads on both sides of the optimum, and too few wheels."""
+    factors = np.linspace(1.1, 1.3, wheels)
+    parts = [
+        replace(
+            of_one_load(load, tuned, factors, SectorComparison(tuned, tuned, True)),
+            truncation=np.array([truncation]),
+        )
+        for load, tuned, truncation in (
+            (320.0, 4e-4, 0.09),
+            (40.0, 3e-4, 0.07),
+            (80.0, 2e-4, 0.02),
+            (160.0, 3.2e-4, 0.03),
+        )
+    ]
+    found = joined_loads(parts)
+    (height,) = [one for one in scatter_headlines(found) if one.what.startswith("highest blade")]
+    # the parabola in the logarithms is lower at 40 N than at 160 N: its bottom lies between 40 and
+    # 80 N, whose balances leave 7 and 2 %
+    assert "estimated to leave, up to 7 %" in height.remark
+    said = [text for text in scatter_sentences(found) if "too few for a bootstrap" in text]
+    assert len(said) == (wheels < 30) and all(one.level == "warning" for one in said)
+
+
 @pytest.mark.parametrize(("sector", "agrees"), [(1.09, True), (1.2, False), (0.8, False)])
 def test_tuned_wheel_is_compared_within_the_error_of_the_sector(sector, agrees):
     several = free_dampers(np.array([4.0, 2.0]), 1.5)

@@ -52,7 +52,7 @@ def test_finished_wheels_are_kept(tmp_path, searched, capsys):
     # the tuned wheel and two of three
     searched["interrupted"] = 3
     assert main(arguments(stopped)) == 130
-    assert "finished stages are kept" in capsys.readouterr().err
+    assert "finished stages are kept, each finished wheel too;" in capsys.readouterr().err
     kept = sorted((stopped / WHEELS).glob("*.npz"))
     # with the choice of the balance
     assert len(kept) == 4 and not (stopped / "stages" / "scatter_80N.npz").exists()

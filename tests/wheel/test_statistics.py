@@ -151,11 +151,27 @@ def test_interval_of_the_robust_optimum_holds_what_it_promises():
     assert np.median([one.high / one.low for one in found]) < 2.0
 
 
+@pytest.mark.parametrize("wheels", [30, 100])
+def test_the_height_of_the_robust_optimum_is_not_bounded_by_the_wheels_drawn(wheels):
+    """Upper ends by the bootstrap alone were below the 95 % quantile of all wheels for 24 % of the
+    samples of 30 wheels and 10 % of those of 100, where 2.5 % are promised.
+    """
+    rng = np.random.default_rng(3)
+    loads = np.geomspace(1, 32, 6)
+    true = np.exp(0.1 * stats.norm.ppf(0.95))
+    samples = [rng.lognormal(0, 0.1, wheels) for _ in range(120)]
+    found = [robust_optimum(peaks_of(loads, np.full(wheels, 7.0), s)).height for s in samples]
+    assert np.mean([one.high < true for one in found]) < 0.05
+    assert np.mean([one.low > true for one in found]) < 0.05
+    # by 30 wheels there is none: the highest of them may well be below it
+    assert all(np.isinf(one.high) == (wheels == 30) for one in found)
+
+
 def test_interval_of_the_robust_optimum_takes_in_what_the_law_leaves():
     """All wheels are best at 7 N; their peaks under each load are off by what checks leave open."""
     loads = np.geomspace(1, 32, 6)
-    sizes = np.random.default_rng(1).lognormal(0, 0.2, 50)
-    whole = peaks_of(loads, np.full(50, 7.0), sizes)
+    sizes = np.random.default_rng(1).lognormal(0, 0.2, 100)
+    whole = peaks_of(loads, np.full(100, 7.0), sizes)
     true = robust_optimum(whole).height
     for off in np.random.default_rng(2).uniform(0.97, 1.03, (10, 6, 1)):
         found = replace(

@@ -47,6 +47,8 @@ SIZE_RATIOS = (1.7, 1.3, 1.0)
 MAX_HARMONICS = 3
 # accuracy at which the sweep looks for the peak: it is found to a tenth of it
 SEARCH_ACCURACY = 0.01
+# of the elements
+ORDER_WORDS = {1: "first", 2: "second"}
 
 
 @dataclass(frozen=True)
@@ -206,8 +208,16 @@ def mesh_table(
     few = replace(settings, harmonics=min(settings.harmonics, MAX_HARMONICS), points=None)
     rows = list(_rows(scene, few, load, variants, budget, comm))
     rich = [row for row in rows if row["found"] is not None and row["order"] == 2]
+    missing = [
+        f"mesh of {ORDER_WORDS[row['order']]} order, {row['name']}: {row['reason']}"
+        for row in rows
+        if row["reason"]
+    ]
     if not rich:
-        remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows]
+        remarks += [
+            "meshes are not compared: none of second order was solved, the reference of the others",
+            *missing,
+        ]
         return pd.DataFrame()
     truth = rich[-1]["found"]
     before = rich[-2]["found"] if len(rich) > 1 else None
@@ -218,7 +228,7 @@ def mesh_table(
         "from the mesh before, its frequency by "
         f"{abs(before.frequency / truth.frequency - 1) if before else np.nan:.1e}"
     )
-    remarks += [f"mesh {row['name']}: {row['reason']}" for row in rows if row["reason"]]
+    remarks += missing
     return pd.DataFrame([_told(row, truth, doubt) for row in rows])
 
 
@@ -247,8 +257,10 @@ def _rows(
         }
         expected = 0.0 if last is None else last[1] * variant.cells / last[0].cells
         left, expected = on_root(comm, partial(_left_and, end, expected))
-        if expected > left:
-            row["reason"] = f"left out: {expected:.2g} s expected, {max(left, 0.0):.2g} s left"
+        if left <= 0:
+            row["reason"] = "left out: the budget was used up"
+        elif expected > left:
+            row["reason"] = f"left out: {expected:.2g} s expected, {left:.2g} s left"
         else:
             row |= _tried(variant.of(scene), settings, load, comm)
         if row["found"] is not None:

@@ -47,13 +47,21 @@ def refuse_scatter(scene: Scene) -> None:
     """Refuse what 'bladefem scatter' cannot draw.
 
     Raises:
-        InputError: the scene has no wheel, no scatter, or several damper masses.
+        InputError: the scene has no wheel, no scatter, one of zero, or several damper masses.
     """
     _wheel_blades(scene)
     if scene.mistuning.scatter is None:
         raise InputError(
             "mistuning.scatter: expected a relative standard deviation of the blades' "
             "frequencies, such as '1 %', for 'bladefem scatter'"
+        )
+    given = scene.mistuning
+    if not any(
+        (given.scatter, given.friction, given.stiffness, given.load, given.mass, given.traction)
+    ):
+        raise InputError(
+            "mistuning.scatter = 0: all wheels that 'bladefem scatter' draws are alike, expected "
+            "more than 0, or a scatter of the dampers such as mistuning.friction = '10 %'"
         )
     if len(scene.study.masses or ()) > 1:
         raise InputError(

@@ -225,7 +225,7 @@ def _with_modes(
     while True:
         family = family_of(settings)
         model = family_member(family, settings).model
-        with naming_the_load(case, model, mode, scene.excitation.force):
+        with naming_the_load(case, model, mode, scene.excitation.force, scene.study.band):
             rough = covered_band(model, settings, scene.study.band, mode, 1.0)
             settings = softened_where_lifting(family, settings, peak_of(rough))
             peak = peak_from(family, settings, peak_of(rough), settings, scene.accuracy)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...contact.numerical_stiffness import physical_stiffness
 from ...errors import NotSolvedError
-from ...hbm.linear_resonances import free_resonances
+from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
 from ...scene.units import show
 from .assemble_model import LoadCase
@@ -26,13 +26,21 @@ def naming_the_load(
     model: ReducedModel,
     mode: int,
     excitation: float,
+    band: tuple[float, float] | None = None,
 ) -> Iterator[None]:
-    """A failure inside names the load that it belongs to, and whether the damper lifts off under
-    it.
+    """A failure inside names the load that it belongs to, and whether the band has no resonance or
+    the damper lifts off.
+
+    Args:
+        mode: number of the resonance, 1 = lowest.
+        excitation: amplitude of the force on each blade [N].
+        band: frequencies of `study.band` [Hz].
     """
     try:
         yield
     except NotSolvedError as error:
+        if beside := band_beside_resonances(model, mode, band):
+            raise NotSolvedError(f"{beside}: {error}") from error
         travel = seat_travel(model, mode, excitation)
         pressed = _compression(case)
         lifts = (
@@ -46,6 +54,26 @@ def naming_the_load(
             )
         )
         raise NotSolvedError(f"study.loads = {show(case.load, 'N')}: {lifts}{error}") from error
+
+
+def band_beside_resonances(
+    model: ReducedModel,
+    mode: int,
+    band: tuple[float, float] | None,
+) -> str:
+    """What says that a band lies beside the resonances of a mode under all loads; empty where it
+    does not, or where there is none.
+    """
+    if band is None:
+        return ""
+    ends = [both(model)[mode - 1] / (2 * np.pi) for both in (free_resonances, stuck_partners)]
+    if band[0] <= max(ends) and band[1] >= min(ends):
+        return ""
+    return (
+        f"study.band = {show(band[0], 'Hz')}, {show(band[1], 'Hz')}: the resonances of mode {mode} "
+        f"lie between {ends[0]:.5g} Hz without damper and {ends[1]:.5g} Hz at full stick, expected "
+        "a band that holds them"
+    )
 
 
 def seat_travel(

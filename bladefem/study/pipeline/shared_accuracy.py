@@ -85,7 +85,8 @@ def curve_with_room(
         return curve, unseen_errors(scene, case, models, softer, curve.settings, top)
 
     model = family_member(models, settings).model
-    with naming_the_load(case, model, scene.excitation.mode, scene.excitation.force):
+    excited = scene.excitation
+    with naming_the_load(case, model, excited.mode, excited.force, scene.study.band):
         curve, unseen = solved(scene.accuracy)
     room = room_of_balance(scene.accuracy, unseen, peak_of(curve.points))
     if room < (curve.settings.error or 0.0) <= scene.accuracy:
