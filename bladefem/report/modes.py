@@ -24,7 +24,7 @@ from ..scene.tables import Scene
 from ..scene.toml import dump_scene
 from ..study.modes.campbell import Campbell
 from ..study.modes.comparison import family_table
-from ..study.modes.crossings import fold_order
+from ..study.modes.crossings import fold_order, wave_sense
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import (
     ORDERS_ABOVE,
@@ -34,7 +34,7 @@ from ..study.modes.survey import (
     order_is_given,
     survey_modes,
 )
-from ..study.pipeline.run_records import folder_of
+from ..study.pipeline.run_records import ModalRun, folder_of
 from ..study.pipeline.stage_inputs import all_declared
 from ..util.communicator import Communicator
 from ..util.percent import percent
@@ -350,7 +350,7 @@ def _drawings(
             turned = partial(modes.draw_wheel_mode, run.mesh, excited, i, family=names[i])
             out[f"mode_{i + 1}_wheel.png"] = turned
     out["wave.gif"] = lambda file: modes.animate_wave(
-        run.mesh, excited, turning, file, family=names[turning]
+        run.mesh, excited, turning, file, family=names[turning], forward=wheel and _is_forward(run)
     )
     if wheel:
         out["nodal_diameters.png"] = lambda file: speed.draw_nodal_diameters(
@@ -368,6 +368,13 @@ def _drawings(
             tables["convergence_points"], tables["convergence"], file
         )
     return out | _speed_drawings(result, tables)
+
+
+def _is_forward(run: ModalRun) -> bool:
+    """Whether the wave that the engine order excites runs with the rotation."""
+    count = sector_of(run.mesh).count
+    # the engine order itself turns against the blades
+    return count > 0 and wave_sense(run.scene.excitation.engine_order, count) == "against"
 
 
 def _response_title(result: Survey) -> str:

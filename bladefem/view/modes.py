@@ -433,6 +433,7 @@ def animate_wave(
     family: str = "",
     frames: int = 16,
     pixels: int = 480,
+    forward: bool = False,
 ) -> Path:
     """Write an endless GIF of one period: a travelling wave for complex modes, a standing one for
     real modes.
@@ -445,6 +446,8 @@ def animate_wave(
         family: name of the mode family, shown in the title.
         frames: pictures in one period.
         pixels: width and height.
+        forward: the wave runs in the sense in which the blades are counted, that of rotation, as
+            those of engine orders above half their number do; else against it.
     """
     import matplotlib
     from PIL import Image, ImageDraw, ImageFont
@@ -452,7 +455,7 @@ def animate_wave(
     face = str(Path(matplotlib.get_data_path(), "fonts/ttf/DejaVuSans.ttf"))
     font, small = (ImageFont.truetype(face, max(pixels // k, 9)) for k in (34, 42))
     pictures = []
-    for image in wave_frames(mesh, modes, number, frames, pixels):
+    for image in wave_frames(mesh, modes, number, frames, pixels, forward):
         picture = Image.fromarray(image)
         ImageDraw.Draw(picture).text(
             (10, 8), mode_title(modes, number, family), fill="black", font=font
@@ -483,8 +486,11 @@ def wave_frames(
     number: int,
     frames: int,
     pixels: int,
+    forward: bool = False,
 ) -> Iterator[np.ndarray]:
-    """(pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1."""
+    """(pixels, pixels, 3) pictures of Re(u e^{j 2 pi k / frames}), k = 0.. frames - 1; of a forward
+    wave with the opposite sign of time.
+    """
     wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
     _, signed = wheel_component(mesh, wheel, motion, None)
     factor = scale_of(mesh, modes.shapes[number])
@@ -502,7 +508,7 @@ def wave_frames(
     )
     aim_camera(plotter, *wheel_camera(mesh), wheel.points, border=1.15)
     for k in range(frames):
-        turn = np.exp(2j * np.pi * k / frames)
+        turn = np.exp((-2j if forward else 2j) * np.pi * k / frames)
         surface.points = wheel.points + factor * (motion * turn).real
         surface.point_data["signed"] = (signed * turn).real
         plotter.render()

@@ -77,6 +77,7 @@ REFUSED = [
     ("damper.length=70 mm", "platform.length"),
     ("platform.length=45 mm", "aerofoil.chord_root"),
     ("aerofoil.chord_root=90 mm", "platform.length"),
+    ("model.nodal_diameters=9, 0, 9", "9 is listed twice"),
     ("model.nodal_diameters=0, 19", "expected 0 to 18, half the number of sectors"),
     ("study.band=200, 100 Hz", "lower frequency first"),
     ("excitation.direction=0, 0, 0", "expected a direction, not all zero, such as 0, 1, 0"),

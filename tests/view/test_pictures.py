@@ -216,6 +216,16 @@ def test_faces_that_look_away_change_no_picture(sector, wave, monkeypatch):
         assert np.mean(abs(one - other).max(axis=2) > 8) < 2e-3
 
 
+def test_a_forward_wave_is_the_backward_one_played_the_other_way(sector, wave):
+    backward, forward = (
+        [np.array(f, int) for f in modes_view.wave_frames(sector, wave, 0, 4, 160, way)]
+        for way in (False, True)
+    )
+    for k, frame in enumerate(forward):
+        np.testing.assert_array_equal(frame, backward[-k % 4])
+    assert np.any(backward[1] != backward[3])
+
+
 def test_renderings_are_saved_with_their_own_pixels(folder):
     """A chequered picture stays one: each pixel of the file is one of the picture, scaled once."""
     picture = np.indices((160, 160)).sum(axis=0)[..., None] % 2 * np.full(3, 255, np.uint8)

@@ -54,7 +54,10 @@ def one_of(
 
 
 def known_diameters(scene: Scene, sectors: int) -> Iterator[str]:
-    for n in scene.model.nodal_diameters or ():
+    listed = scene.model.nodal_diameters or ()
+    for n in sorted({n for n in listed if listed.count(n) > 1}):
+        yield f"model.nodal_diameters: {n} is listed twice, expected each nodal diameter once"
+    for n in listed:
         if n > sectors // 2:
             yield (
                 f"model.nodal_diameters = {n}: expected 0 to {sectors // 2}, half the number of "

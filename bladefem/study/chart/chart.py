@@ -19,6 +19,7 @@ import pandas as pd
 from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.solution import size
+from ...util.percent import percent
 from ..adaptive.choice import Checked, adapted_settings, covered_band
 from ..adaptive.family import Family, family_member
 from ..adaptive.settings import DAMPER_MODELS, Settings
@@ -215,10 +216,11 @@ def _bench(
         else {f"error{end}": np.nan for end in ("", "_frequency", "_phasor")}
     )
     harmonics, samples = REFERENCE_SETTINGS[len(reached) - 1]
+    moved = f"changed by {percent(doubt['error'])} on" if len(reached) > 1 else "of"
     course.remarks.append(
         f"reference of the {name}: H {harmonics}, {samples} samples, resonance by the parabola "
         f"through the highest three frequencies {truth.frequency:.6g} Hz, "
-        f"{1e6 * truth.amplitude:.6g} um, changed by {doubt['error']:.1e} on its last rung"
+        f"{1e6 * truth.amplitude:.6g} um, {moved} its last rung"
     )
     return Bench(omegas, truth, doubt)
 

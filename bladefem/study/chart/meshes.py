@@ -26,6 +26,7 @@ from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
 from ...util.communicator import Communicator
+from ...util.percent import percent
 from ..adaptive.check_points import peak_of
 from ..adaptive.choice import covered_band
 from ..adaptive.family import family_member
@@ -222,11 +223,15 @@ def mesh_table(
     truth = rich[-1]["found"]
     before = rich[-2]["found"] if len(rich) > 1 else None
     doubt = abs(before.amplitude / truth.amplitude - 1) if before else np.nan
+    moved = (
+        f"changed by {percent(doubt)} from the mesh before, its frequency by "
+        f"{percent(abs(before.frequency / truth.frequency - 1))}"
+        if before
+        else "the only one"
+    )
     remarks.append(
         f"reference of the meshes: {rich[-1]['name']} of second order, resonance "
-        f"{truth.frequency:.6g} Hz, {1e6 * truth.amplitude:.6g} um, changed by {doubt:.1e} "
-        "from the mesh before, its frequency by "
-        f"{abs(before.frequency / truth.frequency - 1) if before else np.nan:.1e}"
+        f"{truth.frequency:.6g} Hz, {1e6 * truth.amplitude:.6g} um, {moved}"
     )
     remarks += missing
     return pd.DataFrame([_told(row, truth, doubt) for row in rows])
