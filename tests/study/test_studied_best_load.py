@@ -150,3 +150,14 @@ def test_a_run_studies_it(tmp_path):
     again = pipeline.run(scene, tmp_path, until="response")
     assert [c.load for c in again.response.curves] == [c.load for c in curves]
     assert again.response.best_found.load == found.load
+
+
+def test_the_own_load_is_looked_up_for_the_damper_mass_that_makes_it():
+    curves = [
+        SimpleNamespace(load=load, mass=mass) for mass in (5e-3, 12e-3) for load in (80.0, 120.0)
+    ]
+    assert response_stage.own_curve(curves, 121.4, 12.6e-3) == 3
+    assert response_stage.own_curve(curves, 79.0, 4e-3) == 0
+    # the damper's own mass alone
+    curves = [SimpleNamespace(load=load, mass=None) for load in (80.0, 121.4, 200.0)]
+    assert response_stage.own_curve(curves, 121.4, 12.6e-3) == 1

@@ -108,6 +108,16 @@ def run_response(
     return result
 
 
+def own_curve(curves: Sequence[Curve], load: float, mass: float) -> int:
+    """Number of the curve nearest to the damper's own load [N]; of several damper masses, that of
+    the mass nearest to its own [kg].
+    """
+    return min(
+        range(len(curves)),
+        key=lambda k: (abs((curves[k].mass or mass) - mass), abs(curves[k].load - load)),
+    )
+
+
 def _stresses(
     before: ReducedRun,
     bodies: Bodies,
@@ -123,7 +133,7 @@ def _stresses(
     curves = response.curves
     wanted = {response.best_curve}
     if own is not None:
-        wanted.add(min(range(len(curves)), key=lambda k: abs(curves[k].load - own)))
+        wanted.add(own_curve(curves, own, before.contact.problem.mass))
     factorised = lru_cache(maxsize=None)(lambda n: bodies.alone.factorised(n))
 
     def stress(k: int) -> DampedStress:
