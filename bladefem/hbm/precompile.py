@@ -22,15 +22,17 @@ import numpy as np
 from ..data import Elements
 from ..friction.aft import evaluate
 from ..reduction.matrices import port_model_from_matrices
+from .flow_map import flow_map
 from .linear.condensation import condense
 from .linear.contact_flexibility import by_harmonic
 from .model import Damping, ReducedModel
 from .ring_march import march_ring, state_of_solution
+from .sector_modes import sector_modes
 from .solve import solve
 from .solver.newton import newton
 from .solver.newton_krylov import iterative_inverse
 from .solver.residual import Balance, start_in_stick
-from .stability import stability_verdict
+from .stability import linearised_contacts, stability_verdict
 from .sweep import response
 from .truncation_indicator import truncation_indicator
 
@@ -82,7 +84,7 @@ def compile_2d() -> None:
 def compile_linear() -> None:
     """The linear part and iterations for many unknowns; then the kernels of 2-D elements with the
     derivative in double precision, as sensitivities take it: by then `compile_2d` has left what
-    both share on disk; last the march in time that judges resonances.
+    both share on disk; last what judges resonances in time.
     """
     plane = _plane_model()
     # its flexibility without springs is a kernel of its own
@@ -93,7 +95,11 @@ def compile_linear() -> None:
     )
     inverse(np.ones((3, 5)), 1e-6)
     evaluate(plane.elements, np.full((1, 3, 5), 0.1), 64)
-    march_ring(plane, state_of_solution(plane, solve(plane, 1.0, 2, 64)), 1)
+    point = solve(plane, 1.0, 2, 64)
+    march_ring(plane, state_of_solution(plane, point), 1)
+    # the closer look of a verdict: `compile_2d` has the first one, in single precision
+    contacts, nodes = linearised_contacts(plane, point, sector_modes(plane), 64)
+    flow_map(contacts, nodes, 2 * np.pi / 64, 1)
 
 
 def _line_model() -> ReducedModel:
