@@ -37,7 +37,8 @@ def mesh_model(
 ) -> Mesh:
     """Generate the mesh of the current model, raise its order, and extract it.
 
-    Where flat cells are left, solids are meshed anew with smaller elements, and a note says so.
+    Where flat cells are left, solids are meshed anew by another algorithm, then with smaller
+    elements, and notes say so.
 
     Raises:
         InputError: the elements are far too many, or flat ones are left whatever is tried.
@@ -45,11 +46,12 @@ def mesh_model(
     if size.size:
         check_count(gmsh, dimension, size.scale * size.size)
     smaller = SIZE_FACTORS if dimension == 3 else SIZE_FACTORS[:1]
+    notes: tuple[str, ...] = ()
     for factor in smaller:
         gmsh.option.setNumber("Mesh.MeshSizeFactor", factor * size.scale)
         gmsh.model.mesh.generate(2)
         if dimension == 3:
-            fill_with_tetrahedra(gmsh, groups, size.algorithm)
+            notes = fill_with_tetrahedra(gmsh, groups, size.algorithm)
         first_order = _first_order_mesh(gmsh, groups, dimension)
         if _worst_shape(first_order) > REFUSED_QUALITY or factor == smaller[-1]:
             break
@@ -58,36 +60,44 @@ def mesh_model(
     if size.order == 2:
         second_order(gmsh, size.curved)
     mesh = extract_mesh(gmsh, groups, dimension)
-    if factor == 1.0:
-        return mesh
-    note = (
-        f"elements are {factor:g} times as large as asked for: parts that nearly coincide left "
-        "flat ones otherwise"
-    )
-    return replace(mesh, report={**mesh.report, "notes": (note,)})
+    if factor != 1.0:
+        notes += (
+            f"elements are {factor:g} times as large as asked for: parts that nearly coincide left "
+            "flat ones otherwise",
+        )
+    return replace(mesh, report={**mesh.report, "notes": notes}) if notes else mesh
 
 
 def fill_with_tetrahedra(
     gmsh: ModuleType,
     groups: Groups,
     first: str,
-) -> None:
+) -> tuple[str, ...]:
     """Fill the volumes with tetrahedra by one algorithm, then by the other when the first fails or
     leaves flat cells.
+
+    Returns:
+        A note where it was the other.
 
     Raises:
         Exception: gmsh's own, when the last algorithm fails.
     """
+    failure = ""
     for algorithm in sorted(ALGORITHMS, key=lambda name: name != first):
         gmsh.option.setNumber("Mesh.Algorithm3D", ALGORITHMS[algorithm])
         try:
             gmsh.model.mesh.generate(3)
             if improve_tetrahedra(gmsh, groups) > REFUSED_QUALITY:
-                return
-        except Exception:
+                break
+            failure = failure or "left flat cells"
+        except Exception as error:
             # gmsh raises the bare class
             if algorithm != first:
                 raise
+            failure = f"failed ({' '.join(str(error).split()) or 'no reason given'})"
+    if not failure:
+        return ()
+    return (f"gmsh {failure} with mesh.algorithm = '{first}': meshed with '{algorithm}'",)
 
 
 def refuse_flat(mesh: Mesh) -> None:

@@ -72,9 +72,12 @@ def test_flat_cells_are_meshed_anew_with_smaller_elements(monkeypatch):
     from geometry import finalise_mesh
 
     parts = [t() for t in TABLES]
-    monkeypatch.setattr(
-        finalise_mesh, "fill_with_tetrahedra", lambda gmsh, *_: gmsh.model.mesh.generate(3)
-    )
+
+    def filled_once(gmsh, *_):
+        gmsh.model.mesh.generate(3)
+        return ()
+
+    monkeypatch.setattr(finalise_mesh, "fill_with_tetrahedra", filled_once)
     plain = wedge_sector(*parts, MeshSize(size=1.2e-2))
     found = iter([0.001])
     true = finalise_mesh._worst_shape
@@ -82,6 +85,29 @@ def test_flat_cells_are_meshed_anew_with_smaller_elements(monkeypatch):
     mesh = wedge_sector(*parts, MeshSize(size=1.2e-2))
     assert mesh.report["notes"][0].startswith("elements are 0.8 times as large as asked for")
     assert mesh.report["cells"] > plain.report["cells"]
+    check_mesh(mesh)
+
+
+@pytest.mark.parametrize("fails", [True, False])
+def test_the_other_algorithm_is_told(monkeypatch, fails):
+    """The first one counts as failed, or its mesh as flat."""
+    from geometry import finalise_mesh
+
+    true, calls = finalise_mesh.improve_tetrahedra, []
+
+    def poor_at_first(gmsh, groups):
+        calls.append(gmsh.option.getNumber("Mesh.Algorithm3D"))
+        if len(calls) == 1 and fails:
+            raise Exception("no tetrahedra")
+        return true(gmsh, groups) if len(calls) > 1 else 0.0
+
+    monkeypatch.setattr(finalise_mesh, "improve_tetrahedra", poor_at_first)
+    mesh = wedge_sector(*[t() for t in TABLES], MeshSize(size=1.2e-2))
+    assert calls == [10, 1]
+    why = "failed (no tetrahedra)" if fails else "left flat cells"
+    assert mesh.report["notes"] == (
+        f"gmsh {why} with mesh.algorithm = 'hxt': meshed with 'delaunay'",
+    )
     check_mesh(mesh)
 
 
