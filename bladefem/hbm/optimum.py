@@ -192,7 +192,7 @@ def _first_level(
             known = add_peak(search.along.with_slope(model, peak, value), known)
     if not known:
         raise NotSolvedError(
-            f"no peak in the band of {search.band_in_words} with {search.said(value)}: {reason}"
+            f"no peak in the band of {search.band_in_words} with {search.value_in_words(value)}: {reason}"
         )
     return known, points
 
@@ -241,7 +241,7 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
         points += count
     raise NotSolvedError(
         f"the optimum was not closed in with {MOST_LEVELS} values, the last of them "
-        f"{search.said(value)}"
+        f"{search.value_in_words(value)}"
     )
 
 

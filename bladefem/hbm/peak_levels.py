@@ -63,7 +63,7 @@ class PeakSearch:
         """Name of the parameter."""
         return self.along.name
 
-    def said(self, value: float) -> str:
+    def value_in_words(self, value: float) -> str:
         """A value of the parameter in words: "load 78.9 N"."""
         return f"{self.name} {value:.4g} {self.along.unit}".rstrip()
 
@@ -204,7 +204,7 @@ def solve_level(
     met, count = look_over_band(search, value)
     if met is None:
         raise NotSolvedError(
-            f"the peaks leave the band of {search.band_in_words} with {search.said(value)}"
+            f"the peaks leave the band of {search.band_in_words} with {search.value_in_words(value)}"
         )
     return [met], points + count
 

@@ -216,11 +216,15 @@ def _bench(
         else {f"error{end}": np.nan for end in ("", "_frequency", "_phasor")}
     )
     harmonics, samples = REFERENCE_SETTINGS[len(reached) - 1]
-    moved = f"changed by {percent(doubt['error'])} on" if len(reached) > 1 else "of"
+    moved = (
+        f"changed by {percent(doubt['error'])} on its last rung"
+        if len(reached) > 1
+        else "the only one reached"
+    )
     course.remarks.append(
         f"reference of the {name}: H {harmonics}, {samples} samples, resonance by the parabola "
         f"through the highest three frequencies {truth.frequency:.6g} Hz, "
-        f"{1e6 * truth.amplitude:.6g} um, {moved} its last rung"
+        f"{1e6 * truth.amplitude:.6g} um, {moved}"
     )
     return Bench(omegas, truth, doubt)
 
