@@ -192,7 +192,8 @@ def _first_level(
             known = add_peak(search.along.with_slope(model, peak, value), known)
     if not known:
         raise NotSolvedError(
-            f"no peak in the band of {search.band_in_words} with {search.value_in_words(value)}: {reason}"
+            f"no peak in the band of {search.band_in_words} with "
+            f"{search.value_in_words(value)}: {reason}"
         )
     return known, points
 

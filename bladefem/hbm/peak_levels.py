@@ -204,7 +204,8 @@ def solve_level(
     met, count = look_over_band(search, value)
     if met is None:
         raise NotSolvedError(
-            f"the peaks leave the band of {search.band_in_words} with {search.value_in_words(value)}"
+            f"the peaks leave the band of {search.band_in_words} with "
+            f"{search.value_in_words(value)}"
         )
     return [met], points + count
 

@@ -109,8 +109,8 @@ def _add_multiple(factor, values, target):
             target[k] += factor * values[k]
 
 
-# Matrices this small take BLAS several times as long as plain loops. Sums may be taken in another
-# order and in one instruction with a product, so that they are vectorised.
+# BLAS takes longer for matrices this small, see `benchmarks/time_kernels.py`. Sums may be taken in
+# another order and in one instruction with a product, so that they are vectorised.
 
 
 @njit(fastmath={"contract"}, **INNER_KERNEL)
