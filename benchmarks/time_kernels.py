@@ -7,9 +7,9 @@ the map of disturbances in single precision against double, and the readings of 
 groups of modes that turn alike against the matrix of all blades and modes by BLAS. Alternating, the
 best of REPEATS, so that other work on the machine counts little.
 
-Recorded in four runs beside other work: maps 0.71 to 0.75 of the time, multipliers 4e-6 off; readings
-and forces in modes 0.86 to 0.94 with 8 contact points a blade, 0.52 to 0.58 with 16, 0.32 to 0.42
-with 64. Maps of the shipped wedge, whose normal springs join the bodies: 0.55 to 0.63.
+Recorded in four runs beside other work: maps 0.71 to 0.75 of the time, multipliers 4e-6 off;
+readings and forces in modes 0.86 to 0.94 with 8 contact points a blade, 0.52 to 0.58 with 16, 0.32
+to 0.42 with 64. Maps of the shipped wedge, whose normal springs join the bodies: 0.55 to 0.63.
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ Bodies step exactly between two instants (`bladefem.hbm.linearised_flow.group_st
 forces follow implicitly from the derivatives of the friction law's own steps
 (`bladefem.hbm.linearised_flow.contact_steps`). All disturbances are carried at once, so that nearly
 all operations are products of matrices, which single precision makes 1.3 to 1.8 times as fast
-(`benchmarks/time_kernels.py`, the shipped wedge): maps and multipliers are 1e-5 off there. The small
-systems of the contacts are solved in double precision in any case.
+(`benchmarks/time_kernels.py`, the shipped wedge): maps and multipliers are 1e-5 off there. The
+small systems of the contacts are solved in double precision in any case.
 """
 
 from __future__ import annotations
