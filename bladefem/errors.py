@@ -31,8 +31,13 @@ def missing_file(path: str | Path) -> str:
 def suggestion(word: str, known: Iterable[str]) -> str:
     """The tail of an error message: "; did you mean 'twist'?", or the known words when none is
     close.
+
+    >>> suggestion("twsit", ["twist", "span"]), suggestion("clamp", [])
+    ("; did you mean 'twist'?", '; there are none')
     """
     known = sorted(known)
+    if not known:
+        return "; there are none"
     close = close_word(word, known)
     return f"; did you mean '{close}'?" if close else f"; known are {', '.join(known)}"
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from wheels import ring
 
 from bladefem.errors import InputError
 from bladefem.hbm.model import Damping
-from bladefem.scene.tables import Excitation, Operation, Scene
+from bladefem.scene.tables import Excitation, Operation, Scene, Support
 from bladefem.study.modes import survey
 from bladefem.study.pipeline import pipeline
-from bladefem.study.pipeline.validate_mesh import found_patches, refuse_loads
+from bladefem.study.pipeline.validate_mesh import check_blade, found_patches, refuse_loads
 
 NOSE = Scene(excitation=Excitation(at="nose"))
 
@@ -23,6 +25,15 @@ def test_node_set_and_pair_are_missed_together():
         found_patches(NOSE, ring(), excited=True)
     with pytest.raises(InputError, match=r"^the mesh has no contact pair on its right seat"):
         found_patches(NOSE, ring(), excited=False)
+
+
+def test_a_clamp_that_the_mesh_does_not_have_names_its_field_and_what_there_is():
+    scene = Scene(support=Support(clamp="clmap"))
+    with pytest.raises(InputError, match=r"^support\.clamp = 'clmap': .*did you mean 'clamp'\?$"):
+        check_blade(scene, ring())
+    bare = replace(ring(), faces={}, nodes={})
+    with pytest.raises(InputError, match=r"expected one that holds the blade; there are none$"):
+        check_blade(scene, bare)
 
 
 def test_faces_of_loads():

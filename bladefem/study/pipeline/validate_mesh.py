@@ -95,8 +95,9 @@ def check_blade(scene: Scene, mesh: Mesh) -> None:
             f"{kind.result}, 'bladefem mesh' draws it"
         )
     clamp = scene.support.clamp
-    if clamp and clamp not in (*mesh.faces, *mesh.nodes):
+    names = [*mesh.faces, *mesh.nodes]
+    if clamp and clamp not in names:
         raise InputError(
-            f"the mesh has no face or node set '{clamp}' to hold the blade; it has "
-            f"{', '.join(sorted((*mesh.faces, *mesh.nodes)))}"
+            f"support.clamp = '{clamp}': the mesh has no such face or node set, expected one that "
+            f"holds the blade{suggestion(clamp, names)}"
         )
