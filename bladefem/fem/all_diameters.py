@@ -46,6 +46,7 @@ from .modes import (
     BLOCKS,
     DIRECTION_TOLERANCE,
     GAP_SHARE,
+    MIN_GAP,
     SLEPC,
     highest_gap,
     lowest_pairs,
@@ -342,6 +343,9 @@ def _extend_space(
     """
     new = _span_parts(blocks, t, known)
     blocks.clear()
+    if known is not None and not new.shape[1]:
+        # it holds every motion of a coarse sector already
+        return known
     old = 0 if known is None else known.W.shape[1]
     width = old + new.shape[1]
     store = np.empty((len(new), max(room, width)), order="F") if known is None else known.store
@@ -378,13 +382,15 @@ def _initial_vectors(
     nodal_diameter: int,
     count: int,
 ) -> np.ndarray:
-    """(n_own, count) lowest vectors of the projected pencil, in single precision: the space is
+    """(n_own, count at most) lowest vectors of the projected pencil, in single precision: the space is
     wrong by more, and those of all nodal diameters wait side by side.
     """
-    Z = _projected_modes(space.K, space.M, 2 * np.pi * nodal_diameter / t.sectors, count)
+    angle = 2 * np.pi * nodal_diameter / t.sectors
+    # a coarse sector has fewer than ``count``
+    Z = _projected_modes(space.K, space.M, angle, count)
     if 2 * nodal_diameter % t.sectors == 0:
         return np.asarray(linear_combinations(space.W, Z.real), np.float32)
-    out = np.empty((len(space.W), count), np.complex64, order="F")
+    out = np.empty((len(space.W), Z.shape[1]), np.complex64, order="F")
     out.real, out.imag = linear_combinations(space.W, Z.real), linear_combinations(space.W, Z.imag)
     return out
 
@@ -401,7 +407,8 @@ def _span_parts(
     W = np.empty((len(parts[0]), sum(part.shape[1] for part in parts)), order="F")
     np.concatenate(parts, axis=1, out=W)
     gram = inner_products(t.body.comm, W, W)
-    length = np.sqrt(gram.diagonal())
+    # imaginary parts are zero where nothing joins the sectors
+    length = np.maximum(np.sqrt(gram.diagonal()), np.finfo(float).tiny ** 0.25)
     if known is not None:
         W = subtract_product(W, [known.W], inner_products(t.body.comm, known.W, W))
         gram = inner_products(t.body.comm, W, W)
@@ -622,5 +629,8 @@ def _counting_shift(lists: list[np.ndarray]) -> float:
     below = below[below > 0]
     if len(below) < 2:
         return float(top) * (1 - 1e-6)
-    i = highest_gap(below) - 1
-    return float(below[i] + GAP_SHARE * (below[i + 1] - below[i]))
+    gap = highest_gap(below)
+    if gap is None:
+        # all are one multiple eigenvalue: between its copies there is rounding alone
+        return float(top) * (1 + MIN_GAP)
+    return float(below[gap - 1] + GAP_SHARE * (below[gap] - below[gap - 1]))

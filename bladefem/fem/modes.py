@@ -284,22 +284,23 @@ def count_below(con: Constrained, lam: float) -> int:
     return inertia(combined(con.K, -lam, con.M))
 
 
-def highest_gap(lam: np.ndarray) -> int:
+def highest_gap(lam: np.ndarray) -> int | None:
     """Number of the eigenvalue above the highest gap of ascending lam (m,) that is wide enough to
-    count below it: what is missing anywhere under the gap shows. The widest where none is.
+    count below it: what is missing anywhere under the gap shows. None where no gap is.
     """
     gaps = np.diff(lam) / np.maximum(lam[1:], np.finfo(float).tiny)
     wide = np.flatnonzero(gaps > MIN_GAP)
-    return 1 + int(wide[-1] if len(wide) else np.argmax(gaps))
+    return 1 + int(wide[-1]) if len(wide) else None
 
 
 def _counting_shift(lam: np.ndarray) -> tuple[float, int]:
     """A shift [rad^2/s^2] near the upper end of the highest gap, and how many are below it: a gap
-    may be wide because of what is missing in it.
+    may be wide because of what is missing in it. Above all of them where they are one multiple
+    eigenvalue: between its copies there is rounding alone.
     """
-    if len(lam) < 2:
-        return lam[-1] * 1.0001, len(lam)
     gap = highest_gap(lam)
+    if gap is None:
+        return lam[-1] * (1 + MIN_GAP), len(lam)
     return lam[gap - 1] + GAP_SHARE * (lam[gap] - lam[gap - 1]), gap
 
 

@@ -69,14 +69,15 @@ def open_sector(
         own: unknowns of this rank.
 
     Returns:
-        None where the sector is all cut face, or where ranks cannot be parted.
+        None where the sector is all cut face or its cut faces are all held, or where ranks cannot
+        be parted.
     """
     rows = T.tocoo()
     unit = (rows.data == 1) & (np.diff(T.indptr)[rows.row] == 1)
     places = np.empty(T.shape[1], int)
     places[rows.col[unit]] = rows.row[unit]
     rim = core.rim_of(pattern[places])
-    if len(rim) == len(places):
+    if len(rim) in (0, len(places)):
         return None
     if body.comm.size == 1:
         both = _open_stiffness(body, T, start), _open_mass(body, T, start)

@@ -10,9 +10,9 @@ from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem import all_diameters as wheel
 from bladefem.fem.all_diameters import all_diameters, eigenpairs
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import at_diameter, transformation
+from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.linalg import COLUMNS_AT_A_TIME, apply_block
-from bladefem.fem.modes import count_below
+from bladefem.fem.modes import count_below, modes
 from bladefem.scene.tables import Material
 
 
@@ -45,6 +45,27 @@ def test_one_core_equals_three_matrices():
     )
     for a, b in zip(one, three, strict=True):
         np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
+
+
+@pytest.mark.parametrize("count", [3, 24, 36])
+def test_sectors_with_fewer_unknowns_than_guesses(count):
+    """The motions of three nodal diameters span all of a sector of 36 degrees of freedom."""
+    body = assemble(sector(13, (3, 2, 1), "hexahedron"), "blade", Material())
+    some = all_diameters(body, count)
+    for a, b in zip(some, all_diameters(body, count, direct=True), strict=True):
+        assert len(a.frequencies) == count
+        np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-9)
+
+
+@pytest.mark.mpi
+def test_cut_faces_that_are_held():
+    """Nothing joins the sectors: the modes of one alone in each nodal diameter."""
+    mesh = sector(9, (3, 2, 2), "hexahedron")
+    held = np.concatenate([mesh.faces["y0"], mesh.faces["y1"]])
+    body = assemble(replace(mesh, faces={**mesh.faces, "clamp": held}), "blade", Material())
+    alone = modes(constrain(body, "clamp"), 5).frequencies
+    for found in all_diameters(body, 5):
+        np.testing.assert_allclose(found.frequencies, alone, rtol=1e-9)
 
 
 def test_chosen_diameters_keep_their_order():
