@@ -382,8 +382,8 @@ def _initial_vectors(
     nodal_diameter: int,
     count: int,
 ) -> np.ndarray:
-    """(n_own, count at most) lowest vectors of the projected pencil, in single precision: the space is
-    wrong by more, and those of all nodal diameters wait side by side.
+    """(n_own, count at most) lowest vectors of the projected pencil, in single precision: the space
+    is wrong by more, and those of all nodal diameters wait side by side.
     """
     angle = 2 * np.pi * nodal_diameter / t.sectors
     # a coarse sector has fewer than ``count``

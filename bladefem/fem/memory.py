@@ -50,6 +50,18 @@ FACTOR_BYTES = 100.0
 # sector, in the above already
 CUT_FACE_BYTES = 60.0
 USUAL_CUT_FACE = 0.7
+# of a container: limit, memory in use, its parts, and the name of that part which is files nobody
+# has used lately; control groups of version 2 and of version 1
+_GROUPS = Path("/sys/fs/cgroup")
+CONTAINER_FILES = (
+    (_GROUPS / "memory.max", _GROUPS / "memory.current", _GROUPS / "memory.stat", "inactive_file"),
+    (
+        _GROUPS / "memory/memory.limit_in_bytes",
+        _GROUPS / "memory/memory.usage_in_bytes",
+        _GROUPS / "memory/memory.stat",
+        "total_inactive_file",
+    ),
+)
 
 
 def modal_solve_memory(
@@ -80,11 +92,19 @@ def available_memory() -> float:
     if meminfo.exists():
         rows = dict(line.split(":", 1) for line in meminfo.read_text().splitlines() if ":" in line)
         out = 1024.0 * int(rows.get("MemAvailable", rows["MemFree"]).split()[0])
-    limit = Path("/sys/fs/cgroup/memory.max")
-    used = Path("/sys/fs/cgroup/memory.current")
-    if limit.exists() and used.exists() and limit.read_text().strip().isdigit():
-        out = min(out, float(limit.read_text()) - float(used.read_text()))
-    return out
+    return min([out, *(_container_memory(*files) for files in CONTAINER_FILES)])
+
+
+def _container_memory(limit: Path, used: Path, stat: Path, cache: str) -> float:
+    """What a container can still give [bytes]; infinite where it has no limit.
+
+    Files that the system keeps in memory count as used there, but make room for whoever needs it.
+    """
+    if not (limit.exists() and used.exists() and limit.read_text().strip().isdigit()):
+        return float("inf")
+    rows = dict(line.split() for line in stat.read_text().splitlines()) if stat.exists() else {}
+    free = float(limit.read_text()) - float(used.read_text()) + float(rows.get(cache, 0))
+    return max(free, 0.0)
 
 
 def give_back() -> None:

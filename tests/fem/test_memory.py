@@ -76,6 +76,31 @@ def test_too_large_is_refused_with_advice():
         check_memory(1_000_000, MPI.COMM_WORLD, free=2e9)
 
 
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("memory.max", "memory.current", "memory.stat", "inactive_file"),
+        ("limit_in_bytes", "usage_in_bytes", "memory.stat", "total_inactive_file"),
+    ],
+)
+def test_files_that_a_container_keeps_in_memory_are_free(tmp_path, monkeypatch, names):
+    """As the kernel counts: of 3 MB with 2.9 MB in use 2 MB are files that can go."""
+    files = [tmp_path / name for name in names[:3]]
+    for file, text in zip(
+        files, ("3000000\n", "2900000\n", f"anon 900000\n{names[3]} 2000000\n"), strict=True
+    ):
+        file.write_text(text)
+    monkeypatch.setattr(memory, "CONTAINER_FILES", ((*files, names[3]),))
+    assert available_memory() == 2.1e6
+    files[0].write_text("max\n")
+    assert available_memory() > 3e6
+    # more in use than the limit, as after it was lowered
+    files[0].write_text("100\n")
+    assert available_memory() == 0
+    with pytest.raises(InputError, match=r" 0\.0 GB are free; expected at most about 0 degrees"):
+        check_memory(1_000_000, MPI.COMM_SELF)
+
+
 def test_small_fits():
     plan = check_memory(1000, MPI.COMM_SELF)
     assert 0 < plan.memory < available_memory() and not plan.on_disk
