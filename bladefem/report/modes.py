@@ -267,7 +267,8 @@ def _numbers(
     families: Sequence[str],
     result: Survey,
 ) -> list[Headline]:
-    """The first frequencies with the error of the mesh, where that is known."""
+    """The first frequencies above zero with the error of the mesh, where that is known."""
+    elastic = np.flatnonzero(excited.frequencies > 0)[:MAX_HEADLINES]
     errors = {}
     if result.convergence is not None:
         known = result.convergence.summary
@@ -293,7 +294,7 @@ def _numbers(
             f"± {percent(errors[i + 1])} (mesh)" if i + 1 in errors else "mesh error not studied",
             f"{diameter}residual {excited.residuals[i]:.0e}",
         )
-        for i in range(min(MAX_HEADLINES, len(excited.frequencies)))
+        for i in elastic
     ]
 
 

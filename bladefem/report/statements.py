@@ -75,8 +75,8 @@ def response_answer(
         said = [f"No optimum load is named: {reason}." for reason in against]
         unknown = ("optimum normal load per seat", "not determined", against[0])
         return ResponseAnswer([unknown, lowest], [*said, *doubts])
-    # one load alone has no optimum
-    alone = not by_search and len(finite) == 1
+    # one load alone has no optimum, whatever the number of masses
+    alone = not by_search and finite["load"].nunique() == 1
     title = "normal load per seat" if alone else "optimum normal load per seat"
     numbers = _optimum_numbers(summary, best, title, remark)
     return ResponseAnswer(
@@ -300,13 +300,14 @@ def cautions(
         exact: the best load was searched for, and need not be one of those studied.
     """
     found = []
-    if len(finite) == 1:
+    loads = finite["load"].nunique()
+    if loads == 1:
         found.append(
             "Only one load was studied: whether it is the optimum is not known; give more "
             "study.loads."
         )
     ends = (finite["load"].min(), finite["load"].max())
-    if len(finite) > 1 and not exact and best["load"] in ends:
+    if loads > 1 and not exact and best["load"] in ends:
         end = "smallest" if best["load"] == finite["load"].min() else "largest"
         found.append(
             f"The best load is the {end} one studied: the true optimum may lie beyond it; widen "

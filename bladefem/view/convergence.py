@@ -38,7 +38,8 @@ def draw_convergence(
     """
     keys = [key for key in ("nodal_diameter", "mode") if key in summary]
     with canvas(file, ax, (7.6, 4.6)) as ax:
-        for i, row in enumerate(summary.itertuples()):
+        # rigid modes have no frequency to change
+        for i, row in enumerate(summary[summary["frequency"] > 0].itertuples()):
             line = points[np.logical_and.reduce([points[key] == getattr(row, key) for key in keys])]
             _draw_mode(ax, line.sort_values("size"), row, COLOURS[i % len(COLOURS)])
         ax.axhline(0.0, color="#999999", lw=0.8, zorder=1)

@@ -384,6 +384,12 @@ def test_one_load_alone_is_not_called_the_optimum():
     found = headlines(response_answer(one), one, None)
     assert found[0][:3] == ("normal load per seat", "200 N", "only one load studied")
     assert not any("optimum" in line.what for line in found)
+    # nor with several dampers
+    two = pd.concat([one.assign(mass=mass) for mass in (0.01, 0.02)], ignore_index=True)
+    answer = response_answer(two)
+    assert not any("optimum" in what for what, _, _ in answer.numbers)
+    assert any("Only one load" in text for text in answer.cautions)
+    assert not any("smallest" in text for text in answer.cautions)
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import body_mass
 from bladefem.fem.modes import modes
 from bladefem.fem.stiffness_error import frequency_errors
+from bladefem.report.modes import _numbers
 from bladefem.scene.tables import Material
 from bladefem.scene.toml import load_scene, scene_of
 from bladefem.study.modes.effective_mass import effective_masses
@@ -30,6 +31,7 @@ from bladefem.study.modes.frequency_error import (
     richardson,
 )
 from bladefem.study.modes.mesh_convergence import (
+    MODES_STUDIED,
     SIZE_RATIOS,
     SolvedMesh,
     default_sizes,
@@ -37,6 +39,7 @@ from bladefem.study.modes.mesh_convergence import (
     of_meshes,
     paired_modes,
 )
+from bladefem.study.modes.survey import Wanted, survey_modes
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.normal_modes import find_modes
 from bladefem.study.pipeline.scene_mesh import build_mesh
@@ -261,6 +264,30 @@ def test_a_mesh_of_a_file_is_halved(tmp_path):
     assert (true > 1e-3).all() and (true < 1.2 * row["given_error"]).all()
     assert (row["given_error"] < 4 * true).all()
     assert (row["error"] < row["given_error"]).all()
+
+
+def test_the_elastic_modes_of_a_free_body_are_studied(tmp_path):
+    """A file's bar that nothing holds: six rigid modes, exact on any mesh, before the five whose
+    error is asked for; headlines begin with those.
+    """
+    write_msh(box((2, 1, 1), (0.1, 0.02, 0.03), "hexahedron27"), tmp_path / "a.msh")
+    tables = {
+        "kind": "imported",
+        "imported": {"file": str(tmp_path / "a.msh")},
+        "operation": {"speed": "0 rpm", "stiffening": False},
+        "support": {"clamp": ""},
+        "excitation": {"at": "x1"},
+    }
+    survey = survey_modes(scene_of(tables), tmp_path / "run", Wanted(sizes=()))
+    found = survey.convergence.summary
+    assert len(found) == 6 + MODES_STUDIED
+    np.testing.assert_array_equal(found["given_error"][:6], 0)
+    # halved twice: (1/4)^4 of the error is left
+    true = found["given"][6:] / found["limit"][6:].fillna(found["frequency"]) - 1
+    assert (true < 1.1 * found["given_error"][6:]).all() and (true[:2] > 1e-4).all()
+    excited = survey.run.modes[0]
+    first, *_ = _numbers(excited, [""] * len(excited.frequencies), survey)
+    assert first.what == "mode 7, " and "nan" not in first.uncertainty
 
 
 def test_cells_of_mixed_shapes_are_halved(tmp_path):

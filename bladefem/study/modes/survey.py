@@ -35,7 +35,7 @@ from .clamped_aerofoil import clamped_blade
 from .comparison import mac
 from .effective_mass import effective_masses
 from .linear_response_report import ForcedResponseAnswer, forced_response_answer
-from .mesh_convergence import Convergence, default_sizes, mesh_convergence
+from .mesh_convergence import MODES_STUDIED, Convergence, default_sizes, mesh_convergence
 
 # engine orders above the scene's own, in Campbell and SAFE diagrams; all below it are looked at,
 # since the lowest carry most of an uneven inflow
@@ -122,11 +122,14 @@ def survey_modes(
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
         sizes = list(wanted.sizes) or default_sizes(scene)
-        n = excited_set(run).nodal_diameter
+        excited = excited_set(run)
+        n = excited.nodal_diameter
+        # after the rigid modes, which any mesh has exactly
+        count = MODES_STUDIED + int(np.count_nonzero(excited.frequencies == 0))
         result = replace(
             result,
             convergence=mesh_convergence(
-                scene, sizes, None if n is None else [n], comm=comm, progress=progress
+                scene, sizes, None if n is None else [n], count, comm, progress
             ),
         )
         clock = _stage_seconds(run, "mesh refinement", clock)
