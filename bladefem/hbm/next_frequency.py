@@ -70,6 +70,9 @@ def next_frequency(
         return None
     finest = FINEST_PEAK_STEP * accuracy[0] * (tried[-1] - tried[0])
     heights = np.array([height(w) for w in omegas.tolist()])
+    if not heights.any():
+        # a probe that does not move has no curve
+        return None
     for target in chain(
         _peak_targets(omegas, heights, slope, accuracy), _corner_targets(omegas, heights, curve)
     ):

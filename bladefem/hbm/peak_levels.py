@@ -233,9 +233,10 @@ def look_over_band(
     found = response(model, looked, search.H, search.samples, options=search.options)
     points = [point for point in found if point.converged]
     spent = len(points)
-    for top in sorted(local_maxima(points), key=lambda point: -size(point))[:2]:
+    probe = search.options.probe
+    for top in sorted(local_maxima(points, probe), key=lambda point: -size(point, probe))[:2]:
         if met and (
-            size(top) < NEARLY_HIGHEST * met.height
+            size(top, probe) < NEARLY_HIGHEST * met.height
             or abs(top.omega / met.omega - 1) < SAME_PEAK_LOSS
         ):
             continue

@@ -1,11 +1,12 @@
 """Peaks and optima against brute force."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from models import block, folding_pair
+from models import block, folding_pair, single_mass
 
 from bladefem.data import Elements
 from bladefem.errors import NotSolvedError
@@ -14,12 +15,12 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.optimum import higher_from_neighbours, lowest_peak, optimum
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak, with_slope
-from bladefem.hbm.peak_levels import PeakSearch, Variation
+from bladefem.hbm.peak_levels import PeakSearch, Variation, look_over_band
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
-from bladefem.hbm.sweep import response
+from bladefem.hbm.sweep import response, sweep
 from bladefem.reduction.matrices import port_model_from_matrices
 
 HZ = 2 * np.pi
@@ -331,3 +332,31 @@ def test_the_foot_of_a_jump_does_not_close_a_peak_in():
     heights, slopes = squares**-0.5, -(omegas - 321.0) * squares**-1.5
     resonance = [look(*reading) for reading in zip(omegas, heights, slopes, strict=True)]
     assert not peak_module._jumps_between(*resonance)
+
+
+def test_a_look_over_the_band_measures_at_the_probe_that_is_asked_for():
+    """Two masses: the highest peak of the second is 0.5 rad/s above that of the first."""
+    ports = {"contact": np.array([0]), "load": np.array([0, 1]), "probe": np.array([0, 1])}
+    K = np.array([[1.05, -0.05], [-0.05, 2.3]])
+    body = port_model_from_matrices(np.eye(2), K, ports)
+    contact = Elements(np.array([0.5]), np.zeros(1), np.ones(1), np.array([0.5]), tangents=1)
+    model = ReducedModel((body,), contact, {1: np.array([1.0, 1.0])}, Damping(ratio=0.01))
+    for probe in (0, 1):
+        along = Variation(
+            lambda factor: vary(model, "load", factor),
+            partial(lambda probe, *peak: with_slope(*peak[:2], "load", peak[2], probe), probe),
+        )
+        options = replace(DEFAULT_OPTIONS, probe=probe)
+        search = PeakSearch(along, (0.8, 2.0), 3, 128, (0.1, 10.0), 1e-3, options)
+        met, _ = look_over_band(search, 1.0)
+        assert met is not None
+        points = response(model, np.linspace(0.8, 2.0, 120), 3, 128)
+        assert met.height >= max(size(point, probe) for point in points)
+
+
+def test_a_probe_that_does_not_move_has_no_curve_to_refine():
+    """400 points were solved, with a note that peaks may be higher."""
+    notes = []
+    points = list(sweep(single_mass(force=0.0), (0.5, 2.0), notes=notes))
+    assert len(points) < 20 and not notes
+    assert all(size(point) == 0 for point in points)
