@@ -55,6 +55,8 @@ def read_npz(path: str | Path, key: str) -> Any:
         TypeError,
         AttributeError,
         ImportError,
+        # of a zip file whose head asks for what Python's cannot do
+        RuntimeError,
     ) as error:
         raise ValueError(f"{path}: not a stored stage ({error})") from error
 

@@ -58,7 +58,13 @@ def lock_run_folder(
     Raises:
         InputError: another process holds it, or the folder cannot be written.
     """
-    before = folder_state(folder)
+    try:
+        before = folder_state(folder)
+    except OSError as error:
+        # in a folder that may not be entered, or of a name that is too long
+        raise InputError(
+            f"folder {folder}: cannot be written ({error.strerror or error})"
+        ) from None
     path = open_folder(folder) / ".lock"
     try:
         file = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)

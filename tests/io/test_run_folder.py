@@ -133,6 +133,15 @@ def test_bad_input_leaves_no_folder_behind(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_folder_whose_state_cannot_be_read_is_refused(tmp_path):
+    folder = tmp_path / ("x" * 300)
+    with (
+        pytest.raises(InputError, match="cannot be written .File name too long"),
+        lock_run_folder(folder),
+    ):
+        pass
+
+
 def test_bad_input_brings_back_what_was_put_away(tmp_path):
     with lock_run_folder(tmp_path):
         take_folder(tmp_path, Scene())
