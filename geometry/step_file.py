@@ -1,12 +1,12 @@
 """STEP files through OpenCASCADE: import, names, periodic meshing, and then the same road as any
 imported mesh.
 
-Names come from the file: the solids' (MANIFOLD_SOLID_BREP, else the product's name) and the faces'
-(ADVANCED_FACE). What has no name is called body_1, body_2, ... and face_1, face_2, ... in gmsh's
-numbering, the order of the file. When no face is called cyclic_low, cyclic_high or clamp, they are
-looked for: two faces that the rotation to the next sector carries onto each other; the blade's face
-nearest to the engine axis. The user may name what the file does not. Solids are meshed separately:
-bodies that touch are not glued.
+Names come from the file (step_names.py): the solids' (MANIFOLD_SOLID_BREP, else the product's name)
+and the faces' (ADVANCED_FACE). What has no name is called body_1, body_2, ... and face_1, face_2,
+... in gmsh's numbering, the order of the file. When no face is called cyclic_low, cyclic_high or
+clamp, they are looked for: two faces that the rotation to the next sector carries onto each other;
+the blade's face nearest to the engine axis. The user may name what the file does not. Solids are
+meshed separately: bodies that touch are not glued.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ from .parameters import MeshSize, Wedge
 from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
 from .session import gmsh_session, gmsh_step
+from .step_names import solids_of_volumes, written_solids
 
 CONTACT_FACES = ("seat_left", "seat_right", "damper_left", "damper_right")
 # what to do about a file that gmsh cannot read
@@ -210,17 +211,30 @@ def _import_shapes(
 def _named_entities(gmsh: ModuleType, text: str) -> Named:
     """(dimension, name) -> entities, by the names in the file where they can be distinguished."""
     named: dict[tuple[int, str], list[int]] = {}
-    solids = _written_names(text)
     volumes = [tag for _, tag in gmsh.model.getEntities(3)]
-    for i, volume in enumerate(volumes):
-        faces = [tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False)]
-        body, words = solids[i] if len(solids) == len(volumes) else ("", [])
-        words = words if len(words) == len(faces) else [""] * len(faces)
+    faces_of = [
+        sorted(tag for _, tag in gmsh.model.getBoundary([(3, volume)], oriented=False))
+        for volume in volumes
+    ]
+    drawn = [
+        (len(faces), _corners(gmsh, volume))
+        for volume, faces in zip(volumes, faces_of, strict=True)
+    ]
+    found = solids_of_volumes(written_solids(text), drawn)
+    for volume, faces, solid in zip(volumes, faces_of, found, strict=True):
+        body, words = ("", ()) if solid is None else (solid.name, solid.faces)
+        words = words if len(words) == len(faces) else ("",) * len(faces)
         label = gmsh.model.getEntityName(3, volume).split("/")[-1]
         named.setdefault((3, body or label or f"body_{volume}"), []).append(volume)
-        for face, word in zip(sorted(faces), words, strict=True):
+        for face, word in zip(faces, words, strict=True):
             named.setdefault((2, word or f"face_{face}"), []).append(face)
     return named
+
+
+def _corners(gmsh: ModuleType, volume: int) -> np.ndarray:
+    """(n, 3) corners of a solid [m]."""
+    points = gmsh.model.getBoundary([(3, volume)], oriented=False, recursive=True)
+    return np.array([gmsh.model.getValue(0, tag, []) for _, tag in points]).reshape(-1, 3)
 
 
 def _apply_names(named: Named, wanted: dict[str, list[str]]) -> Named:
@@ -236,32 +250,6 @@ def _apply_names(named: Named, wanted: dict[str, list[str]]) -> Named:
         }
         result |= {(dim, name): tags for name, tags in rename_groups(groups, here).items()}
     return result
-
-
-def _written_names(text: str) -> list[tuple[str, list[str]]]:
-    """Name of each solid and of its faces, in the order of the file."""
-    record = {
-        int(n): body for n, body in re.findall(r"#(\d+)\s*=\s*(.*?);\s*(?=#|ENDSEC)", text, re.S)
-    }
-    solids = []
-    for body in (record[n] for n in sorted(record) if record[n].startswith("MANIFOLD_SOLID_BREP")):
-        head = re.match(r"MANIFOLD_SOLID_BREP\s*\(\s*'(.*?)'\s*,\s*#(\d+)", body, re.S)
-        if head is None:
-            raise InputError(
-                f"imported.file: solid '{body[:60]}', expected MANIFOLD_SOLID_BREP('name', #shell)"
-            )
-        name, shell = head.groups()
-        faces = re.findall(r"#(\d+)", record.get(int(shell), ""))
-        words = [
-            re.match(r"\w+\s*\(\s*'(.*?)'", record.get(int(face), "X('')"), re.S) for face in faces
-        ]
-        solids.append((_plain_name(name), [_plain_name(word[1]) if word else "" for word in words]))
-    return solids
-
-
-def _plain_name(name: str) -> str:
-    """A name worth using; CAD systems write NONE and the like."""
-    return "" if name.strip().upper() in ("", "NONE", "$") else name.strip()
 
 
 def _find_faces(

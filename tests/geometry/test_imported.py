@@ -2,6 +2,7 @@
 missing.
 """
 
+import re
 from dataclasses import replace
 
 import meshio
@@ -29,7 +30,7 @@ from geometry.plane import plane_blades
 from geometry.profile import turn_about_axis
 from geometry.sector import wedge_sector
 from geometry.session import gmsh_session
-from geometry.step_file import read_step
+from geometry.step_file import read_step, step_face_names
 
 
 def same(found, mesh, tolerance=1e-12):
@@ -181,6 +182,33 @@ def test_step_block_in_millimetres_with_named_faces(tmp_path):
     assert np.ptp(mesh.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
     same_numbers = read_step(tmp_path / "a.step", MeshSize(size=0.01), scale=1e-3)
     assert np.ptp(same_numbers.points, axis=0) == pytest.approx([0.1, 0.02, 0.03], rel=1e-6)
+
+
+def test_solids_of_a_step_file_are_told_by_their_corners(tmp_path):
+    """Its records may have numbers in any order: those that descend exchanged the names of blade
+    and damper, and of their faces.
+    """
+    file = tmp_path / "a.step"
+    write_step(file, "two", {"blade": [f"l{i}" for i in range(6)], "damper": ["s0"]})
+    text = file.read_text()
+    file.write_text(re.sub(r"#(\d+)", lambda found: f"#{5000 - int(found[1])}", text))
+    mesh = read_step(file, MeshSize(size=0.05, order=1))
+    extents = {name: np.ptp(mesh.points[np.unique(c)], axis=0) for name, c in mesh.bodies.items()}
+    np.testing.assert_allclose(extents["blade"], [0.03, 0.04, 0.05], rtol=1e-6)
+    np.testing.assert_allclose(extents["damper"], [0.01, 0.01, 0.02], rtol=1e-6)
+    assert mesh.points[mesh.faces["l0"], 0].max() < 0.04 < mesh.points[mesh.faces["s0"], 0].min()
+
+
+def test_names_of_a_hollow_solid_are_read_with_their_letters(tmp_path):
+    """As ISO 10303-21 writes a quotation mark and what is beyond ASCII."""
+    file = tmp_path / "a.step"
+    faces = ["Fl\\X2\\00FC\\X0\\gel 1", "7''", *[f"f{i}" for i in range(9)], "inside"]
+    write_step(file, "hollow", {"blade": faces})
+    names = step_face_names(file)
+    assert names == {"Flügel 1", "7'", *[f"f{i}" for i in range(9)], "inside"}
+    mesh = read_step(file, MeshSize(size=0.05, order=1), names=["clamp = Flügel 1"])
+    assert "clamp" in mesh.faces and list(mesh.bodies) == ["blade"]
+    assert mesh.points[mesh.faces["inside"]].max(axis=(0, 1))[0] < 0.021
 
 
 def test_groups_get_the_users_names(coarse_sector, tmp_path):

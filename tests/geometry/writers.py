@@ -88,8 +88,8 @@ def write_bdf(mesh, file):
 
 
 def write_step(file, kind, names):
-    """STEP file in millimetres of a "block" or a "disc" segment; names[solid] lists that solid's
-    faces, in order.
+    """STEP file in millimetres of a "block", a "disc" segment, "two" blocks or a "hollow" one;
+    names[solid] lists that solid's faces, in order.
 
     In a process of its own: reading a STEP file changes the unit in which OpenCASCADE writes the
     next one.
@@ -103,8 +103,9 @@ def write_step(file, kind, names):
         env={**os.environ, "PYTHONPATH": str(root)},
     )
     text = file.read_text()
+    record = "BREP_WITH_VOIDS('" if kind == "hollow" else "MANIFOLD_SOLID_BREP('"
     for solid, faces in names.items():
-        text = text.replace("MANIFOLD_SOLID_BREP('',", f"MANIFOLD_SOLID_BREP('{solid}',", 1)
+        text = text.replace(f"{record}',", f"{record}{solid}',", 1)
         for face in faces:
             text = text.replace("ADVANCED_FACE('',", f"ADVANCED_FACE('{face}',", 1)
     file.write_text(text)
@@ -120,6 +121,12 @@ def draw_step(file, kind):
     with gmsh_session() as gmsh:
         if kind == "disc":
             disc_segment(gmsh, Disc(), np.pi / Disc().sectors)
+        elif kind in ("two", "hollow"):
+            large = gmsh.model.occ.addBox(0, 0, 0, 0.03, 0.04, 0.05)
+            place = 0.06 if kind == "two" else 0.01
+            small = gmsh.model.occ.addBox(place, 0.01, 0.01, 0.01, 0.01, 0.02)
+            if kind == "hollow":
+                gmsh.model.occ.cut([(3, large)], [(3, small)])
         else:
             draw_prism(
                 gmsh, np.array([[0.1, -0.01], [0.2, -0.01], [0.2, 0.01], [0.1, 0.01]]), 0.0, 0.03
