@@ -11,7 +11,6 @@ meshed separately: bodies that touch are not glued.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,20 +31,13 @@ from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
 from .session import gmsh_session, gmsh_step
 from .step_names import solids_of_volumes, written_solids
+from .step_unit import file_unit
 
 CONTACT_FACES = ("seat_left", "seat_right", "damper_left", "damper_right")
 # what to do about a file that gmsh cannot read
 STEP_REMEDY = "expected a STEP file of solids; export it anew from CAD"
 # elements along a model that is only looked at
 PREVIEW_ELEMENTS = 30
-SI_PREFIXES = {
-    "": 1.0,
-    ".MILLI.": 1e-3,
-    ".CENTI.": 1e-2,
-    ".DECI.": 0.1,
-    ".MICRO.": 1e-6,
-    ".KILO.": 1e3,
-}
 
 
 @dataclass(frozen=True)
@@ -172,16 +164,6 @@ def coarse_step(file: str | Path) -> RawMesh:
         with gmsh_step("imported.file", f"mesh '{file}'"):
             gmsh.model.mesh.generate(3)
         return from_gmsh_model(gmsh)
-
-
-def file_unit(text: str) -> float:
-    """Length unit [m] that a STEP file states; millimetre when it states none."""
-    found = re.search(
-        r"LENGTH_UNIT\(\).{0,80}?SI_UNIT\(\s*(\$|\.\w+\.)\s*,\s*\.METRE\.", text, re.S
-    )
-    if found:
-        return SI_PREFIXES.get(found[1].replace("$", ""), 1e-3)
-    return 0.0254 if re.search(r"CONVERSION_BASED_UNIT\(\s*'INCH'", text, re.I) else 1e-3
 
 
 def _import_shapes(

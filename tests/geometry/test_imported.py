@@ -31,6 +31,7 @@ from geometry.profile import turn_about_axis
 from geometry.sector import wedge_sector
 from geometry.session import gmsh_session
 from geometry.step_file import read_step, step_face_names
+from geometry.step_unit import file_unit
 
 
 def same(found, mesh, tolerance=1e-12):
@@ -197,6 +198,29 @@ def test_solids_of_a_step_file_are_told_by_their_corners(tmp_path):
     np.testing.assert_allclose(extents["blade"], [0.03, 0.04, 0.05], rtol=1e-6)
     np.testing.assert_allclose(extents["damper"], [0.01, 0.01, 0.02], rtol=1e-6)
     assert mesh.points[mesh.faces["l0"], 0].max() < 0.04 < mesh.points[mesh.faces["s0"], 0].min()
+
+
+def test_the_unit_of_a_step_file_in_inches(tmp_path):
+    """It is so many millimetres, whose record stands in the file too: with the right
+    ``imported.scale`` a model was 25.4 times as large.
+    """
+    file = tmp_path / "a.step"
+    write_step(file, "block", {})
+    text = file.read_text()
+    assert file_unit(text) == 1e-3
+    inch = (
+        r"#\1 = (CONVERSION_BASED_UNIT('INCH',#9001)LENGTH_UNIT()NAMED_UNIT(#9002));\n"
+        "#9001 = LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),#9003);\n"
+        "#9002 = DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.);\n"
+        "#9003 = (LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.));"
+    )
+    metric = r"#(\d+) = \( LENGTH_UNIT\(\) NAMED_UNIT\(\*\) SI_UNIT\(.MILLI.,.METRE.\) \);"
+    text, changed = re.subn(metric, inch, text)
+    file.write_text(text)
+    assert changed == 1 and file_unit(text) == pytest.approx(0.0254, rel=1e-12)
+    for scale in (1.0, 0.0254):
+        mesh = read_step(file, MeshSize(size=2.0, order=1), scale=scale)
+        np.testing.assert_allclose(np.ptp(mesh.points, axis=0), [2.54, 0.508, 0.762], rtol=1e-6)
 
 
 def test_names_of_a_hollow_solid_are_read_with_their_letters(tmp_path):
