@@ -23,7 +23,7 @@ from bladefem.util.arrays import RealArray
 from .imported_check import STEP_SUFFIXES
 from .numbered_faces import NumberedFaces, face_corners, numbered_faces
 from .raw_mesh import SUFFIX_READERS, RawMesh, read_raw
-from .step_file import coarse_step
+from .step_file import NEAREST_TOLERANCE, coarse_step
 from .topology import CORNERS, DIMENSION, FAMILY, NODES
 
 # lengths [m] of blades and sectors: a factor to metres is right that brings the model between them
@@ -104,8 +104,8 @@ class Look:
     outside: NumberedFaces
     faces: tuple[FacePart, ...]
     cut: CutFaces | None
-    # name of the face nearest to the axis, when there are cut faces
-    bore: str | None
+    # names of the faces nearest to the axis, when there are cut faces
+    bore: tuple[str, ...]
     # name that a task needs -> the one set of the file whose name contains it
     alike: dict[str, str]
     # one sentence each
@@ -136,7 +136,7 @@ def look_at(file: str | Path) -> Look:
         outside, names = _drawn_faces(raw, outside)
     faces = tuple(_face_part(outside, number, name) for number, name in enumerate(names))
     cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()), drawing)
-    bore = None if cut is None else _bore_face(raw, outside, faces, cut)
+    bore = () if cut is None else _bore_faces(raw, outside, faces, cut)
     alike = {} if drawing else _alike_names(raw)
     return Look(
         Path(file),
@@ -189,7 +189,7 @@ def starting_scene(look: Look, folder: Path | None = None) -> str:
     if look.cut is not None:
         wanted = {"cyclic_low": look.cut.low, "cyclic_high": look.cut.high}
         if look.bore:
-            wanted["clamp"] = (look.bore,)
+            wanted["clamp"] = look.bore
         names += [f"{new} = {' + '.join(old)}" for new, old in wanted.items() if new not in taken]
     axis = AXES[look.cut.axis] if look.cut else AXES["z"]
     # which states its unit
@@ -425,20 +425,23 @@ def _edge_nodes(outside: NumberedFaces, number: int) -> np.ndarray:
     return np.unique(found[count == 1])
 
 
-def _bore_face(
+def _bore_faces(
     raw: RawMesh,
     outside: NumberedFaces,
     faces: tuple[FacePart, ...],
     cut: CutFaces,
-) -> str | None:
-    """The face whose farthest node is nearest to the axis: a disc is held there."""
+) -> tuple[str, ...]:
+    """The face whose farthest node is nearest to the axis, all of them where several are: a disc is
+    held there, and CAD systems write a bore in several pieces.
+    """
     radius = _radii(raw, cut.axis)
     reach = {
         face.name: max(radius[c].max() for c in face_corners(outside, i))
         for i, face in enumerate(faces)
         if face.name not in (*cut.low, *cut.high)
     }
-    return min(reach, key=lambda name: reach[name]) if reach else None
+    nearest = min(reach.values(), default=0.0) + NEAREST_TOLERANCE * float(radius.max())
+    return tuple(name for name in reach if reach[name] <= nearest)
 
 
 def _tip_face(
@@ -503,7 +506,7 @@ def _missing_names(
     raw: RawMesh,
     alike: dict[str, str],
     cut: CutFaces | None,
-    bore: str | None,
+    bore: tuple[str, ...],
 ) -> tuple[str, ...]:
     """What a run needs and neither a set of the file nor a guess provides."""
     there = _names_of(raw) | set(alike)

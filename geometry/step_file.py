@@ -5,8 +5,8 @@ Names come from the file (step_names.py): the solids' (MANIFOLD_SOLID_BREP, else
 and the faces' (ADVANCED_FACE). What has no name is called body_1, body_2, ... and face_1, face_2,
 ... in gmsh's numbering, the order of the file. When no face is called cyclic_low, cyclic_high or
 clamp, they are looked for: two faces that the rotation to the next sector carries onto each other;
-the blade's face nearest to the engine axis. The user may name what the file does not. Solids are
-meshed separately: bodies that touch are not glued.
+the blade's face nearest to the engine axis, all of them where several are. The user may name what
+the file does not. Solids are meshed separately: bodies that touch are not glued.
 """
 
 from __future__ import annotations
@@ -38,6 +38,8 @@ CONTACT_FACES = ("seat_left", "seat_right", "damper_left", "damper_right")
 STEP_REMEDY = "expected a STEP file of solids; export it anew from CAD"
 # elements along a model that is only looked at
 PREVIEW_ELEMENTS = 30
+# of the largest radius: faces that are as near to the axis as the nearest one
+NEAREST_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -265,7 +267,9 @@ def _find_faces(
             for tag, c in middle.items()
             if not any(tag in tags for tags in found.values())
         }
-        found[2, "clamp"] = [min(radius, key=lambda tag: radius[tag])]
+        # CAD systems write a bore in several pieces
+        nearest = min(radius.values()) + NEAREST_TOLERANCE * max(radius.values())
+        found[2, "clamp"] = [tag for tag in radius if radius[tag] <= nearest]
     return found
 
 

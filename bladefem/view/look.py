@@ -144,4 +144,4 @@ def _face_roles(look: Look) -> dict[str, str]:
     """Face name -> what it looks like."""
     said = dict.fromkeys(look.cut.low, "cut face") if look.cut else {}
     said |= dict.fromkeys(look.cut.high, "cut face, next") if look.cut else {}
-    return said | ({look.bore: "nearest to the axis"} if look.bore else {})
+    return said | dict.fromkeys(look.bore, "nearest to the axis")

@@ -25,6 +25,7 @@ from bladefem.study.pipeline import pipeline
 from geometry.export import write_msh
 from geometry.face_distance import distance_to_face
 from geometry.imported import read_mesh
+from geometry.look import look_at, starting_scene
 from geometry.parameters import Aerofoil, Disc, MeshSize, Plane, Platform, Shank, Wedge
 from geometry.plane import plane_blades
 from geometry.profile import turn_about_axis
@@ -298,6 +299,18 @@ def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
     )
     radius = np.hypot(*mesh.points[np.unique(mesh.faces["clamp"])].T[:2])
     np.testing.assert_allclose(radius, disc.bore_radius, rtol=1e-6)
+
+
+def test_all_pieces_of_a_bore_are_held(tmp_path):
+    """One of two was, 20 of 50 mm: the first frequency was 1702 in place of 2487 Hz."""
+    file = tmp_path / "a.step"
+    write_step(file, "split", {})
+    mesh = read_step(file, MeshSize(size=0.06, order=1), sectors=12)
+    held = mesh.points[np.unique(mesh.faces["clamp"])]
+    np.testing.assert_allclose(np.hypot(held[:, 0], held[:, 1]), 0.08, rtol=1e-6)
+    assert np.ptp(held[:, 2]) == pytest.approx(0.05, rel=1e-6)
+    seen = look_at(file)
+    assert len(seen.bore) == 2 and f"clamp = {' + '.join(seen.bore)}" in starting_scene(seen)
 
 
 @pytest.mark.parametrize("kind", ["hexahedron20", "hexahedron27", "hexahedron", "tetra", "tetra10"])

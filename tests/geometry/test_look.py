@@ -44,7 +44,7 @@ def test_cut_faces_and_unit_are_guessed(deck):
     look = look_at(deck)
     assert (look.cut.axis, look.cut.sectors) == ("z", decks.SECTORS)
     assert (look.cut.low, look.cut.high) == (("face_3",), ("face_4",))
-    assert look.bore == "face_6" and look.scale == 1e-3
+    assert look.bore == ("face_6",) and look.scale == 1e-3
     assert not any(sentence.startswith(("clamp", "cyclic")) for sentence in look.missing)
 
 
@@ -160,7 +160,7 @@ def test_cut_faces_of_a_drawing_are_guessed():
     found = look_at("scenes/own_blade.step")
     assert (found.cut.axis, found.cut.sectors) == ("z", 36)
     assert (found.cut.low, found.cut.high) == (("face_1",), ("face_6",))
-    assert found.bore == "face_2"
+    assert found.bore == ("face_2",)
     assert not any("imported.sectors" in sentence for sentence in found.missing)
 
 
