@@ -40,10 +40,14 @@ def first_look(model: ReducedModel, band: tuple[float, float]) -> np.ndarray:
     """
     guesses = np.concatenate(
         [
-            resonances(model, h)
-            for resonances in (free_resonances, stuck_resonances)
-            for h in model.excitation
-            if h > 0
+            # a model at rest has none
+            np.zeros(0),
+            *(
+                resonances(model, h)
+                for resonances in (free_resonances, stuck_resonances)
+                for h in model.excitation
+                if h > 0
+            ),
         ]
     )
     inside = guesses[(guesses > band[0]) & (guesses < band[1])]
