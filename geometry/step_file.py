@@ -289,6 +289,10 @@ def _turned_faces(
         and np.linalg.norm(on @ p - q) < 1e-6 * scale
         and abs(area[a] / area[b] - 1) < 1e-6
     ]
+    if pairs and (pairs[0][1], pairs[0][0]) in pairs:
+        # half a turn carries each onto the other: low ones are those on the side of the first
+        first = middle[pairs[0][0]] - on @ middle[pairs[0][0]]
+        pairs = [(a, b) for a, b in pairs if middle[a] @ first > 0]
     return [a for a, _ in pairs], [b for _, b in pairs]
 
 

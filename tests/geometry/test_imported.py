@@ -301,6 +301,17 @@ def test_step_sector_finds_its_cyclic_faces_and_its_bore(tmp_path):
     np.testing.assert_allclose(radius, disc.bore_radius, rtol=1e-6)
 
 
+def test_half_a_wheel_has_two_cut_faces(tmp_path):
+    """Half a turn carries each of them onto the other, and both were taken for both."""
+    file = tmp_path / "a.step"
+    write_step(file, "half", {})
+    mesh = read_step(file, MeshSize(size=0.06, order=1), sectors=2)
+    low, high = (mesh.points[np.unique(mesh.faces[n])] for n in ("cyclic_low", "cyclic_high"))
+    assert np.ptp(low[:, 2]) == pytest.approx(0.05) and len(low) == len(high)
+    x = np.concatenate([low @ low[0], -high @ low[0]])
+    assert (x > 0).all(), "each on one side of the axis"
+
+
 def test_all_pieces_of_a_bore_are_held(tmp_path):
     """One of two was, 20 of 50 mm: the first frequency was 1702 in place of 2487 Hz."""
     file = tmp_path / "a.step"

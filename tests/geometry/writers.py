@@ -88,7 +88,7 @@ def write_bdf(mesh, file):
 
 
 def write_step(file, kind, names):
-    """STEP file in millimetres of a "block", a "disc" segment, one in two pieces ("split"), "two" blocks or a "hollow" one;
+    """STEP file in millimetres of a "block", a "disc" segment, one of 30 or 180 degrees in two pieces ("split", "half"), "two" blocks or a "hollow" one;
     names[solid] lists that solid's faces, in order.
 
     In a process of its own: reading a STEP file changes the unit in which OpenCASCADE writes the
@@ -121,13 +121,14 @@ def draw_step(file, kind):
     with gmsh_session() as gmsh:
         if kind == "disc":
             disc_segment(gmsh, Disc(), np.pi / Disc().sectors)
-        elif kind == "split":
+        elif kind in ("split", "half"):
+            angle = np.pi / 6 if kind == "split" else np.pi
             # faces of both pieces stay apart
             gmsh.option.setNumber("Geometry.OCCUnionUnify", 0)
             ends = []
             for z, height in ((0.0, 0.02), (0.02, 0.03)):
                 outer, inner = (
-                    gmsh.model.occ.addCylinder(0, 0, z, 0, 0, height, r, angle=np.pi / 6)
+                    gmsh.model.occ.addCylinder(0, 0, z, 0, 0, height, r, angle=angle)
                     for r in (0.2, 0.08)
                 )
                 ends.append(gmsh.model.occ.cut([(3, outer)], [(3, inner)])[0])
