@@ -92,7 +92,7 @@ def lowest_eigenpairs(
         rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
         if not len(rest) and k < count:
-            raise NotSolvedError(f"{count} modes were asked of a body that has {k} elastic ones")
+            raise NotSolvedError(f"{count} elastic modes were asked of a body that has {k}")
         if (k >= count and error < tolerance) or not len(rest):
             # of no more use where memory is at its peak
             del block, Mblock
