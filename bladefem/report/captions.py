@@ -26,7 +26,8 @@ CAPTIONS = {
     "motion of the root along each axis.",
     "modes/wave": "The excited mode as a wave that turns round the wheel.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
-    "marked where an order meets the wave that it excites. Drawn are orders 1 to 5 and those next "
+    "marked where an order meets the wave that it excites. Waves have Coriolis forces, backward "
+    "ones are dashed where they are another line. Drawn are orders 1 to 5 and those next "
     "to the scene's own, with the nodal diameters that they excite; the table of crossings has all "
     "orders.",
     "modes/crossings": "Speeds at which an engine order excites a mode; the orders are those named "
@@ -101,7 +102,11 @@ CAPTIONS = {
     "and friction work of its damper at the wheel's highest point.",
     "wheel/scatter": "Highest blade of the drawn wheels over the tuned wheel under the same load: "
     "quantiles with 95 % intervals, which hold what checked wheels are off the calibrated damper "
-    "law, and the worst wheel.",
+    "law, and the worst wheel. A dash: so few wheels leave that end of the interval open, below "
+    "the lowest or above the highest wheel drawn.",
+    "wheel/scatter_wheels": "Each drawn wheel under the load at which the tuned wheel is lowest: "
+    "its highest blade, and where that has its resonance. The seed and the wheel's number give "
+    "the same wheel again, under every load; scatter_wheels.csv has all loads.",
     "wheel/scatter_optima": "The load that is best for the tuned wheel, and the one that is best "
     "for 95 % of the drawn wheels, with 95 % intervals by the bootstrap over the wheels.",
     "wheel/scatter_utilisation": "What of the material's endurance the drawn wheels use: the tuned "
