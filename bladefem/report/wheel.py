@@ -269,7 +269,7 @@ def optima_of_scatter(
         searched: best load of the tuned wheel by a search [N], where it is among those studied: a
             parabola between these is less than the search.
     """
-    there = [] if searched is None else np.flatnonzero(found.loads == searched)
+    there = np.flatnonzero(found.loads == (np.nan if searched is None else searched))
     if len(there):
         tuned = float(found.loads[there[0]]), float(found.tuned[there[0]])
     else:
