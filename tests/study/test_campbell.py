@@ -1,5 +1,8 @@
 """Campbell table against solves at each speed; crossings of the right wave; texts of speeds."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 from wheels import bodies
@@ -9,7 +12,13 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.gyroscopic import coupling, waves
 from bladefem.fem.modes import modes
 from bladefem.hbm.linear_resonances import wave_frequencies
+from bladefem.scene.tables import Solver
+from bladefem.scene.toml import load_scene
 from bladefem.study.modes.campbell import campbell_table, campbell_tables, read_speeds
+from bladefem.study.modes.survey import Wanted, survey_modes
+from bladefem.study.pipeline.bodies import Bodies
+
+PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 
 
 @pytest.fixture(scope="module")
@@ -122,3 +131,17 @@ def test_campbell_does_not_depend_on_ranks():
         for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )
     np.testing.assert_allclose(a.drop(columns="error"), b.drop(columns="error"), rtol=1e-8)
+
+
+def test_the_scenes_eigensolver_solves_the_modes_of_every_command(tmp_path):
+    """Also those of a single blade, and of other speeds: an option that SLEPc does not know is
+    refused where SLEPc is asked.
+    """
+    wrong = Solver(petsc="-eps_monitr")
+    given = bodies()
+    wheel = Bodies(replace(given.scene, solver=wrong), given.mesh)
+    with pytest.raises(InputError, match="-eps_monitr"):
+        campbell_table(wheel, [0.0, 100.0], [1], 2)
+    plane = load_scene(PLANE, ["mesh.size=8 mm", "solver.petsc=-eps_monitr"])
+    with pytest.raises(InputError, match="-eps_monitr"):
+        survey_modes(plane, tmp_path, Wanted())

@@ -22,6 +22,7 @@ from ...errors import InputError
 from ...scene.fields import split_values
 from ...scene.units import is_plain, parse
 from ..pipeline.bodies import Bodies, is_wheel
+from ..pipeline.normal_modes import eigensolver
 from .crossings import (
     campbell_crossings,
     crossing_margins,
@@ -206,9 +207,10 @@ def _modes_at_speed(
     from ...fem.constraint import constrain
     from ...fem.modes import modes
 
+    solver = eigensolver(bodies.scene)
     if is_wheel(bodies.mesh):
-        return all_diameters(body, count, diameters)
-    return [modes(constrain(body), count)]
+        return all_diameters(body, count, diameters, solver=solver)
+    return [modes(constrain(body), count, solver=solver)]
 
 
 def _excited_waves(
