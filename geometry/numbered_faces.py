@@ -1,8 +1,8 @@
 """The outside of a mesh cut into faces along its edges and numbered, for files without names.
 
 Outer facets that share an edge belong to one face unless they meet there at more than CREASE_ANGLE.
-Faces are numbered from the largest: face_1, face_2, ..., or outer_face_1, ... where sets of the file
-have such names themselves. The numbers depend on the file alone, not on what becomes of its cells,
+Faces are numbered from the largest: face_1, face_2, ..., or outer_face_1, ... where sets of the
+file have such names themselves. The numbers depend on the file alone, not on what becomes of its cells,
 so that a scene may name faces by them.
 """
 
