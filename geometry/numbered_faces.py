@@ -2,8 +2,8 @@
 
 Outer facets that share an edge belong to one face unless they meet there at more than CREASE_ANGLE.
 Faces are numbered from the largest: face_1, face_2, ..., or outer_face_1, ... where sets of the
-file have such names themselves. The numbers depend on the file alone, not on what becomes of its cells,
-so that a scene may name faces by them.
+file have such names themselves. The numbers depend on the file alone, not on what becomes of its
+cells, so that a scene may name faces by them.
 """
 
 from __future__ import annotations
