@@ -52,8 +52,8 @@ CAPTIONS = {
     "response/local_resonances": "Every local maximum of each response: motions found at its "
     "frequency, and by which slow sweep it is reached (isolated: by neither; march in time: kept "
     "there in time, in place of an unstable balance). Stability is lost by a fold (the motion "
-    "jumps, or moves on to one that branches off beside it), period doubling (it repeats after two periods) or a torus (a ripple of another "
-    "frequency grows).",
+    "jumps, or moves on to one that branches off beside it), period doubling (it repeats after two "
+    "periods) or a torus (a ripple of another frequency grows).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
