@@ -86,7 +86,8 @@ CAPTIONS = {
     "modes/utilisation": "Alternating stress over the amplitude that lasts at the mean stress "
     "there, at the resonance under the best load.",
     "response/backbone_resonances": "Resonances that the nonlinear mode alone predicts, next to "
-    "those of the full balance, and the largest damping by friction.",
+    "those of the full balance, and the largest damping by friction. Detached motions are kept up "
+    "by the force too, and not reached from rest.",
     "response/design_map": "Nonlinear modes: damping and frequency against amplitude for each "
     "load; dashed the damping that the force needs, so that crossings are resonances, dots those "
     "of the balance, diamonds where the mode turns back in amplitude. Right: resonance amplitude "

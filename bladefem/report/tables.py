@@ -98,6 +98,7 @@ COLUMNS = {
     "mass": Column("damper mass", "kg", "g", 1e3),
     "mode_frequency": Column("resonance by the mode", "Hz"),
     "mode_amplitude": Column("amplitude by the mode", "m", "µm", 1e6),
+    "detached_amplitude": Column("highest detached motion by the mode", "m", "µm", 1e6),
     "balance_frequency": Column("resonance by the balance", "Hz"),
     "balance_amplitude": Column("amplitude by the balance", "m", "µm", 1e6),
     "off": Column("off the balance", "1", "%", 100.0, 2),
