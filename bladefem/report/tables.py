@@ -178,6 +178,7 @@ COLUMNS = {
     "principal": Column("largest principal", "Pa", "MPa", 1e-6, 4),
     "pressing": Column("smallest principal", "Pa", "MPa", 1e-6, 4),
     "frequency_of_partner": Column("frequency of partner", "Hz"),
+    "dofs": Column("degrees of freedom", digits=9),
     "size": Column("element size", "m", "mm", 1e3, 4),
     "recovered": Column("error by the recovered stress", "1", "%", 100.0, 2),
     "scatter": Column("scatter of meshes", "1", "%", 100.0, 2),

@@ -281,6 +281,9 @@ def test_a_mesh_that_would_take_too_long_is_left_out_and_named():
     assert table["left_out"].tolist() == [False, True, False, True]
     assert sum("0.1 mm: left out" in remark for remark in remarks) == 2
     assert any("mesh of second order, 0.1 mm: left out" in remark for remark in remarks)
+    # what alone is the reference is not exact, and what was left out has no size
+    assert "the only one, whose own error is not known" in remarks[0]
+    assert np.isnan(table["error"][2]) and table["error"][0] > 0 and np.isnan(table["dofs"][1])
 
 
 def test_no_mesh_of_second_order_is_no_comparison(monkeypatch):
