@@ -207,7 +207,9 @@ def mesh_of_raw(
     """
     solids = solid_cells(raw, source, linear, np.asarray(axis, dtype=float))
     mesh = _split_bodies(raw, solids, source)
-    mesh = replace(mesh, points=_turn_to_axis(mesh, scale, np.asarray(axis, dtype=float)))
+    mesh = _turned(
+        replace(mesh, points=mesh.points * scale), _axis_turn(np.asarray(axis, dtype=float))
+    )
     check_extent(float(np.ptp(mesh.points[np.unique(solids.cells)], axis=0).max()), scale)
     mesh = _with_faces(mesh, raw, wanted)
     mesh = _find_pairs(mesh, sectors, source, tolerance, cut_gap)
@@ -288,17 +290,21 @@ def _positive_cells(
     return result
 
 
-def _turn_to_axis(
-    mesh: Mesh,
-    scale: float,
-    axis: np.ndarray,
-) -> np.ndarray:
-    """Points [m] with the engine axis along z."""
+def _axis_turn(axis: np.ndarray) -> np.ndarray | None:
+    """(3, 3) rotation that brings the engine axis to z; None where it is there."""
     z = axis / np.linalg.norm(axis)
     if abs(z[2] - 1) < 1e-12:
-        return mesh.points * scale
+        return None
     radial = np.linalg.svd(z[None])[2][1]
-    return mesh.points * scale @ np.array([radial, np.cross(z, radial), z]).T
+    return np.array([radial, np.cross(z, radial), z])
+
+
+def _turned(mesh: Mesh, turn: np.ndarray | None) -> Mesh:
+    """The mesh in turned axes, which remembers how it was turned."""
+    if turn is None:
+        return mesh
+    whole = turn if mesh.turn is None else turn @ mesh.turn
+    return replace(mesh, points=mesh.points @ turn.T, turn=whole)
 
 
 def _with_faces(
@@ -396,7 +402,7 @@ def _find_pairs(
                     f"imported.sectors = {sectors}{suggestion(name, mesh.faces)}"
                 )
         mesh, pairs["cyclic"] = _cyclic_pair(mesh, on, tolerance, cut_gap)
-        mesh = replace(mesh, points=_centre_sector(mesh))
+        mesh = _turned(mesh, _centring_turn(mesh))
     shift = _row_pitch(mesh) if not sectors else np.zeros(3)
     motions: dict[str, Motion] = {
         "this": ("seat_right", "damper_left", np.eye(3), np.zeros(3)),
@@ -548,15 +554,15 @@ def _tie_notes(mesh: Mesh) -> Iterator[str]:
         )
 
 
-def _centre_sector(mesh: Mesh) -> np.ndarray:
-    """Points [m] turned about z so that +x is midway between the cyclic faces."""
+def _centring_turn(mesh: Mesh) -> np.ndarray | None:
+    """(3, 3) rotation about z that brings +x midway between the cyclic faces; None where it is."""
     low, high = (
         mesh.points[np.unique(mesh.faces[name])].mean(axis=0)[:2]
         for name in ("cyclic_low", "cyclic_high")
     )
     middle = low / np.linalg.norm(low) + high / np.linalg.norm(high)
     angle = np.arctan2(middle[1], middle[0])
-    return mesh.points if abs(angle) < 1e-9 else mesh.points @ turn_about_axis(-angle).T
+    return None if abs(angle) < 1e-9 else turn_about_axis(-angle)
 
 
 def _edge_length(mesh: Mesh) -> float:

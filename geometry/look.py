@@ -21,7 +21,7 @@ from bladefem.errors import InputError, missing_file
 from bladefem.util.arrays import RealArray
 
 from .imported_check import STEP_SUFFIXES
-from .numbered_faces import NumberedFaces, face_corners, numbered_faces
+from .numbered_faces import NumberedFaces, face_corners, face_word, numbered_faces
 from .raw_mesh import SUFFIX_READERS, RawMesh, read_raw
 from .step_file import NEAREST_TOLERANCE, coarse_step
 from .topology import CORNERS, DIMENSION, FAMILY, NODES
@@ -61,7 +61,7 @@ FURTHER_NAMES = ("cyclic_high", "damper_left", "damper_right")
 class FacePart:
     """One numbered face; lengths in the file's unit."""
 
-    # "face_1", ...
+    # "face_1", ...; "outer_face_1", ... where the file has sets of such names
     name: str
     facets: int
     area: float
@@ -131,7 +131,7 @@ def look_at(file: str | Path) -> Look:
     used = np.unique(np.concatenate([cells.ravel() for cells in solid]))
     box = np.stack([raw.points[used].min(axis=0), raw.points[used].max(axis=0)])
     outside = numbered_faces(raw)
-    names = [f"face_{number + 1}" for number in range(outside.count)]
+    names = [f"{face_word(raw)}{number + 1}" for number in range(outside.count)]
     if drawing:
         outside, names = _drawn_faces(raw, outside)
     faces = tuple(_face_part(outside, number, name) for number, name in enumerate(names))

@@ -84,6 +84,9 @@ class Mesh:
     # with the cells themselves, and so are its loads, stresses and halved meshes (`whole_cells`);
     # contacts and pictures see the pieces.
     whole: dict[str, IntegerArray] = field(default_factory=dict)
+    # (3, 3) from the axes of the user's file to those of the mesh: points = file's @ turn.T; None
+    # where they are the same
+    turn: RealArray | None = None
 
     def __repr__(self) -> str:
         bodies = ", ".join(f"{name} {len(cells)} cells" for name, cells in self.bodies.items())

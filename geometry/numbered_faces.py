@@ -1,12 +1,14 @@
 """The outside of a mesh cut into faces along its edges and numbered, for files without names.
 
 Outer facets that share an edge belong to one face unless they meet there at more than CREASE_ANGLE.
-Faces are numbered from the largest: face_1, face_2, ... The numbers depend on the file alone, not
-on what becomes of its cells, so that a scene may name faces by them.
+Faces are numbered from the largest: face_1, face_2, ..., or outer_face_1, ... where sets of the
+file have such names themselves. The numbers depend on the file alone, not on what becomes of its
+cells, so that a scene may name faces by them.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -19,6 +21,9 @@ from bladefem.util.arrays import IntegerArray, RealArray
 from .raw_mesh import RawMesh
 from .topology import CORNERS, DIMENSION, FACETS, FAMILY
 
+# before the number of a face, and where the file has sets of such names
+FACE_WORD = "face_"
+OTHER_FACE_WORD = "outer_face_"
 # [rad] between normals of neighbours across an edge of the body
 CREASE_ANGLE = np.radians(30.0)
 # digits to which areas and places count when faces are ordered
@@ -53,6 +58,13 @@ def numbered_faces(raw: RawMesh) -> NumberedFaces:
     return NumberedFaces(corners, order[part], normals, centres)
 
 
+def face_word(raw: RawMesh) -> str:
+    """What stands before the number of a face."""
+    names = (*raw.groups, *raw.node_sets, *raw.surfaces)
+    taken = any(re.fullmatch(rf"{FACE_WORD}\d+", name.lower()) for name in names)
+    return OTHER_FACE_WORD if taken else FACE_WORD
+
+
 def with_numbered_faces(raw: RawMesh, names: Iterable[str], before: str = "") -> RawMesh:
     """Faces that are named by their numbers, as surfaces of the file.
 
@@ -61,16 +73,15 @@ def with_numbered_faces(raw: RawMesh, names: Iterable[str], before: str = "") ->
         before: what stands before "face_3", such as "damper.".
     """
     there = {name.lower() for name in (*raw.groups, *raw.node_sets, *raw.surfaces)}
-    start = f"{before}face_".lower()
+    word = f"{before}{face_word(raw)}"
+    start = word.lower()
     asked = {name.lower() for name in names} - there
     ends = {name[len(start) :] for name in asked if name.startswith(start)}
     numbers = sorted(int(end) for end in ends if end.isdigit())
     if not numbers:
         return raw
     faces = numbered_faces(raw)
-    found = {
-        f"{before}face_{n}": face_corners(faces, n - 1) for n in numbers if 0 < n <= faces.count
-    }
+    found = {f"{word}{n}": face_corners(faces, n - 1) for n in numbers if 0 < n <= faces.count}
     return replace(raw, surfaces={**raw.surfaces, **found})
 
 

@@ -249,6 +249,7 @@ def chart(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     check_budget(options.budget)
     if options.reference:
+        _refuse_with_reference(options)
         folder = Path(options.output or "runs/reference")
         scene = None
         accuracy = 0.02
@@ -266,6 +267,25 @@ def chart(options: argparse.Namespace, comm: Communicator | None) -> None:
     tell(
         options, comm, lambda: "\n".join([*made.remarks, "written: " + ", ".join(map(str, files))])
     )
+
+
+def _refuse_with_reference(options: argparse.Namespace) -> None:
+    """What would change nothing of the built-in blade, which has no scene.
+
+    Raises:
+        InputError: a scene, a field or meshes are given.
+    """
+    given = {
+        "scene": options.scene,
+        "--set": " ".join(options.overrides),
+        "--mesh": None if options.mesh is None else options.mesh or "chosen sizes",
+    }
+    for name, value in given.items():
+        if value:
+            raise InputError(
+                f"chart --reference: {name} ({value}) does not change the built-in blade, expected "
+                "either a scene or --reference"
+            )
 
 
 def info(options: argparse.Namespace, comm: Communicator | None) -> None:

@@ -23,14 +23,20 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
     from ..report.wheel import scatter_sentences, use_sentences
     from ..study.mistuning.stage import scatter_of_run, scatter_utilisation
     from ..study.pipeline import pipeline
+    from ..study.pipeline.best_load import studied_load
 
     run = pipeline.run(scene, folder, comm=comm, progress=bars)
     found = scatter_of_run(run, comm, bars)
     used, remarks = scatter_utilisation(run, found)
     held = scene.model.static == "uncoupled"
     # what makes the tuned responses wrong makes the wheels' wrong, which are counted over them
-    sentences = [*run.messages, *scatter_sentences(found, held), *use_sentences(used), *remarks]
-    table, files = on_root(comm, lambda: _write_results(found, used, sentences, folder, scene))
+    best = run.response.best_found
+    searched = None if best is None else studied_load(best)
+    own = [*scatter_sentences(found, held, searched), *use_sentences(used), *remarks]
+    sentences = [*run.messages, *own]
+    table, files = on_root(
+        comm, lambda: _write_results(found, used, sentences, folder, scene, searched)
+    )
     tell(
         options,
         comm,
@@ -51,8 +57,13 @@ def _write_results(
     sentences: list[str],
     folder: Path,
     scene: Scene,
+    searched: float | None,
 ) -> tuple[Any, list[Path]]:
-    """The table as text, and the files of the folder."""
+    """The table as text, and the files of the folder.
+
+    Args:
+        searched: best load of the tuned wheel by the run's search [N]; None without one.
+    """
     from ..report.tables import readable_texts, write_tables
     from ..report.wheel import (
         optimum_is_known,
@@ -60,8 +71,10 @@ def _write_results(
         scatter_drawings,
         scatter_headlines,
         scatter_table,
+        shown_wheels,
         use_headlines,
         use_table,
+        wheel_table,
     )
     from ..report.write import Page, write_report
 
@@ -69,7 +82,7 @@ def _write_results(
         "wheel/scatter": scatter_table(found),
     }
     if optimum_is_known(found):
-        parts["wheel/scatter_optima"] = optimum_table(found)
+        parts["wheel/scatter_optima"] = optimum_table(found, searched)
     if used:
         parts["wheel/scatter_utilisation"] = use_table(used)
     files = []
@@ -77,11 +90,16 @@ def _write_results(
         stem = name.split("/")[1]
         write_tables(table, folder / stem, stem)
         files.append(folder / f"{stem}.csv")
+    seed = scene.mistuning.seed
+    write_tables(wheel_table(found, seed), folder / "scatter_wheels", "scatter_wheels")
+    files.append(folder / "scatter_wheels.csv")
+    if len(shown := shown_wheels(found, seed)):
+        parts["wheel/scatter_wheels"] = shown
     figures = {}
-    for name, draw in scatter_drawings(found).items():
+    for name, draw in scatter_drawings(found, searched).items():
         figures[name] = folder / f"{name.split('/')[1]}.png"
         draw(figures[name])
-    numbers = [*scatter_headlines(found), *use_headlines(used)]
+    numbers = [*scatter_headlines(found, searched), *use_headlines(used)]
     page = Page(numbers=numbers, stem="report_scatter")
     pages = write_report(folder, scene, parts, figures, sentences, page=page)
     return readable_texts(parts["wheel/scatter"]), [*files, *figures.values(), *pages]

@@ -12,6 +12,12 @@ elements of the vibration do: where pressed, s_n + c(f_n) = 0, and the slip of a
 at the end of the step as the normal stiffness of the layer does. All conditions of a step are one
 system of projections, solved by Newton's method (Alart, Curnier 1991, DOI
 10.1016/0045-7825(91)90022-X).
+
+The slip of a face is that of the damper against it. A symmetric damper that is pressed outwards
+slides up both faces as the layers give way, so that friction points inwards on both and carries a
+part of its load, 2 mu N cos a of a wedge with half angle a. The forces on the two seats are mirror
+images, of opposite sign along t1, which runs towards +y on both: the same sign there would be a
+couple and a force along y, which nothing balances.
 """
 
 from __future__ import annotations

@@ -81,12 +81,36 @@ def project_coriolis(
 
     The mass of a node is the same in all directions, so that G = 2 M (a x): no matrix of its own.
     """
+    g = inner_products(body.comm, X, _coriolis_forces(body, X, axis))
+    return (g - g.conj().T) / 2
+
+
+def coriolis_loads(
+    body: Body,
+    shapes: np.ndarray,
+    axis: tuple[float, float, float] = AXIS,
+) -> np.ndarray:
+    """(n_points*dim, m) the forces G u of fields (m, n_points, 2 or 3) in mesh numbering, on every
+    rank (collective).
+    """
+    parts = body.comm.allgather(_coriolis_forces(body, own_rows(body, shapes), axis))
+    forces = np.concatenate(parts)
+    out = np.zeros((len(body.scalar_rows), forces.shape[1]), forces.dtype)
+    out[_row_order(body)] = forces
+    return out
+
+
+def _coriolis_forces(
+    body: Body,
+    X: np.ndarray,
+    axis: tuple[float, float, float],
+) -> np.ndarray:
+    """G X of this rank's rows (n_own, m)."""
     a = np.asarray(axis, float) / np.linalg.norm(axis)
     turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
     nodal = X.reshape(-1, body.dim, X.shape[1])
     crossed = np.asfortranarray(np.einsum("ij,njm->nim", turn, nodal).reshape(X.shape))
-    g = 2 * inner_products(body.comm, X, apply_block(body.M, crossed))
-    return (g - g.conj().T) / 2
+    return 2 * apply_block(body.M, crossed)
 
 
 def own_rows(body: Body, shapes: np.ndarray) -> np.ndarray:
@@ -96,10 +120,14 @@ def own_rows(body: Body, shapes: np.ndarray) -> np.ndarray:
     Sums over the rows of one sector are sums over its body, both cut faces included.
     """
     first, last = body.K.owner_range
-    order = np.argsort(body.scalar_rows, kind="stable")[np.count_nonzero(body.scalar_rows < 0) :][
-        first:last
-    ]
+    order = _row_order(body)[first:last]
     return np.asfortranarray(shapes[:, :, : body.dim].reshape(len(shapes), -1)[:, order].T)
+
+
+def _row_order(body: Body) -> np.ndarray:
+    """(rows of all ranks,) degree of freedom in mesh numbering of each row."""
+    outside = np.count_nonzero(body.scalar_rows < 0)
+    return np.argsort(body.scalar_rows, kind="stable")[outside:]
 
 
 def waves(

@@ -25,7 +25,8 @@ MAX_CUT_DIFFERENCE = 0.05
 
 
 def mesh_temperatures(mesh: Mesh, given: GivenTemperatures) -> RealArray:
-    """(n_points,) temperatures [K] from those of places, or of nodes of the user's own mesh.
+    """(n_points,) temperatures [K] from those of places in the axes of the user's own file, or of
+    nodes of it.
 
     Nodes that no temperature is given for, such as those in the middle of edges, take what lies
     between the others of their cells; a body of another file takes the temperatures next to it.
@@ -35,7 +36,9 @@ def mesh_temperatures(mesh: Mesh, given: GivenTemperatures) -> RealArray:
             without temperature, or a mesh without numbers.
     """
     if given.places is not None:
-        return interpolate_temperatures(mesh, given.places, given.values)
+        # a sector is turned about its axis, so that +x is midway between its cut faces
+        places = given.places if mesh.turn is None else given.places @ mesh.turn.T
+        return interpolate_temperatures(mesh, places, given.values)
     nodes = np.asarray(given.nodes)
     if mesh.numbers is None:
         raise InputError(
@@ -111,7 +114,7 @@ def interpolate_temperatures(mesh: Mesh, places: RealArray, values: RealArray) -
     """(n_points,) temperatures [K], linear between the given places.
 
     Args:
-        places: (k, 3) [m].
+        places: (k, 3) [m], in the axes of the mesh.
         values: (k,) [K].
 
     Raises:
@@ -168,8 +171,8 @@ def _nearest(
         node = np.array2string(nodes[distance.argmax()], precision=4)
         raise InputError(
             f"temperature.file: the node at {node} m is {1e3 * size * distance.max():.3g} mm away "
-            "from all given places, expected places throughout the body, in the mesh's axes and "
-            "with the right units"
+            "from all given places, expected places throughout the body, in the axes of the "
+            "body's file and with the right units"
         )
     return np.asarray(nearest(at))
 

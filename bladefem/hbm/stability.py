@@ -11,7 +11,8 @@ repeat after the same number r of blades as they do. A disturbance that is carri
 period and handed on to the next blade meets the same wave again: r such steps make the period.
 
 The named bifurcation is the one through which a motion with such multipliers lost its stability:
-"fold" at +1, "period doubling" at -1, "torus" for a complex pair.
+"fold" at +1 (where another motion may branch off as well), "period doubling" at -1, "torus" for a
+complex pair.
 """
 
 from __future__ import annotations

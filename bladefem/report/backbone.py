@@ -37,6 +37,7 @@ def prediction_table(found: Sequence[Backbone], run: SolvedRun | None = None) ->
                 "balance_frequency": one.balance[1],
                 "balance_amplitude": one.balance[0],
                 "off": one.error,
+                "detached_amplitude": max((a for a, _ in one.resonances[1:]), default=np.nan),
                 **({} if run is None else {"balance_error": balance_error(run, one)["error"]}),
                 "most_friction": one.friction[one.converged].max(initial=0.0),
                 "unconverged": int((~one.converged).sum()),
@@ -103,6 +104,16 @@ def backbone_sentences(found: Sequence[Backbone]) -> list[str]:
                 warning(
                     f"load {newtons(one.load)}: {len(lost)} of {len(one.converged)} amplitudes not "
                     f"solved, {between}: {one.lost}"
+                )
+            )
+        if len(one.resonances) > 1:
+            others = " and ".join(
+                f"{1e6 * height:.4g} um ({at:.5g} Hz)" for height, at in one.resonances[1:]
+            )
+            sentences.append(
+                warning(
+                    f"load {newtons(one.load)}: the force also keeps the mode up to {others}, in "
+                    "motions detached from those that grow from rest; a strong drive may lead there"
                 )
             )
         if not np.isfinite(one.error):

@@ -26,7 +26,8 @@ CAPTIONS = {
     "motion of the root along each axis.",
     "modes/wave": "The excited mode as a wave that turns round the wheel.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
-    "marked where an order meets the wave that it excites. Drawn are orders 1 to 5 and those next "
+    "marked where an order meets the wave that it excites. Waves have Coriolis forces, backward "
+    "ones are dashed where they are another line. Drawn are orders 1 to 5 and those next "
     "to the scene's own, with the nodal diameters that they excite; the table of crossings has all "
     "orders.",
     "modes/crossings": "Speeds at which an engine order excites a mode; the orders are those named "
@@ -51,8 +52,8 @@ CAPTIONS = {
     "response/local_resonances": "Every local maximum of each response: motions found at its "
     "frequency, and by which slow sweep it is reached (isolated: by neither; march in time: kept "
     "there in time, in place of an unstable balance). Stability is lost by a fold (the motion "
-    "jumps), period doubling (it repeats after two periods) or a torus (a ripple of another "
-    "frequency grows).",
+    "jumps, or moves on to one that branches off beside it), period doubling (it repeats after two "
+    "periods) or a torus (a ripple of another frequency grows).",
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
@@ -85,7 +86,8 @@ CAPTIONS = {
     "modes/utilisation": "Alternating stress over the amplitude that lasts at the mean stress "
     "there, at the resonance under the best load.",
     "response/backbone_resonances": "Resonances that the nonlinear mode alone predicts, next to "
-    "those of the full balance, and the largest damping by friction.",
+    "those of the full balance, and the largest damping by friction. Detached motions are kept up "
+    "by the force too, and not reached from rest.",
     "response/design_map": "Nonlinear modes: damping and frequency against amplitude for each "
     "load; dashed the damping that the force needs, so that crossings are resonances, dots those "
     "of the balance, diamonds where the mode turns back in amplitude. Right: resonance amplitude "
@@ -101,7 +103,11 @@ CAPTIONS = {
     "and friction work of its damper at the wheel's highest point.",
     "wheel/scatter": "Highest blade of the drawn wheels over the tuned wheel under the same load: "
     "quantiles with 95 % intervals, which hold what checked wheels are off the calibrated damper "
-    "law, and the worst wheel.",
+    "law, and the worst wheel. A dash: so few wheels leave that end of the interval open, below "
+    "the lowest or above the highest wheel drawn.",
+    "wheel/scatter_wheels": "Each drawn wheel under the load at which the tuned wheel is lowest: "
+    "its highest blade, and where that has its resonance. The seed and the wheel's number give "
+    "the same wheel again, under every load; scatter_wheels.csv has all loads.",
     "wheel/scatter_optima": "The load that is best for the tuned wheel, and the one that is best "
     "for 95 % of the drawn wheels, with 95 % intervals by the bootstrap over the wheels.",
     "wheel/scatter_utilisation": "What of the material's endurance the drawn wheels use: the tuned "

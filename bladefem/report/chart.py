@@ -31,8 +31,11 @@ def write_chart(
     title: str = "",
     scene: Scene | None = None,
 ) -> list[Path]:
-    """Write chart.png, chart_errors.png, chart.txt, one CSV a table (methods, models, meshes) and,
-    for a scene, ``report_chart.html`` and ``.md``; returns the files.
+    """Write chart.png, chart_errors.png, chart.txt, one CSV a table (methods, models, meshes), and
+    ``report_chart.html`` and ``.md``; returns the files.
+
+    Args:
+        scene: what the chart is of; None for the built-in model, which has no fields.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -49,8 +52,8 @@ def write_chart(
     for picture, draw in zip(pictures, (draw_chart, draw_errors), strict=True):
         draw(tables, picture, tolerance=accuracy, title=title)
     files += [*pictures, write_text(folder / "chart.txt", "\n".join(chart.remarks) + "\n")]
-    if scene is not None:
-        files += _report(chart, scene, tables, pictures, folder)
+    built_in = Scene(title=title, accuracy=accuracy)
+    files += _report(chart, scene or built_in, tables, pictures, folder, scene is None)
     return files
 
 
@@ -60,8 +63,13 @@ def _report(
     tables: dict[str, pd.DataFrame],
     pictures: list[Path],
     folder: Path,
+    built_in: bool,
 ) -> tuple[Path, Path]:
-    """The automatic choice first, then all methods and models."""
+    """The automatic choice first, then all methods and models.
+
+    Args:
+        built_in: the scene stands for a model that has no fields.
+    """
     numbers = [
         headline
         for name in CHOICE_TITLES
@@ -79,10 +87,12 @@ def _report(
         },
         dict(zip(names, pictures, strict=True)),
         (text if isinstance(text, Message) else method(text) for text in chart.remarks),
+        given=() if built_in else None,
         page=Page(
             numbers=numbers,
             stem="report_chart",
-            subject=f"{scene.kind}, speed against accuracy",
+            subject=f"{'built-in model' if built_in else scene.kind}, speed against accuracy",
+            inputs=() if built_in else None,
         ),
     )
 

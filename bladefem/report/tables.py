@@ -25,8 +25,12 @@ class Column(NamedTuple):
     # from SI to the shown unit
     factor: float = 1.0
     digits: int = 5
+    # what stands for an infinite value; its sign when empty
+    infinite: str = ""
 
 
+# an end of an interval that a sample is too small to have
+OPEN_END = "-"
 COLUMNS = {
     "load": Column("normal load", "N"),
     "load_low": Column("load, low end", "N"),
@@ -45,19 +49,22 @@ COLUMNS = {
     "highest_amplitude": Column("highest blade", "m", "µm", 1e6),
     "highest_amplitude_held": Column("the same, dampers held in the mean", "m", "µm", 1e6),
     "highest_amplitude_low": Column("from", "m", "µm", 1e6),
-    "highest_amplitude_high": Column("to", "m", "µm", 1e6),
+    "highest_amplitude_high": Column("to", "m", "µm", 1e6, infinite=OPEN_END),
     "highest_blade": Column("its number"),
     "amplification": Column("over the tuned wheel", "1", digits=4),
     "amplification_free": Column("the same without dampers", "1", digits=4),
     "deviation": Column("deviation of frequency", "1", "%", 100.0, 3),
     "blade": Column("blade"),
     "wheels": Column("wheels"),
+    "wheel": Column("wheel"),
+    "seed": Column("seed of the draws"),
+    "solved_by": Column("solved by"),
     "calibration": Column("law multiplied by"),
     "law_error": Column("law off the whole wheel by", "1", "%", 100.0, 2),
     "truncation": Column("harmonics leave", "1", "%", 100.0, 2),
     "worst": Column("worst wheel", "1", digits=4),
     **{
-        f"p{share}{end}": Column(f"{share} %{title}", "1", digits=4)
+        f"p{share}{end}": Column(f"{share} %{title}", "1", digits=4, infinite=OPEN_END)
         for share in (50, 95, 99)
         for end, title in (("", " of wheels below"), ("_low", " from"), ("_high", " to"))
     },
@@ -91,6 +98,7 @@ COLUMNS = {
     "mass": Column("damper mass", "kg", "g", 1e3),
     "mode_frequency": Column("resonance by the mode", "Hz"),
     "mode_amplitude": Column("amplitude by the mode", "m", "µm", 1e6),
+    "detached_amplitude": Column("highest detached motion by the mode", "m", "µm", 1e6),
     "balance_frequency": Column("resonance by the balance", "Hz"),
     "balance_amplitude": Column("amplitude by the balance", "m", "µm", 1e6),
     "off": Column("off the balance", "1", "%", 100.0, 2),
@@ -161,15 +169,16 @@ COLUMNS = {
     "utilisation": Column("utilisation", "1", digits=3),
     "tuned_utilisation": Column("utilisation of the tuned wheel", "1", digits=3),
     "p95_utilisation": Column("95 % of wheels below", "1", digits=3),
-    "p95_utilisation_low": Column("from", "1", digits=3),
-    "p95_utilisation_high": Column("to", "1", digits=3),
+    "p95_utilisation_low": Column("from", "1", digits=3, infinite=OPEN_END),
+    "p95_utilisation_high": Column("to", "1", digits=3, infinite=OPEN_END),
     "stress_margin": Column("stress could grow by", "1", digits=3),
-    "utilisation_bound": Column("with upper ends", "1", digits=3),
+    "utilisation_bound": Column("with upper ends", "1", digits=3, infinite=OPEN_END),
     "von_mises": Column("von Mises", "Pa", "MPa", 1e-6, 4),
     "von_mises_gauss": Column("von Mises at Gauss points", "Pa", "MPa", 1e-6, 4),
     "principal": Column("largest principal", "Pa", "MPa", 1e-6, 4),
     "pressing": Column("smallest principal", "Pa", "MPa", 1e-6, 4),
     "frequency_of_partner": Column("frequency of partner", "Hz"),
+    "dofs": Column("degrees of freedom", digits=9),
     "size": Column("element size", "m", "mm", 1e3, 4),
     "recovered": Column("error by the recovered stress", "1", "%", 100.0, 2),
     "scatter": Column("scatter of meshes", "1", "%", 100.0, 2),
@@ -300,7 +309,7 @@ def cell_text(value: Any, column: Column) -> str:
     if not isinstance(value, float | int | np.floating | np.integer):
         return "" if value is None else str(value)
     if np.isinf(value):
-        return "∞" if value > 0 else "-∞"
+        return column.infinite or ("∞" if value > 0 else "-∞")
     return "" if np.isnan(value) else plain_number(float(value * column.factor), column.digits)
 
 
@@ -309,7 +318,7 @@ def is_number(text: str) -> bool:
     try:
         float(text.replace("∞", "inf"))
     except ValueError:
-        return text == ""
+        return text in ("", OPEN_END)
     return True
 
 

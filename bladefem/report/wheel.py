@@ -182,6 +182,59 @@ def scatter_table(found: Amplification) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
+def wheel_table(found: Amplification, seed: int) -> pd.DataFrame:
+    """One row a load and drawn wheel: its highest blade; NaN where the amplification is not known.
+
+    Args:
+        seed: of the draws, which with the wheel's number gives the wheel again.
+    """
+    parts = []
+    wheels = found.factor.shape[1]
+    for i, load in enumerate(found.loads):
+        known = 1.0 if found.is_known[i] else float("nan")
+        parts.append(
+            pd.DataFrame(
+                {
+                    "load": load,
+                    "seed": seed,
+                    "wheel": np.arange(1, wheels + 1),
+                    "highest_amplitude": known * found.peak[i],
+                    "highest_blade": found.blade[i] + 1,
+                    "amplification": known * found.factor[i],
+                    "peak_frequency": known * found.omega[i] / (2 * np.pi),
+                    "solved_by": _solved_by(found, i),
+                    "unconverged": found.unsolved[i],
+                }
+            )
+        )
+    return pd.concat(parts, ignore_index=True)
+
+
+def _solved_by(found: Amplification, load: int) -> list[str]:
+    """What the amplification of each wheel comes from; blade and frequency of a wheel that checks
+    the damper law are the law's too.
+    """
+    if not found.is_known[load]:
+        return ["not solved"] * found.factor.shape[1]
+    if not found.checked.shape[1]:
+        return ["whole wheel"] * found.factor.shape[1]
+    whole = set(found.checked[load].tolist())
+    return [
+        "whole wheel, place by the law" if wheel in whole else "damper law, calibrated"
+        for wheel in range(found.factor.shape[1])
+    ]
+
+
+def shown_wheels(found: Amplification, seed: int) -> pd.DataFrame:
+    """The rows of `wheel_table` under the load with the lowest tuned wheel, the highest first."""
+    i = _lowest_known(found)
+    table = wheel_table(found, seed)
+    if i is None:
+        return table.iloc[:0]
+    rows = table[table["load"] == found.loads[i]]
+    return rows.sort_values("highest_amplitude", ascending=False, ignore_index=True)
+
+
 def _comparison_columns(found: Amplification, load: int) -> dict[str, float]:
     """The tuned wheel by both ways, and whether these agree; empty where they were not compared."""
     if not len(found.agrees):
@@ -206,16 +259,29 @@ def _free_columns(found: Amplification, load: int) -> dict[str, float]:
     }
 
 
-def optima_of_scatter(found: Amplification) -> tuple[tuple[float, float], RobustOptimum]:
+def optima_of_scatter(
+    found: Amplification, searched: float | None = None
+) -> tuple[tuple[float, float], RobustOptimum]:
     """Load [N] and amplitude [m] of the tuned wheel's optimum, and the optimum of 95 % of the drawn
     wheels.
+
+    Args:
+        searched: best load of the tuned wheel by a search [N], where it is among those studied: a
+            parabola between these is less than the search.
     """
-    return best_load(found.loads, found.tuned), robust_optimum(found)
+    there = np.flatnonzero(found.loads == (np.nan if searched is None else searched))
+    if len(there):
+        tuned = float(found.loads[there[0]]), float(found.tuned[there[0]])
+    else:
+        tuned = best_load(found.loads, found.tuned)
+    return tuned, robust_optimum(found)
 
 
-def optimum_table(found: Amplification) -> pd.DataFrame:
-    """The tuned optimum, which knows no scatter, and the robust one with its intervals."""
-    (load, height), robust = optima_of_scatter(found)
+def optimum_table(found: Amplification, searched: float | None = None) -> pd.DataFrame:
+    """The tuned optimum, which knows no scatter, and the robust one with its intervals; arguments
+    as those of `optima_of_scatter`.
+    """
+    (load, height), robust = optima_of_scatter(found, searched)
     rows = [
         {"optimum": "tuned wheel", "load": load, "highest_amplitude": height},
         {
@@ -276,11 +342,15 @@ def use_sentences(used: Sequence[ScatteredUse]) -> list[str]:
     ]
 
 
-def scatter_headlines(found: Amplification) -> list[Headline]:
-    """First numbers of the statistics, as far as they are known; one load alone has no optimum."""
+def scatter_headlines(found: Amplification, searched: float | None = None) -> list[Headline]:
+    """First numbers of the statistics, as far as they are known; one load alone has no optimum.
+
+    Args:
+        searched: as that of `optima_of_scatter`.
+    """
     numbers = []
     if optimum_is_known(found):
-        numbers = _optimum_headlines(found)
+        numbers = _optimum_headlines(found, searched)
     elif len(found.loads) > 1:
         why = "amplifications are not known where the drawn wheels are lowest"
         numbers = [Headline(ROBUST_OPTIMUM, NOT_DETERMINED, why, "")]
@@ -300,9 +370,10 @@ def scatter_headlines(found: Amplification) -> list[Headline]:
     ]
 
 
-def _optimum_headlines(found: Amplification) -> list[Headline]:
+def _optimum_headlines(found: Amplification, searched: float | None) -> list[Headline]:
     """Best loads with scatter and without, and the highest blade at the first."""
-    (load, height), robust = optima_of_scatter(found)
+    (load, height), robust = optima_of_scatter(found, searched)
+    by_search = searched is not None and load == searched
     words = f"{100 * robust.share:g} % of {found.peak.shape[1]} wheels"
     return [
         Headline(
@@ -314,7 +385,7 @@ def _optimum_headlines(found: Amplification) -> list[Headline]:
         Headline(
             "optimum of the tuned wheel",
             newtons(load, 4),
-            loads_on_both_sides(found, load),
+            "by search, and studied" if by_search else loads_on_both_sides(found, load),
             f"{1e6 * height:.4g} µm where all blades are alike",
         ),
         Headline(
@@ -368,13 +439,16 @@ def _upper(value: float) -> str:
     return f"{value:.3g}" if np.isfinite(value) else "unknown, too few wheels"
 
 
-def scatter_sentences(found: Amplification, held_means: bool = False) -> list[str]:
+def scatter_sentences(
+    found: Amplification, held_means: bool = False, searched: float | None = None
+) -> list[str]:
     """The answer, and what it is worth.
 
     Args:
         held_means: the scene holds the dampers' mean displacements.
+        searched: as that of `optima_of_scatter`.
     """
-    sentences = _optimum_sentences(found)
+    sentences = _optimum_sentences(found, searched)
     i = _lowest_known(found)
     if i is not None:
         q = found.quantile(i, WHEEL_SHARE)
@@ -496,7 +570,7 @@ def _mean_sentences(found: Amplification, held_means: bool) -> list[str]:
     return said
 
 
-def _optimum_sentences(found: Amplification) -> list[str]:
+def _optimum_sentences(found: Amplification, searched: float | None) -> list[str]:
     """Both optima; one load alone has none."""
     if len(found.loads) < 2:
         return ["one load has no optimum, expected several in study.loads"]
@@ -507,14 +581,17 @@ def _optimum_sentences(found: Amplification) -> list[str]:
                 "their amplification is not known"
             )
         ]
-    (load, height), robust = optima_of_scatter(found)
+    (load, height), robust = optima_of_scatter(found, searched)
+    by_search = searched is not None and load == searched
+    both = "the robust optimum is that" if by_search else "both optima are those"
     sentences = [
-        f"tuned optimum: {newtons(load, 4)}, {1e6 * height:.4g} um",
+        f"tuned optimum{', by search' if by_search else ''}: {newtons(load, 4)}, "
+        f"{1e6 * height:.4g} um",
         f"robust optimum ({100 * robust.share:g} % of {found.peak.shape[1]} wheels below): "
         f"{newtons(robust.load.value, 4)} ({INTERVAL} "
         f"{newton_range(robust.load.low, robust.load.high)}), {1e6 * robust.height.value:.4g} um "
         f"({_height_interval(robust)})",
-        "between the loads studied both optima are those of a parabola, whose error the intervals "
+        f"between the loads studied {both} of a parabola, whose error the intervals "
         f"leave out: robust optimum {loads_on_both_sides(found, robust.load.value)}",
     ]
     wheels = found.peak.shape[1]
@@ -540,17 +617,24 @@ def _optimum_sentences(found: Amplification) -> list[str]:
     return sentences
 
 
-def marked_optima(found: Amplification) -> list[tuple[str, float, float, float]]:
+def marked_optima(
+    found: Amplification, searched: float | None
+) -> list[tuple[str, float, float, float]]:
     """Name, load and interval of the optima, for the chart."""
-    (load, _), robust = optima_of_scatter(found)
+    (load, _), robust = optima_of_scatter(found, searched)
     name = f"robust optimum ({100 * robust.share:g} %)"
     own = robust.load
     return [("tuned optimum", load, load, load), (name, own.value, own.low, own.high)]
 
 
-def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]]:
+def scatter_drawings(
+    found: Amplification, searched: float | None = None
+) -> dict[str, Callable[[Path], object]]:
     """Bands against the load, and the histogram under the load with the lowest tuned wheel, where
     amplifications are known.
+
+    Args:
+        searched: as that of `optima_of_scatter`.
     """
     drawings: dict[str, Callable[[Path], object]] = {}
     i = _lowest_known(found)
@@ -560,7 +644,7 @@ def scatter_drawings(found: Amplification) -> dict[str, Callable[[Path], object]
             view.draw_histogram, found.factor[i], marks, newtons(found.loads[i])
         )
     if len(found.loads) > 1:
-        optima = marked_optima(found) if optimum_is_known(found) else []
+        optima = marked_optima(found, searched) if optimum_is_known(found) else []
         drawings["wheel/scatter_chart"] = partial(
             view.draw_bands, found.loads, found.tuned, _known_bands(found), optima
         )

@@ -84,7 +84,8 @@ class Page:
     subject: str = ""
     # numbers after the first ones
     more: Sequence[Headline] = ()
-    # fields and whole tables among the inputs that the results depend on; all when left out
+    # fields and whole tables among the inputs that the results depend on; all when left out, none
+    # where the results are of no scene
     inputs: Collection[str] | None = None
 
 
@@ -180,7 +181,7 @@ def page_contents(
         "title": scene.title,
         "subject": page.subject or scene.kind,
         "date": datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z"),
-        "inputs_hash": inputs_hash(scene),
+        "inputs_hash": inputs_hash(scene) if page.inputs is None or page.inputs else "",
         "inputs": _relevant(resolved_rows(scene, given), page.inputs),
         "mark": "changed" if given is None else "given",
         "statements": statements,

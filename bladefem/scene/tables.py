@@ -233,8 +233,8 @@ class Temperature:
     file: str = quantity(
         "",
         help="CSV file of places and temperatures, columns x, y, z, T with units in brackets such "
-        "as 'T [degC]' (m and K without), interpolated; or columns node, T with the numbers of the "
-        "user's own mesh; relative to the scene file",
+        "as 'T [degC]' (m and K without), interpolated, in the axes of imported.file; or columns "
+        "node, T with the numbers of that mesh; relative to the scene file",
     )
     reference: float = quantity(
         293.15, "K", 0.0, 5000.0, "at which the bodies are as drawn and free of thermal stress"

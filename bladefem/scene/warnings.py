@@ -24,7 +24,7 @@ MAX_RIM_SPEED = 900.0
 def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_doubtful_materials(scene), *_doubtful_masses(scene), *_doubtful_mesh(scene)]
-    said += _unused_stiffnesses(scene)
+    said += [*_unused_stiffnesses(scene), *_unused_solver_fields(scene), *_unused_phase(scene)]
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
@@ -80,6 +80,32 @@ def _unused_stiffnesses(scene: Scene) -> Iterator[str]:
                     f"{name}.{areal} = {show(per_area, 'N/m^3')} is not used: {name}.{total} = "
                     f"{show(whole, 'N/m')}, the stiffness of the whole seat, takes its place"
                 )
+
+
+def _unused_solver_fields(scene: Scene) -> Iterator[str]:
+    """Fields of SLEPc beside the other eigensolver."""
+    solver = scene.solver
+    if solver.eigensolver == "slepc":
+        return
+    options = [word for word in solver.petsc.split() if word.startswith(("-eps_", "-st_"))]
+    given = {"vectors": solver.vectors, "petsc": " ".join(options)}
+    for name, value in given.items():
+        if value:
+            yield (
+                f"solver.{name} = {value} is not used: it is SLEPc's, and solver.eigensolver = "
+                f"{solver.eigensolver}"
+            )
+
+
+def _unused_phase(scene: Scene) -> Iterator[str]:
+    """The phase between plane blades, on a wheel."""
+    sectors = kind_named(scene.kind).sectors
+    if scene.excitation.phase and sectors is not None and value_at(scene, sectors):
+        yield (
+            f"excitation.phase = {show(scene.excitation.phase, 'rad')} is not used: on a wheel "
+            f"excitation.engine_order = {scene.excitation.engine_order} and {sectors} = "
+            f"{value_at(scene, sectors)} give the phase between blades"
+        )
 
 
 def _doubtful_speed(scene: Scene) -> Iterator[str]:

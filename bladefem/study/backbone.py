@@ -65,17 +65,23 @@ class Backbone:
     lost: str
 
     @property
-    def predicted(self) -> tuple[float, float]:
-        """Resonance amplitude [m] and frequency [Hz] under the scene's force: the highest crossing
-        of `drive` with 1; NaN where the amplitudes do not reach it.
+    def resonances(self) -> list[tuple[float, float]]:
+        """Amplitudes [m] and frequencies [Hz] of the resonances under the scene's force, where
+        `drive` rises through 1, in the order of the branch. The first ends the motions that grow
+        from rest, later ones those that are detached from them: in between the force is too small.
         """
         known = np.flatnonzero(self.converged)
-        drive = self.drive[known]
-        crossings = np.flatnonzero((drive[:-1] <= 1) != (drive[1:] <= 1))
-        if not len(crossings):
-            return np.nan, np.nan
-        highest = max(crossings, key=lambda k: self.amplitude[known[k]])
-        i, j = known[highest], known[highest + 1]
+        enough = self.drive[known] <= 1
+        tops = np.flatnonzero(enough[:-1] & ~enough[1:])
+        return [self._crossing(known[k], known[k + 1]) for k in tops]
+
+    @property
+    def predicted(self) -> tuple[float, float]:
+        """The first of the `resonances`; NaN where the amplitudes do not reach it."""
+        return next(iter(self.resonances), (np.nan, np.nan))
+
+    def _crossing(self, i: int, j: int) -> tuple[float, float]:
+        """Amplitude [m] and frequency [Hz] where `drive` is 1 between two points."""
         share = -np.log(self.drive[i]) / np.log(self.drive[j] / self.drive[i])
         amplitude = self.amplitude[i] * (self.amplitude[j] / self.amplitude[i]) ** share
         frequency = self.frequency[i] + share * (self.frequency[j] - self.frequency[i])
@@ -88,12 +94,28 @@ class Backbone:
 
     def response(self) -> tuple[np.ndarray, np.ndarray]:
         """Forced response by the mode alone: frequencies (m,) [Hz] and amplitudes (m,) [m], from
-        below the resonance over it to above.
+        below the resonance over it to above; NaN before each piece that is detached.
 
         At each amplitude |omega^2 - Omega^2 + 2i zeta omega Omega| a = |phi^H F| has two
         frequencies where the force is more than the resonance needs.
         """
-        kept = self.converged & (self.drive <= 1)
+        known = np.flatnonzero(self.converged)
+        enough = self.drive[known] <= 1
+        ends = np.flatnonzero(np.diff(enough.astype(int))) + 1
+        pieces = [piece for piece in np.split(np.arange(len(known)), ends) if enough[piece].all()]
+        out = [np.zeros((2, 0))]
+        for piece in pieces:
+            first, last = piece[0], piece[-1]
+            foot = [self._crossing(known[first - 1], known[first])] if first else []
+            tip = [self._crossing(known[last], known[last + 1])] if last + 1 < len(known) else []
+            gap = [(np.nan, np.nan)] if len(out) > 1 else []
+            below, above = self._flanks(known[piece])
+            out += [_columns(gap + foot), below, _columns(tip), above[:, ::-1], _columns(foot)]
+        frequency, amplitude = np.hstack(out)
+        return frequency, amplitude
+
+    def _flanks(self, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Frequency [Hz] and amplitude [m], (2, k), below and above the resonance at points."""
         omega = 2 * np.pi * self.frequency[kept]
         rate = 2 * (self.friction + self.own)[kept] * omega
         half = omega**2 - rate**2 / 2
@@ -101,12 +123,12 @@ class Backbone:
         amplitude = self.amplitude[kept]
         below = np.sqrt(np.maximum(half - root, 0)) / (2 * np.pi)
         above = np.sqrt(half + root) / (2 * np.pi)
-        height, at = self.predicted
-        tip = ([at], [height]) if np.isfinite(height) else ([], [])
-        return (
-            np.concatenate([below, tip[0], above[::-1]]),
-            np.concatenate([amplitude, tip[1], amplitude[::-1]]),
-        )
+        return np.array([below, amplitude]), np.array([above, amplitude])
+
+
+def _columns(pairs: list[tuple[float, float]]) -> np.ndarray:
+    """(2, k) amplitudes and frequencies as frequency and amplitude."""
+    return np.array(pairs).reshape(-1, 2).T[::-1]
 
 
 def run_backbones(

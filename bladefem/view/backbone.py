@@ -140,6 +140,9 @@ def _draw_prediction(ax: Axes, found: Sequence[Backbone], colours: dict[float, A
     balance = MICRO * np.array([one.balance[0] for one in found])
     # the line of one load alone is a point, which only its mark shows
     ax.plot(load[order], predicted[order], "-x", color="#777777", label="by the mode")
+    others = [(one.load, MICRO * a) for one in found for a, _ in one.resonances[1:]]
+    if others:
+        ax.plot(*zip(*others, strict=True), "+", color="#777777", label="detached, by the mode")
     for one, height in zip(found, balance, strict=True):
         ax.plot(one.load, height, "o", color=colours[one.load])
     ax.plot([], [], "o", color="#777777", label="forced response")

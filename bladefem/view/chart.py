@@ -51,18 +51,8 @@ def draw_chart(
             draw_accuracy(
                 shown, ax=ax, tolerance=tolerance, title=f"{title}: {what}" if title else what
             )
-            top = ax.get_ylim()[1]
-            margin = max(1.3, (top / floor) ** 0.08)
-            bottom = floor / margin
-            ax.set_ylim(bottom, top * margin)
-            ax.axhspan(
-                bottom,
-                floor,
-                color="#bbbbbb",
-                alpha=0.5,
-                zorder=0,
-                label="below the reference's own error",
-            )
+            if np.isfinite(table["reference_error"].iloc[0]):
+                _shade_below(ax, floor)
             ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
             _name_star(ax, what)
             _name_time(ax, what)
@@ -70,6 +60,22 @@ def draw_chart(
             ax.set(ylabel=f"error of the {of} [%]")
         names_apart(*axes[:, 0])
         return axes[0, 0].figure
+
+
+def _shade_below(ax: Axes, floor: float) -> None:
+    """The errors that are smaller than the reference's own."""
+    top = ax.get_ylim()[1]
+    margin = max(1.3, (top / floor) ** 0.08)
+    bottom = floor / margin
+    ax.set_ylim(bottom, top * margin)
+    ax.axhspan(
+        bottom,
+        floor,
+        color="#bbbbbb",
+        alpha=0.5,
+        zorder=0,
+        label="below the reference's own error",
+    )
 
 
 def draw_errors(

@@ -105,7 +105,7 @@ def _number_faces(
             continue
         middle = np.linalg.norm(look.outside.centres[towards] - face.centre, axis=1).argmin()
         places.append(look.outside.centres[towards[middle]] @ frame.T + lift * eye)
-        numbers.append(face.name.removeprefix("face_"))
+        numbers.append(face.name.removeprefix("outer_").removeprefix("face_"))
     if places:
         plotter.add_point_labels(
             np.array(places),

@@ -21,6 +21,8 @@ from .style import COLOURS, FAILED_COLOUR, canvas
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# relative distance of two waves that are drawn as two lines
+APART = 2e-3
 # not as many as colours, so that a pair comes again late
 MARKERS = "osD^vPX*<>h"
 
@@ -38,7 +40,9 @@ def draw_campbell(
     """Frequencies over speed with engine-order lines; crossings are ringed; returns the figure.
 
     Args:
-        table: columns speed [rad/s], mode, frequency [Hz], optionally nodal_diameter and family.
+        table: columns speed [rad/s], mode, frequency [Hz], optionally nodal_diameter and family;
+            with forward and backward [Hz] the waves under Coriolis forces are drawn, the latter
+            dashed where it is another line.
         orders: engine orders to draw.
         file: PNG to write.
         crossings: rows of ``campbell_crossings``: speed, frequency, engine_order.
@@ -68,7 +72,7 @@ def draw_campbell(
             ax.axvline(
                 RPM * operating,
                 color="#555555",
-                ls="--",
+                ls="-.",
                 lw=1.1,
                 label=f"{RPM * operating:.5g} rpm",
             )
@@ -86,6 +90,7 @@ def draw_campbell(
 def _draw_modes(ax: Axes, table: pd.DataFrame) -> None:
     """A line a mode and nodal diameter, named at the first diameter of each mode."""
     keys = [key for key in ("mode", "nodal_diameter") if key in table]
+    split = False
     for key, line in table.groupby(keys):
         mode, *diameter = key
         line = line.sort_values("speed")
@@ -93,13 +98,17 @@ def _draw_modes(ax: Axes, table: pd.DataFrame) -> None:
         first = (
             not diameter or diameter[0] == table.loc[table["mode"] == mode, "nodal_diameter"].min()
         )
-        ax.plot(
-            RPM * line["speed"],
-            line["frequency"],
-            color=colour,
-            lw=1.7 if not diameter else 1.2,
-            label=line_name(line, mode) if first else None,
-        )
+        wide = 1.7 if not diameter else 1.2
+        speed = RPM * line["speed"]
+        drawn = line["forward" if "forward" in line else "frequency"]
+        ax.plot(speed, drawn, color=colour, lw=wide, label=line_name(line, mode) if first else None)
+        if "backward" not in line:
+            continue
+        if (abs(line["backward"] / drawn.clip(lower=np.finfo(float).tiny) - 1) > APART).any():
+            ax.plot(speed, line["backward"], color=colour, lw=wide, ls="--")
+            split = True
+    if split:
+        ax.plot([], [], color="#555555", lw=1.2, ls="--", label="backward waves")
 
 
 def diameter_names(table: pd.DataFrame) -> list[tuple[float, str, str]]:

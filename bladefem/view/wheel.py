@@ -94,7 +94,9 @@ def draw_bands(
         for colour, (name, value) in zip(COLOURS, quantiles.items(), strict=False):
             middle, low, high = 1e6 * value.T
             ax.plot(load, middle, color=colour, marker="o", label=name)
-            ax.fill_between(load, low, np.where(np.isfinite(high), high, middle), alpha=0.18)
+            # open ends, of few wheels, have no place
+            ends = [np.where(np.isfinite(end), end, middle) for end in (low, high)]
+            ax.fill_between(load, *ends, alpha=0.18)
         first = min((at for _, at, _, _ in best), default=0.0)
         for place, (name, at, lowest, highest) in enumerate(best):
             ax.axvline(at, color="#888888", linewidth=1.0, linestyle=("--", ":")[place % 2])

@@ -407,6 +407,15 @@ def test_a_chart_needs_a_time(budget, what, tmp_path, capsys):
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.parametrize(
+    "more", [[WEDGE], ["--set", "contact.mu=0.2"], ["--mesh"], ["--mesh", "9 mm"]]
+)
+def test_a_chart_of_the_built_in_blade_takes_no_scene(more, tmp_path, capsys):
+    assert main(["chart", *more, "--reference", "-o", str(tmp_path / "run")]) == 2
+    assert "expected either a scene or --reference" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
 def test_a_chart_needs_damping(tmp_path, capsys):
     assert main(["chart", WEDGE, "-o", str(tmp_path), "--set", "operation.damping=0"]) == 2
     assert "operation.damping = 0: expected above 0" in capsys.readouterr().err

@@ -103,6 +103,9 @@ def test_a_wedge_that_slides_outwards_carries_the_closed_form(problems):
         assert one.force.sum() == pytest.approx(expected, rel=2e-3)
     carried = MU * np.cos(ALPHA) / (np.sin(ALPHA) + MU * np.cos(ALPHA))
     assert found.share == pytest.approx(carried, rel=5e-3)
+    # mirror images: down the slope on both faces, against the way out; t1 runs up it on this one
+    slope = np.array([one.traction[:, 0].sum() for one in found.maps])
+    np.testing.assert_allclose(slope, np.array([-MU, MU]) * expected, rtol=3e-3)
 
 
 def test_a_layer_that_stiffens_a_thousandfold_is_pressed_on(problems):

@@ -24,7 +24,9 @@ from bladefem.fem.refinement import refine_uniformly
 from bladefem.fem.temperature_field import mesh_temperatures
 from bladefem.scene.tables import Material
 from bladefem.scene.temperature_file import GivenTemperatures
+from geometry.export import write_msh
 from geometry.imported import read_mesh
+from geometry.profile import turn_about_axis
 from geometry.raw_mesh import read_raw
 from geometry.session import gmsh_session
 from geometry.topology import facet_nodes
@@ -264,6 +266,29 @@ def test_a_damper_of_another_file_is_as_hot_as_what_it_touches(tmp_path):
         found = mesh_temperatures(mesh, given)
         np.testing.assert_allclose(found, 400.0 + 1000.0 * mesh.points[:, 0], rtol=1e-9)
     assert bar.cell_type == mesh.cell_type
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0)])
+def test_places_of_temperatures_are_in_the_axes_of_the_file(axis, tmp_path):
+    """A sector 17 degrees off x, or about x, is as hot by the places of its nodes as by their
+    numbers; the reader turns it to x and z. The field, equal on the cut faces, has 80 K over a
+    sector.
+    """
+    drawn = sector(12)
+    off = turn_about_axis(np.deg2rad(17.0))
+    if axis[0]:
+        off = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]) @ off
+    mesh = replace(drawn, points=drawn.points @ off.T)
+    write_msh(mesh, tmp_path / "a.msh")
+    raw = read_raw(tmp_path / "a.msh")
+    count = drawn.sector.count
+    x, y, _ = (raw.points @ off).T
+    heat = 600.0 + 1000.0 * np.hypot(x, y) + 40.0 * np.cos(count * np.arctan2(y, x))
+    found = read_mesh(tmp_path / "a.msh", sectors=count, axis=axis)
+    by_place = mesh_temperatures(found, GivenTemperatures(heat, raw.points, None))
+    by_number = mesh_temperatures(found, GivenTemperatures(heat, None, raw.numbers))
+    assert found.turn is not None and np.ptp(by_number) > 80.0
+    np.testing.assert_allclose(by_place, by_number, atol=1e-6)
 
 
 @pytest.mark.parametrize(

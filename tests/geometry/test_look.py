@@ -1,6 +1,7 @@
 """What a mesh file says of itself, and a run of the scene that comes of it."""
 
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 
 import decks
@@ -70,6 +71,22 @@ def test_sets_with_alike_names_are_taken(tmp_path):
     assert [name.split(" ")[0] for name in names[2:]] == ["cyclic_low", "cyclic_high"]
     missing = [sentence.split(":")[0] for sentence in look.missing]
     assert missing == ["tip_mid", "seat_right", "damper"]
+
+
+def test_sets_named_like_numbered_faces_are_not_mixed_up_with_them(tmp_path):
+    """A drawing's faces come in a mesh as sets face_1, ... in another order than the numbers, which
+    the scene to start from must not take for each other.
+    """
+    m = decks.model("c3d10")
+    sets = {"Face_6": m.node_sets["cyclic_low"]}
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(replace(m, node_sets=sets), {})))
+    look = look_at(tmp_path / "a.inp")
+    assert look.bore == "outer_face_6"
+    table = tomllib.loads(starting_scene(look))["imported"]
+    mesh = read_mesh(tmp_path / "a.inp", 1.0, table["sectors"], table["axis"], table["names"])
+    bore = np.unique(mesh.faces["clamp"])
+    radius = np.linalg.norm(mesh.points[:, :2], axis=1)
+    np.testing.assert_allclose(radius[bore], radius.min(), rtol=1e-3)
 
 
 def test_files_of_one_model_are_numbered_alone(tmp_path):

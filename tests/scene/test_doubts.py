@@ -73,6 +73,20 @@ def test_stiffnesses_that_nothing_reads_are_named():
     assert implausible_values(load_scene(scene, ["contact.left.kt=4e6 N/m"])) == []
 
 
+def test_fields_that_nothing_reads_are_named():
+    """The phase of plane blades on a wheel, and SLEPc's fields beside the other eigensolver."""
+    scene = ROOT / "scenes" / "wedge.toml"
+    fields = ["solver.vectors=40", "solver.petsc=-eps_monitor", "excitation.phase=30 deg"]
+    assert implausible_values(load_scene(scene, ["solver.eigensolver=lanczos", *fields])) == [
+        "solver.vectors = 40 is not used: it is SLEPc's, and solver.eigensolver = lanczos",
+        "solver.petsc = -eps_monitor is not used: it is SLEPc's, and solver.eigensolver = lanczos",
+        "excitation.phase = 30 deg is not used: on a wheel excitation.engine_order = 9 and "
+        "disc.sectors = 36 give the phase between blades",
+    ]
+    plane = ROOT / "scenes" / "plane.toml"
+    assert implausible_values(load_scene(plane, fields)) == []
+
+
 def test_limits_themselves_raise_none():
     text = [
         "material.blade.E=1 GPa",

@@ -17,7 +17,7 @@ from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.report.backbone import backbone_sentences, prediction_table
-from bladefem.study.backbone import curve_backbone
+from bladefem.study.backbone import Backbone, curve_backbone
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "hbm"))
 from models import single_mass
@@ -74,6 +74,32 @@ def test_the_balance_of_the_reference_blade_is_predicted(load):
         assert drawn == pytest.approx(own, rel=0.1)
     row = prediction_table([found]).iloc[0]
     assert row["off"] == found.error and row["unconverged"] == 0
+
+
+def test_a_detached_resonance_is_not_taken_for_the_one_from_rest():
+    """Friction that opens at large amplitudes: the drive rises through 1, falls and rises again."""
+    amplitude = np.geomspace(1e-6, 1e-4, 81)
+    x = np.log10(amplitude / 1e-6)
+    level = np.full(81, 0.01)
+    drive = np.exp(2.0 * np.sin(2 * np.pi * (x - 0.5)) * (x > 0.2) - 0.5 * (x <= 0.2))
+    one = Backbone(
+        20.0, None, amplitude, 400 + 10 * x, level, 0 * level, drive, level > 0, level < 0,
+        (10**-5.5, 405.0), amplitude, "",
+    )  # fmt: skip
+    (first, second) = one.resonances
+    assert first == pytest.approx((10**-5.5, 405.0), rel=1e-4)
+    assert second == pytest.approx((10**-4.5, 415.0), rel=1e-4)
+    assert abs(one.error) < 1e-3
+    at, height = one.response()
+    # the second piece stands alone, between x = 1 and 1.5
+    (gap,) = np.flatnonzero(np.isnan(at))
+    assert height[:gap].max() == pytest.approx(10**-5.5, rel=1e-4)
+    assert height[gap + 1 :].min() == pytest.approx(10**-5.0, rel=1e-4)
+    assert height[gap + 1] == height[-1]
+    assert any(
+        "keeps the mode up to 31.62 um (415 Hz)" in said for said in backbone_sentences([one])
+    )
+    assert prediction_table([one])["detached_amplitude"][0] == pytest.approx(10**-4.5, rel=1e-4)
 
 
 def test_a_force_that_no_amplitude_meets_is_said():

@@ -164,6 +164,10 @@ def test_files_are_written(made, tmp_path):
     files = write_chart(made, tmp_path, 0.02, "reference blade")
     assert all(file.stat().st_size > 100 for file in files)
     assert len(pd.read_csv(files[0])) == len(made.methods)
+    page = (tmp_path / "report_chart.html").read_text(encoding="utf-8")
+    assert "<h1>reference blade</h1>" in page and "built-in model, speed against" in page
+    # it has no fields, which would be those of another scene
+    assert 'id="inputs"' not in page and "SHA-256" not in page and "plane" not in page
 
 
 def test_the_page_begins_with_the_whole_model_and_its_errors_are_no_estimates(made, tmp_path):
@@ -277,6 +281,9 @@ def test_a_mesh_that_would_take_too_long_is_left_out_and_named():
     assert table["left_out"].tolist() == [False, True, False, True]
     assert sum("0.1 mm: left out" in remark for remark in remarks) == 2
     assert any("mesh of second order, 0.1 mm: left out" in remark for remark in remarks)
+    # what alone is the reference is not exact, and what was left out has no size
+    assert "the only one, whose own error is not known" in remarks[0]
+    assert np.isnan(table["error"][2]) and table["error"][0] > 0 and np.isnan(table["dofs"][1])
 
 
 def test_no_mesh_of_second_order_is_no_comparison(monkeypatch):

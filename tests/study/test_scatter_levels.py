@@ -10,11 +10,15 @@ import pytest
 from test_walking_dampers import BLADES, free_dampers, resonance
 
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
+from bladefem.report.tables import readable_texts
 from bladefem.report.wheel import (
     optimum_is_known,
+    optimum_table,
     scatter_headlines,
     scatter_sentences,
     scatter_table,
+    shown_wheels,
+    wheel_table,
 )
 from bladefem.study.mistuning import peak_choice
 from bladefem.study.mistuning.law_level import with_checks
@@ -99,6 +103,46 @@ def of_one_load(load, tuned, factors, compared):
         *no_checks(1),
     )
     return with_comparison(found, compared)
+
+
+def agreed(load, tuned, factors):
+    return of_one_load(load, tuned, factors, SectorComparison(tuned, tuned, True))
+
+
+def test_each_wheel_has_a_line():
+    """Seed and number find a wheel again; the page has the load with the lowest tuned wheel."""
+    found = joined_loads([agreed(load, 1e-6 * load, np.array([1.2, 1.4])) for load in (40.0, 80.0)])
+    found = replace(found, omega=2 * np.pi * np.array([[400.0, 401.0], [410.0, 411.0]]))
+    table = wheel_table(found, 7)
+    assert list(table["wheel"]) == [1, 2, 1, 2] and set(table["seed"]) == {7}
+    np.testing.assert_allclose(table["amplification"], [1.2, 1.4, 1.2, 1.4])
+    np.testing.assert_allclose(table["highest_amplitude"], [48e-6, 56e-6, 96e-6, 112e-6])
+    np.testing.assert_allclose(table["peak_frequency"], [400, 401, 410, 411])
+    assert list(shown_wheels(found, 7)["wheel"]) == [2, 1]
+    assert (shown_wheels(found, 7)["load"] == 40.0).all()
+
+
+def test_a_searched_load_is_the_tuned_optimum():
+    """A parabola through the loads studied has another minimum than the search, which is one of
+    them: one of both is shown.
+    """
+    factors = np.linspace(1.1, 1.3, 40)
+    tuned = {40.0: 3e-4, 70.0: 2e-4, 160.0: 2.9e-4}
+    found = joined_loads([agreed(load, height, factors) for load, height in tuned.items()])
+    parabola = optimum_table(found)["load"][0]
+    assert abs(parabola / 70.0 - 1) > 0.02
+    assert optimum_table(found, 70.0)["load"][0] == 70.0
+    assert "by search: 70 N, 200 um" in scatter_sentences(found, searched=70.0)[0]
+    assert scatter_headlines(found, 70.0)[1].value == "70 N"
+    # one that was not studied is not known here
+    assert optimum_table(found, 75.0)["load"][0] == parabola
+
+
+def test_an_open_end_of_few_wheels_is_a_dash():
+    found = agreed(40.0, 3e-4, np.linspace(1.1, 1.3, 4))
+    assert scatter_table(found)["p50_low"][0] == -np.inf
+    shown = readable_texts(scatter_table(found)).iloc[0]
+    assert shown["50 % from"] == shown["50 % to"] == "-"
 
 
 def test_amplification_is_refused_where_the_sector_moves_otherwise():

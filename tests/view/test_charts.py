@@ -48,6 +48,23 @@ def test_campbell_marks_every_crossing(folder):
     assert ink(folder / "campbell.png") > 0.03
 
 
+def test_campbell_draws_both_waves():
+    """Waves under Coriolis forces, on which crossings lie; one line where both are the same."""
+    speed = np.linspace(0.0, 500.0, 3)
+    still = np.full(3, 400.0)
+    lines = {"forward": still - 0.02 * speed, "backward": still + 0.02 * speed}
+    names = {"mode": 1, "speed": speed, "frequency": still}
+    split = pd.DataFrame({**names, "nodal_diameter": 2, **lines})
+    standing = pd.DataFrame(
+        {**names, "nodal_diameter": 0, "forward": still - 1, "backward": still - 1}
+    )
+    drawn = draw_campbell(pd.concat([split, standing]), [3]).axes[0].lines
+    heights = {
+        (line.get_linestyle(), line.get_ydata()[-1]) for line in drawn if len(line.get_xdata()) == 3
+    }
+    assert heights == {("-", 390.0), ("--", 410.0), ("-", 399.0)}
+
+
 def test_interference_rings_what_is_too_close(folder):
     table = synthetic.wheel_frequencies()
     figure = draw_interference(

@@ -8,14 +8,12 @@ interpolation. The modes at these three speeds span those between them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import reduce
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from scipy.linalg import eigh
 
 from geometry.mesh import sector_of
 
@@ -24,6 +22,7 @@ from ...errors import InputError
 from ...scene.fields import split_values
 from ...scene.units import is_plain, parse
 from ..pipeline.bodies import Bodies, is_wheel
+from ..pipeline.normal_modes import eigensolver
 from .crossings import (
     campbell_crossings,
     crossing_margins,
@@ -34,6 +33,7 @@ from .crossings import (
 
 if TYPE_CHECKING:
     from ...fem.body import Body
+    from .speed_model import SpeedModel
 
 # modes beyond those asked for: Coriolis forces mix neighbours
 GUARD_MODES = 6
@@ -79,10 +79,17 @@ def campbell_tables(
     operating = bodies.scene.operation.speed
     if sectors and diameters is None:
         diameters = sorted({fold_order(order, sectors) for order in orders})
-    table = campbell_table(bodies, sorted({*speeds, operating}), diameters, count)
+    all_speeds = sorted({*speeds, operating})
+    models = speed_models(bodies, all_speeds, diameters, count)
+    table = pd.concat([model.table(all_speeds) for model in models], ignore_index=True)
     at_speed = table[table["speed"] == operating]
     crossed = [
-        campbell_crossings(_excited_waves(table, order, sectors), [order], sectors or None)
+        campbell_crossings(
+            _excited_waves(table, order, sectors),
+            [order],
+            sectors or None,
+            _excited_line(models, order, sectors),
+        )
         for order in orders
     ]
     # one without rows stands for all where no order crosses a mode
@@ -114,9 +121,26 @@ def campbell_table(
         backward [Hz] with them, error [1]: how far the frequency moves when the middle speed's
         modes are left out, a pessimistic measure of what the basis misses.
     """
+    models = speed_models(bodies, speeds, diameters, count)
+    return pd.concat([model.table(speeds) for model in models], ignore_index=True)
+
+
+def speed_models(
+    bodies: Bodies,
+    speeds: Sequence[float],
+    diameters: Sequence[int] | None,
+    count: int = 5,
+) -> list[SpeedModel]:
+    """The small matrices of each nodal diameter, for speeds [rad/s] from zero to the largest.
+
+    Raises:
+        InputError: fewer than two speeds, negative ones.
+    """
     if len(speeds) < 2 or min(speeds) < 0 or not np.isfinite(speeds).all():
         raise InputError(f"speeds are {list(speeds)} rad/s, expected at least two, not negative")
     from ...contact.seating import counting_sense, spin_axis
+    from ...fem.constraint import transformation
+    from .speed_model import speed_model
 
     squares = np.linspace(0.0, max(speeds) ** 2, 3)
     at = [bodies.blade_at(float(np.sqrt(s))) for s in squares]
@@ -124,14 +148,12 @@ def campbell_table(
         _modes_at_speed(bodies, body, diameters, count + GUARD_MODES)
         for body in bodies.progress(at, "speeds")
     ]
-    axis = spin_axis(bodies.mesh)
-    rows = [
-        _frequency_lines(
-            at, [s[i] for s in sets], squares, speeds, axis, counting_sense(bodies.mesh)
-        )
-        for i in range(len(sets[0]))
+    frame = transformation(at[1], cyclic=is_wheel(bodies.mesh))
+    axis, sense = spin_axis(bodies.mesh), counting_sense(bodies.mesh)
+    return [
+        speed_model(at, frame, same_diameter, squares, count, axis, sense)
+        for same_diameter in zip(*sets, strict=True)
     ]
-    return pd.concat(rows, ignore_index=True)
 
 
 def read_speeds(text: str) -> list[float]:
@@ -185,97 +207,10 @@ def _modes_at_speed(
     from ...fem.constraint import constrain
     from ...fem.modes import modes
 
+    solver = eigensolver(bodies.scene)
     if is_wheel(bodies.mesh):
-        return all_diameters(body, count, diameters)
-    return [modes(constrain(body), count)]
-
-
-def _frequency_lines(
-    at: list[Any],
-    sets: list[ModeSet],
-    squares: np.ndarray,
-    speeds: Sequence[float],
-    axis: tuple[float, float, float],
-    sense: int,
-) -> pd.DataFrame:
-    """All speeds of one nodal diameter, in the space of the modes at three speeds; the guards are
-    left out.
-    """
-    count = len(sets[0].frequencies)
-    shown = slice(0, count - GUARD_MODES)
-    K, M, g = _project_speeds(at, sets, axis)
-    outer = np.r_[0:count, 2 * count : 3 * count]
-    frames = []
-    for speed in speeds:
-        weights = _lagrange_weights(squares, speed**2)
-        small = reduce(np.add, [weight * part for weight, part in zip(weights, K, strict=True)])
-        f, Z = _lowest_frequencies(small, M, count)
-        rough, _ = _lowest_frequencies(small[np.ix_(outer, outer)], M[np.ix_(outer, outer)], count)
-        forward, backward = _split_waves(
-            f, Z.conj().T @ g @ Z, speed, sense, sets[0].nodal_diameter
-        )
-        values = {
-            "frequency": f,
-            "forward": forward,
-            "backward": backward,
-            "error": np.abs(rough / f - 1),
-        }
-        frames.append(
-            pd.DataFrame({"mode": np.arange(1, count + 1), "speed": float(speed), **values})[shown]
-        )
-    table = pd.concat(frames, ignore_index=True)
-    if sets[0].nodal_diameter is not None:
-        table.insert(0, "nodal_diameter", sets[0].nodal_diameter)
-    return table
-
-
-def _project_speeds(
-    at: list[Any],
-    sets: list[ModeSet],
-    axis: tuple[float, float, float],
-) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
-    """Stiffness of each speed, mass and Coriolis matrix on the modes of all three."""
-    from ...fem.gyroscopic import own_rows, project_coriolis
-    from ...fem.linalg import apply_block, hermitian_part, inner_products
-
-    comm = at[0].comm
-    X = own_rows(at[0], np.concatenate([s.shapes for s in sets]))
-    K = [hermitian_part(inner_products(comm, X, apply_block(body.K, X))) for body in at]
-    M = hermitian_part(inner_products(comm, X, apply_block(at[0].M, X)))
-    return K, M, project_coriolis(at[0], X, axis)
-
-
-def _lowest_frequencies(
-    K: np.ndarray,
-    M: np.ndarray,
-    count: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest frequencies [Hz] and vectors in a basis that may nearly depend on itself."""
-    from ...fem.linalg import hermitian_part
-
-    size, Q = np.linalg.eigh(M)
-    keep = size > 1e-11 * size[-1]
-    W = Q[:, keep] / np.sqrt(size[keep])
-    lam, Z = eigh(hermitian_part(W.conj().T @ K @ W))
-    return np.sqrt(np.maximum(lam[:count], 0)) / (2 * np.pi), W @ Z[:, :count]
-
-
-def _split_waves(
-    f: np.ndarray,
-    g: np.ndarray,
-    speed: float,
-    sense: int,
-    diameter: int | None,
-) -> tuple[np.ndarray, np.ndarray]:
-    from ...fem.gyroscopic import waves
-
-    found = waves(ModeSet(f, np.zeros((len(f), 0, 3)), diameter, np.zeros(len(f))), g, speed, sense)
-    return found.forward, found.backward
-
-
-def _lagrange_weights(nodes: np.ndarray, s: float) -> list[float]:
-    """Weights of the values at the nodes for the value at s."""
-    return [float(np.prod([(s - b) / (a - b) for b in nodes if b != a])) for a in nodes]
+        return all_diameters(body, count, diameters, solver=solver)
+    return [modes(constrain(body), count, solver=solver)]
 
 
 def _excited_waves(
@@ -289,8 +224,25 @@ def _excited_waves(
     beyond half the number of blades are seen by the blades as a wave in the other sense. Coriolis
     forces move standing waves and single blades too, which have the same frequency in both columns.
     """
-    backward = sectors and wave_sense(order, sectors) == "with"
-    return table.assign(frequency=table["backward" if backward else "forward"])
+    return table.assign(frequency=table[_excited_column(order, sectors)])
+
+
+def _excited_column(order: int, sectors: int) -> str:
+    return "backward" if sectors and wave_sense(order, sectors) == "with" else "forward"
+
+
+def _excited_line(
+    models: Sequence[SpeedModel], order: int, sectors: int
+) -> Callable[[dict[str, int], float], float]:
+    """The frequency [Hz] that an order excites, from the names of a line and a speed [rad/s]."""
+    place = ("forward", "backward").index(_excited_column(order, sectors))
+    by_diameter = {model.nodal_diameter: model for model in models}
+
+    def frequency(line: dict[str, int], speed: float) -> float:
+        _, *both = by_diameter[line.get("nodal_diameter")].waves_at(speed)
+        return float(both[place][line["mode"] - 1])
+
+    return frequency
 
 
 def _order_interference(

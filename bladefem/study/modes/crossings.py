@@ -8,11 +8,15 @@ speed / (2 pi), in the nodal diameter that EO folds to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 import pandas as pd
+from scipy.optimize import brentq
 
+# of the speed at which an order crosses a line
+CROSSING_TOLERANCE = 1e-9
 # verdict where engine orders have the frequency zero
 AT_REST = "not excited at rest"
 
@@ -35,17 +39,21 @@ def campbell_crossings(
     table: pd.DataFrame,
     orders: Iterable[int],
     sectors: int | None = None,
+    line_at: Callable[[dict[str, int], float], float] | None = None,
 ) -> pd.DataFrame:
     """Speeds at which an engine-order line crosses a frequency line, one row a crossing.
 
-    Between two speeds f^2 is linear in speed^2 (Southwell), which makes each crossing a closed
-    form.
+    Where only the table is known, f^2 is taken for linear in speed^2 between two speeds
+    (Southwell), which makes each crossing a closed form. Coriolis forces split waves in proportion
+    to the speed: with them it is an approximation.
 
     Args:
         table: columns speed [rad/s], mode, frequency [Hz], and optionally nodal_diameter.
         orders: engine orders.
         sectors: number of blades; given, an order crosses only lines of the nodal diameter that it
             folds to.
+        line_at: frequency [Hz] of a line, from its mode (and nodal_diameter), at a speed [rad/s]:
+            crossings are solved on it.
 
     Returns:
         columns mode, nodal_diameter (if there), engine_order, speed [rad/s], frequency [Hz].
@@ -53,7 +61,8 @@ def campbell_crossings(
     keys = [key for key in ("nodal_diameter", "mode") if key in table]
     rows = []
     for key, line in table.groupby(keys):
-        named = dict(zip(keys, key, strict=True))
+        named = {name: int(value) for name, value in zip(keys, key, strict=True)}
+        curve = None if line_at is None else partial(line_at, named)
         for order in orders:
             if (
                 sectors
@@ -68,24 +77,46 @@ def campbell_crossings(
                     "speed": speed,
                     "frequency": order * speed / (2 * np.pi),
                 }
-                for speed in line_crossings(line.sort_values("speed"), order)
+                for speed in line_crossings(line.sort_values("speed"), order, curve)
             ]
     columns = [*keys, "engine_order", "speed", "frequency"]
     return pd.DataFrame(rows, columns=columns).sort_values("speed", ignore_index=True)
 
 
-def line_crossings(line: pd.DataFrame, order: int) -> list[float]:
+def line_crossings(
+    line: pd.DataFrame,
+    order: int,
+    frequency_at: Callable[[float], float] | None = None,
+) -> list[float]:
     """Speeds [rad/s] where one frequency line meets one engine order; a crossing on a given speed
     counts once.
+
+    Args:
+        frequency_at: the line itself, [Hz] at a speed; straight in the squares when left out.
     """
-    speed2 = line["speed"].to_numpy(float) ** 2
+    speed = line["speed"].to_numpy(float)
     f2 = line["frequency"].to_numpy(float) ** 2
-    over = f2 - (order / (2 * np.pi)) ** 2 * speed2
+    over = f2 - (order / (2 * np.pi)) ** 2 * speed**2
     found = []
     for k in np.flatnonzero((over[:-1] * over[1:] < 0) | (over[1:] == 0)):
-        part = over[k] / (over[k] - over[k + 1])
-        found.append(float(np.sqrt(speed2[k] + part * (speed2[k + 1] - speed2[k]))))
+        if frequency_at is None or over[k + 1] == 0:
+            part = over[k] / (over[k] - over[k + 1])
+            square = speed[k] ** 2 + part * (speed[k + 1] ** 2 - speed[k] ** 2)
+            found.append(float(np.sqrt(square)))
+        else:
+            found.append(_solved_crossing(frequency_at, order, speed[k], speed[k + 1]))
     return found
+
+
+def _solved_crossing(
+    frequency_at: Callable[[float], float], order: int, low: float, high: float
+) -> float:
+    """The speed [rad/s] between two at which a line meets an engine order."""
+
+    def distance(speed: float) -> float:
+        return frequency_at(speed) - order * speed / (2 * np.pi)
+
+    return float(brentq(distance, low, high, xtol=CROSSING_TOLERANCE * high))
 
 
 def interference_table(

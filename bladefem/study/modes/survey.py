@@ -26,7 +26,7 @@ from ...util.message import method
 from ...util.progress import Progress, without_progress
 from ..pipeline import pipeline
 from ..pipeline.bodies import Bodies, is_wheel
-from ..pipeline.normal_modes import MODES_SHOWN, excited_modes, wheel_modes
+from ..pipeline.normal_modes import MODES_SHOWN, eigensolver, excited_modes, wheel_modes
 from ..pipeline.run_records import ModalRun
 from ..pipeline.stage_inputs import stage_key
 from ..pipeline.validate_mesh import check_blade, refuse_loads
@@ -167,7 +167,7 @@ def _all_modes(bodies: Bodies, direct: bool) -> list[ModeSet]:
 
     if not is_wheel(bodies.mesh):
         flex = bodies.factorised(0)
-        return [modes(flex.con, MODES_SHOWN, flex)]
+        return [modes(flex.con, MODES_SHOWN, flex, solver=eigensolver(bodies.scene))]
     return wheel_modes(bodies, MODES_SHOWN, bodies.scene.model.nodal_diameters, direct)
 
 
