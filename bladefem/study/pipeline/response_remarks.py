@@ -304,8 +304,8 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
             share = f"{100 * scene.accuracy:.3g} %"
             tolerated = f", and from {newton_range(start, end)} they keep within {share} of it"
         yield (
-            f"best load{damper}: {newtons(b.load, 4)} by exact search between {lowest} and "
-            f"{highest}, {len(b.tried)} loads and {b.points} points; no load near it lowers the "
+            f"search for the best load{damper}: it ended at {newtons(b.load, 4)}, between {lowest} "
+            f"and {highest}, with {len(b.tried)} loads and {b.points} points; no load near it lowers the "
             f"amplitude of these balances by more than {percent(b.tolerance)}{tolerated}; "
             f"{b.settings.sentence(error_text=error)}"
         )
