@@ -127,7 +127,7 @@ def solved_mesh(
 
     bodies = Bodies(scene, mesh, comm)
     sets = find_modes(bodies, diameters, count + SPARE_MODES)
-    errors = [frequency_errors(bodies.still_blade, found) for found in sets]
+    errors = [frequency_errors(bodies.still_blade, found, bodies.state) for found in sets]
     return SolvedMesh(mesh, sets, errors)
 
 
