@@ -171,7 +171,7 @@ COLUMNS = {
     "pressing": Column("smallest principal", "Pa", "MPa", 1e-6, 4),
     "frequency_of_partner": Column("frequency of partner", "Hz"),
     "size": Column("element size", "m", "mm", 1e3, 4),
-    "recovered": Column("error by the recovered stress", "1", "%", 100.0, 2),
+    "estimated": Column("estimated on this mesh alone", "1", "%", 100.0, 2),
     "scatter": Column("scatter of meshes", "1", "%", 100.0, 2),
     "order": Column("observed order", "1", digits=3),
     "sum": Column("sum of shares", "1", "%", 100.0, 4),
