@@ -52,6 +52,19 @@ ROUNDING_OVER_TOLERANCE = 1e3
 
 
 @dataclass(frozen=True)
+class SteadyState:
+    """What small vibrations are about, whose stiffness is `linear_tangent` or `tangent`."""
+
+    # (n_points, dim) static displacement [m]
+    displacement: np.ndarray
+    # [rad/s]
+    speed: float
+    axis: tuple[float, float, float] = AXIS
+    # Green's strain: of a nonlinear preload
+    large: bool = False
+
+
+@dataclass(frozen=True)
 class Preload:
     """The static state under rotation and heat."""
 
@@ -123,7 +136,7 @@ def thermal_force(body: Body, quadrature: str = "exact") -> np.ndarray:
     measure = ufl.Measure("dx", body.space.mesh, metadata={"quadrature_degree": degree[0]})
     hot = stress(_thermal_strain(body, degree[0]))
     form = compile_form(depth * ufl.inner(hot, ufl.sym(ufl.grad(v))) * measure)
-    return _in_mesh_numbering(body, assemble_vector(form).array).ravel()
+    return in_mesh_numbering(body, assemble_vector(form).array).ravel()
 
 
 def thermal_displacement(flex: Flexibility, quadrature: str = "exact") -> np.ndarray:
@@ -297,7 +310,7 @@ def _load_steps(
 
 def tangent(
     body: Body,
-    state: Preload,
+    state: Preload | SteadyState,
     axis: tuple[float, float, float] = AXIS,
     quadrature: str = "exact",
 ) -> PETSc.Mat:
@@ -305,6 +318,13 @@ def tangent(
     forms = _potential_forms(body, axis, quadrature)
     _set_heating(forms, 1.0)
     return _tangent_matrix(body, forms, state.displacement, state.speed**2)
+
+
+def state_tangent(body: Body, state: SteadyState) -> PETSc.Mat:
+    """Stiffness of small vibrations about a steady state, spin softening included [N/m]."""
+    if state.large:
+        return tangent(body, state, state.axis)
+    return linear_tangent(body, state.displacement, state.speed, state.axis)
 
 
 def body_under_rotation(
@@ -504,7 +524,7 @@ def _unbalanced_force(
 def _elastic_force(forms: _Forms, u: np.ndarray, speed2: float) -> np.ndarray:
     """(n_points*dim,) unbalanced force of cells of one shape in mesh numbering [N]."""
     _set_state(forms, u, speed2)
-    return _in_mesh_numbering(forms.body, assemble_vector(forms.force).array).ravel()
+    return in_mesh_numbering(forms.body, assemble_vector(forms.force).array).ravel()
 
 
 def _spring_force(body: Body, spring: PETSc.Mat, u: np.ndarray) -> np.ndarray:
@@ -512,10 +532,10 @@ def _spring_force(body: Body, spring: PETSc.Mat, u: np.ndarray) -> np.ndarray:
     moved, force = spring.createVecs()
     moved.array = u[_block_nodes(body)].ravel()[: moved.getLocalSize()]
     spring.mult(moved, force)
-    return _in_mesh_numbering(body, force.array).ravel()
+    return in_mesh_numbering(body, force.array).ravel()
 
 
-def _in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
+def in_mesh_numbering(body: Body, part: np.ndarray) -> np.ndarray:
     """(n_points, dim) of an assembled vector's share of this rank; the same on every rank."""
     rows = np.concatenate(body.comm.allgather(part))
     out = np.zeros((body.rows.size, body.dim))

@@ -393,45 +393,6 @@ def _of_cells(
     )
 
 
-def element_stress(
-    body: Body,
-    u: np.ndarray,
-    name: str,
-    word: str,
-    cells: np.ndarray,
-    rule: tuple[np.ndarray, np.ndarray] | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Stresses of several real displacement fields at once, in some cells of one material.
-
-    Args:
-        u: (n_points, dim, m) displacements [m].
-        cells: (nc, k) of the body's material ``name``, of the shape ``word``.
-        rule: places (q, d) and weights (q,) in the unit cell; those of `gauss_stress` when left
-            out.
-
-    Returns:
-        volumes (nc, q) [m^3] and stresses (nc, q, m, 6) [Pa] at the points.
-    """
-    d = body.dim
-    at, weight = rule or best_points(word)
-    values, gradients = tabulate(word, at)
-    tangents = np.einsum("ckg,qkd->cqgd", body.mesh.points[cells][:, :, :d], gradients)
-    depth = body.mesh.depth if d == 2 else 1.0
-    volume = np.abs(np.linalg.det(tangents)) * weight * depth
-    # (nc, q, k, d) gradients of the shape functions in space
-    spatial = gradients @ np.linalg.inv(tangents)
-    slope = np.einsum("ckim,cqkj->cqmij", u[cells], spatial, optimize=True)
-    strain = (slope + slope.swapaxes(3, 4)) / 2
-    temperature = point_temperatures(body.heat, cells, values)
-    hot = None if temperature is None else temperature[..., None]
-    stress = stress_of(body.material[name], strain, body.plane, hot)
-    across = None
-    if d == 2 and body.plane == "strain":
-        lam = lame_parameters(body.material[name], d, body.plane)[..., 0]
-        across = lam * np.trace(strain, axis1=3, axis2=4)
-    return volume, _stress_vector(stress, across)
-
-
 def _stress_vector(stress: np.ndarray, across: np.ndarray | None) -> np.ndarray:
     d = stress.shape[-1]
     out = np.zeros((*stress.shape[:-2], 6), stress.dtype)

@@ -180,7 +180,7 @@ COLUMNS = {
     "frequency_of_partner": Column("frequency of partner", "Hz"),
     "dofs": Column("degrees of freedom", digits=9),
     "size": Column("element size", "m", "mm", 1e3, 4),
-    "recovered": Column("error by the recovered stress", "1", "%", 100.0, 2),
+    "estimated": Column("estimated on this mesh alone", "1", "%", 100.0, 2),
     "scatter": Column("scatter of meshes", "1", "%", 100.0, 2),
     "order": Column("observed order", "1", digits=3),
     "sum": Column("sum of shares", "1", "%", 100.0, 4),

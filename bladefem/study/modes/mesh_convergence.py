@@ -52,8 +52,8 @@ COMPARED_NODES = 4000
 class Convergence:
     """SI columns."""
 
-    # size [m], cells, dofs, nodal_diameter, mode, frequency [Hz], recovered: its error [1] by the
-    # recovered stress, mac: one row a mesh and mode
+    # size [m], cells, dofs, nodal_diameter, mode, frequency [Hz], estimated: its error [1] by
+    # `fem.stiffness_error`, mac: one row a mesh and mode
     points: pd.DataFrame
     # nodal_diameter, mode, frequency, limit [Hz], order [1], error [1] of the finest mesh,
     # scatter [1] about the fit, reason: why the order is not believed, empty when it is; of a mesh
@@ -68,7 +68,7 @@ class SolvedMesh:
     mesh: Mesh
     # one a nodal diameter
     sets: Sequence[ModeSet]
-    # (modes,) errors of the frequencies [1] by the recovered stress, of each set
+    # (modes,) estimated errors of the frequencies [1], of each set
     errors: Sequence[np.ndarray]
 
 
@@ -124,12 +124,12 @@ def solved_mesh(
     count: int,
     comm: Communicator | None = None,
 ) -> SolvedMesh:
-    """Modes of one mesh, some more than asked for, and their errors by the recovered stress."""
+    """Modes of one mesh, some more than asked for, and their estimated errors."""
     from ...fem.stiffness_error import frequency_errors
 
     bodies = Bodies(scene, mesh, comm)
     sets = find_modes(bodies, diameters, count + SPARE_MODES)
-    errors = [frequency_errors(bodies.still_blade, found) for found in sets]
+    errors = [frequency_errors(bodies.still_blade, found, bodies.state) for found in sets]
     return SolvedMesh(mesh, sets, errors)
 
 
@@ -153,14 +153,14 @@ def _halved_mesh_convergence(
     keys = [key for key in ("nodal_diameter", "mode") if key in found.points]
     given = found.points[found.points["dofs"] == found.points["dofs"].min()]
     summary = found.summary.merge(
-        given[[*keys, "frequency", "recovered"]].rename(columns={"frequency": "given"}), on=keys
+        given[[*keys, "frequency", "estimated"]].rename(columns={"frequency": "given"}), on=keys
     )
     # down to the finest mesh, and from there
     below = abs(summary["given"] / summary["frequency"] - 1) + summary["error"]
-    summary["given_error"] = np.fmax(below, summary["recovered"])
+    summary["given_error"] = np.fmax(below, summary["estimated"])
     # rigid modes are exact
     summary.loc[summary["frequency"] == 0, "given_error"] = 0.0
-    summary = summary.drop(columns="recovered")
+    summary = summary.drop(columns="estimated")
     return replace(found, summary=summary)
 
 
@@ -224,7 +224,7 @@ def _mesh_rows(
             **diameter,
             "mode": np.arange(1, len(numbers) + 1),
             "frequency": modes.frequencies[numbers],
-            "recovered": errors[numbers],
+            "estimated": errors[numbers],
             "mac": match,
         }
     )

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from ...fem.constraint import Transformation
     from ...fem.flexibility import Flexibility
     from ...fem.gyroscopic import Spin
+    from ...fem.rotation import SteadyState
     from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
@@ -138,21 +139,37 @@ class Bodies:
     @cached_property
     def blade(self) -> Body:
         """The blade, with the stiffness that it has under rotation and heat."""
-        return self.blade_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
+        return self._blade_about(self.state)
 
     def blade_at(self, speed: float) -> Body:
         """The blade with its stiffness at a speed [rad/s]."""
-        from ...fem.rotation import body_under_rotation, has_thermal_strain, linear_tangent
+        return self._blade_about(self.state_at(speed))
+
+    def _blade_about(self, state: SteadyState | None) -> Body:
+        from ...fem.rotation import state_tangent
+
+        if state is None:
+            return self.still_blade
+        self._release_still()
+        return replace(self.still_blade, K=state_tangent(self.still_blade, state))
+
+    @cached_property
+    def state(self) -> SteadyState | None:
+        """What the blade vibrates about; None at rest."""
+        return self.state_at(self.scene.operation.speed if self.scene.operation.stiffening else 0.0)
+
+    def state_at(self, speed: float) -> SteadyState | None:
+        """The static state at a speed [rad/s]; None at rest."""
+        from ...fem.rotation import SteadyState, has_thermal_strain, preload
 
         if speed == 0 and not has_thermal_strain(self.still_blade):
-            return self.still_blade
+            return None
+        axis = spin_axis(self.mesh)
         if self.scene.operation.preload == "nonlinear":
-            return body_under_rotation(self.still_blade, speed, "clamp", spin_axis(self.mesh))
+            found = preload(self.still_blade, speed, "clamp", axis)
+            return SteadyState(found.displacement, speed, axis, large=True)
         u0 = speed**2 * self.swell + self.thermal_displacement
-        self._release_still()
-        return replace(
-            self.still_blade, K=linear_tangent(self.still_blade, u0, speed, spin_axis(self.mesh))
-        )
+        return SteadyState(u0, speed, axis)
 
     @cached_property
     def swell(self) -> np.ndarray:

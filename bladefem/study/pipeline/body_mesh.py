@@ -1,9 +1,10 @@
 """Is the body's mesh fine enough? By how much its estimated error changes a resonance.
 
-The blade's elements are too stiff. What recovered stress says about that (`fem.stiffness_error`)
-softens the modes of the reduced model, and the resonance is looked for again: the change of its
-amplitude is the estimate. It holds what the modes carry: the shape of the motion at the seats
-against that at the probe, on which friction acts, and the excited mode's share in the force.
+The blade's elements are too stiff. What displacements of third order say about that
+(`fem.stiffness_error`) softens the modes of the reduced model, and the resonance is looked for
+again: the change of its amplitude is the estimate. It holds what the modes carry: the shape of the
+motion at the seats against that at the probe, on which friction acts, and the excited mode's share
+in the force.
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ def mode_errors(
     dim = bodies.mesh.dimension
     fields = modes.shapes[:, :, :dim]
     seen = ports.matrix.T @ fields.reshape(len(fields), -1).T
-    energies = stiffness_error(bodies.still_blade, fields)
+    squares = (2 * np.pi * modes.frequencies) ** 2
+    energies = stiffness_error(bodies.still_blade, fields, squares, bodies.state)
     return ModeErrors(modes.nodal_diameter or 0, np.asarray(seen), energies)
 
 
