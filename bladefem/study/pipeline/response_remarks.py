@@ -305,8 +305,9 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
             tolerated = f", and from {newton_range(start, end)} they keep within {share} of it"
         yield (
             f"search for the best load{damper}: it ended at {newtons(b.load, 4)}, between {lowest} "
-            f"and {highest}, with {len(b.tried)} loads and {b.points} points; no load near it lowers the "
-            f"amplitude of these balances by more than {percent(b.tolerance)}{tolerated}; "
+            f"and {highest}, with {len(b.tried)} loads and {b.points} points; no load near it "
+            f"lowers the amplitude of these balances by more than {percent(b.tolerance)}"
+            f"{tolerated}; "
             f"{b.settings.sentence(error_text=error)}"
         )
 
