@@ -19,7 +19,7 @@ from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import body_mesh, pipeline
 from bladefem.study.pipeline.bodies import Bodies
-from bladefem.study.pipeline.body_mesh import softened_change
+from bladefem.study.pipeline.body_mesh import SofterBody, softened_change
 from bladefem.study.pipeline.normal_modes import find_modes
 from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.scene_mesh import build_mesh
@@ -101,9 +101,29 @@ def test_a_softened_peak_that_is_not_solved(monkeypatch, lifting):
     as_meshed = reference_model(load=3.0, points=4, modes=20)
     side = replace(as_meshed.sides[0], omega=0.99 * as_meshed.sides[0].omega)
     family = family_of(replace(as_meshed, sides=(side, *as_meshed.sides[1:])))
-    softer = SimpleNamespace(family=lambda case: family, ratio=0.99)
+    softer = SofterBody(lambda case: family, 0.99)
     top = SimpleNamespace(omega=1.0, states={"lift": lifting}, w=np.zeros((8, 1, 2)))
     monkeypatch.setattr(body_mesh, "changed_peak", lambda *_: None)
     settings = Settings(20, 1, 0, "mass")
     found = softened_change(softer, family_of(as_meshed), None, settings, top, 1)
     assert found == (pytest.approx(0.99**-2 - 1, rel=0.05) if lifting else np.inf)
+
+
+@pytest.mark.parametrize(("lifting", "expected"), [(0, 0.24), (8, 0.034)])
+def test_a_change_that_ends_on_another_motion_is_not_the_mesh(monkeypatch, lifting, expected):
+    """1.7 % by half of the softening and 24 % by all of it: where contacts lift off, many motions
+    exist at one frequency; where none does, the jump is that of the resonance itself.
+    """
+    model = reference_model(load=3.0, points=4, modes=20)
+    family = family_of(model)
+    top = SimpleNamespace(omega=1.0, states={"lift": lifting}, w=np.zeros((8, 1, 2)))
+    softer = SofterBody(lambda case: family, 0.98, SofterBody(lambda case: family, 0.99))
+    heights = {0.99: 1.017, 0.98: 1.24}
+    monkeypatch.setattr(body_mesh, "size", lambda _: 1.0)
+    monkeypatch.setattr(
+        body_mesh,
+        "changed_peak",
+        lambda model, settings, top, omega, *_: SimpleNamespace(height=heights[omega]),
+    )
+    found = softened_change(softer, family, None, Settings(20, 1, 0, "mass"), top, 1)
+    assert found == pytest.approx(expected, rel=1e-9)

@@ -41,6 +41,8 @@ class SofterBody:
     family: Callable[[LoadCase], Family]
     # frequency of the excited mode over that as meshed
     ratio: float
+    # the body less half of that error
+    half: SofterBody | None = None
 
 
 @dataclass(frozen=True)
@@ -141,22 +143,43 @@ def softened_change(
     """Relative change of a resonance amplitude on the softened body. Where that was not solved and
     contacts lift off, that of the blade without damper; else inf.
 
+    Where most contacts lift off, many motions exist side by side, and the search may end on another
+    one: of the whole change and twice that by half of the error the smaller one counts there. Of
+    the shipped wedge under 18 N, a tenth, a quarter, a half and three quarters of the error change
+    the resonance by 0.3, 0.9, 1.7 and 2.6 %, all of it by 24 %.
+
     Args:
         models: of the body as meshed.
         settings, top: of the resonance, and its highest point.
         mode: that is excited (1 = lowest).
     """
+    known = [_change_on(softer, case, settings, top)]
+    if mostly_lifts_off(top) and softer.half is not None:
+        half = _change_on(softer.half, case, settings, top)
+        known.append(None if half is None else 2 * half)
+    changes = [change for change in known if change is not None]
+    if changes:
+        return min(changes)
+    if not lifts_off(top):
+        return np.inf
+    # a damper that comes off holds little: the motion is nearly that of the free blade
+    model = family_member(softer.family(case), settings).model
+    meshed = family_member(models, settings).model
+    return abs(_free_height(model, mode) / _free_height(meshed, mode) - 1)
+
+
+def _change_on(
+    softer: SofterBody,
+    case: LoadCase,
+    settings: Settings,
+    top: Solution,
+) -> float | None:
+    """Relative change of a resonance amplitude; None where it was not solved."""
     model = family_member(softer.family(case), settings).model
     # fallbacks for a damper that comes off take longer than the whole curve, mostly in vain
     firm = not mostly_lifts_off(top)
     peak = changed_peak(model, settings, top, top.omega * softer.ratio, PEAK_TOLERANCE, firm)
-    if peak is not None:
-        return abs(peak.height / size(top) - 1)
-    if not lifts_off(top):
-        return np.inf
-    # a damper that comes off holds little: the motion is nearly that of the free blade
-    meshed = family_member(models, settings).model
-    return abs(_free_height(model, mode) / _free_height(meshed, mode) - 1)
+    return None if peak is None else abs(peak.height / size(top) - 1)
 
 
 def _free_height(model: ReducedModel, mode: int) -> float:
