@@ -9,16 +9,14 @@ estimated error of the body's elements changes.
 
 Measured on 9 and 4.5 mm elements:
 
-    case               um coarse  um fine   true   reported (balance + half the points + body)
-    shipped, coarse      160.45    167.74   4.4 %   7.0 %  (2.0 % +          + 5.1 %)   (*)
-    soft layer           908.27    913.47   0.6 %   8.5 %  (3.6 % +          + 4.9 %)   (*)
-    stiff layer           65.67     69.93   6.1 %  21.7 %  (8.6 % + 11.5 % + 1.5 %)
-    imported mesh        158.72    167.30   5.1 %   9.2 %  (1.2 % + not known + 8.0 %)
-    imported STEP        133.71    134.27   0.4 %   6.0 %  (3.0 % + 1.6 % + 1.3 %)
+    case               um coarse  um fine   true   reported (balance + body)
+    shipped, coarse      159.04    162.43   2.1 %   5.9 %  (1.5 % + 4.4 %)
+    soft layer           934.66    903.76   3.4 %   8.6 %  (2.8 % + 5.8 %)
+    stiff layer           67.04     67.59   0.8 %   1.9 %  (1.0 % + 0.9 %)
+    imported mesh        158.55    161.44   1.8 %   8.2 %  (1.2 % + 7.0 %)
+    imported STEP        127.81    129.92   1.6 %   2.3 %  (0.2 % + 2.1 %)
 
-(*) before the factor 1.5 of `fem.stiffness_error`. "Not known": half the points were not solved, or
-are already in the balance's error. The shipped scene itself, 80 N: 158.3 um with 4.6 % by the body;
-after its foot of the shank was meshed more finely 151.5 um, 4.5 % less, with 1.0 %.
+What half the points change is in the balance's error there.
 """
 
 from __future__ import annotations

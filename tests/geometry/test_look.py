@@ -81,7 +81,7 @@ def test_sets_named_like_numbered_faces_are_not_mixed_up_with_them(tmp_path):
     sets = {"Face_6": m.node_sets["cyclic_low"]}
     (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(replace(m, node_sets=sets), {})))
     look = look_at(tmp_path / "a.inp")
-    assert look.bore == "outer_face_6"
+    assert look.bore == ("outer_face_6",)
     table = tomllib.loads(starting_scene(look))["imported"]
     mesh = read_mesh(tmp_path / "a.inp", 1.0, table["sectors"], table["axis"], table["names"])
     bore = np.unique(mesh.faces["clamp"])
