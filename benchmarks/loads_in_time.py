@@ -27,12 +27,13 @@ import pandas as pd
 from numba import njit
 
 from bladefem.data import PortModel
+from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
-from bladefem.study.pipeline.reduced_sector import reduce_sector
+from bladefem.study.pipeline.reduced_sector import Reduced, reduce_sector
 
 SCENE = Path(__file__).parents[1] / "scenes" / "wedge.toml"
 BLADES = 4
@@ -101,20 +102,31 @@ def with_residual_modes(body: PortModel, damping: float) -> tuple[np.ndarray, ..
     high = body.shapes[:, ~kept]
     residual = np.asarray(body.residual) + (high / body.omega[~kept] ** 2) @ high.conj().T
     values, vectors = np.linalg.eigh((residual + residual.conj().T) / 2)
-    soft = values > SMALLEST_COMPLIANCE * values.max()
+    soft = (values > SMALLEST_COMPLIANCE * values.max()) & (values > 0)
     added = vectors[:, soft] * np.sqrt(values[soft]) * RESIDUAL_FREQUENCY
     omega = np.append(body.omega[kept], np.full(soft.sum(), RESIDUAL_FREQUENCY))
     ratios = np.append(np.full(kept.sum(), damping), np.full(soft.sum(), RESIDUAL_DAMPING))
     return omega, ratios, np.concatenate([body.shapes[:, kept], added], axis=1)
 
 
-def ring_of(folder: str, loads: list[float]) -> tuple[Ring, list[LoadCase]]:
-    """The shipped scene reduced, and its seats under these loads."""
+def reduced_scene(folder: str, loads: list[float]) -> tuple[Scene, Reduced, list[LoadCase], int]:
+    """The shipped scene, its sector, its seats under these loads, and the nodes of the first."""
     scene = vary(load_scene(SCENE), "study.loads", loads, "study.own_load", False)
     ready = pipeline.run(scene, folder, until="contact")
     patches = list(ready.contact.problem.patches)
-    order, sectors = scene.excitation.engine_order, scene.disc.sectors
-    reduced = reduce_sector(Bodies(scene, ready.mesh), patches, [0, order, sectors // 2], MODES)
+    diameters = [0, scene.excitation.engine_order, scene.disc.sectors // 2]
+    reduced = reduce_sector(Bodies(scene, ready.mesh), patches, diameters, MODES)
+    cases = load_cases(scene, ready.mesh, ready.contact)
+    return scene, reduced, cases, len(patches[0].area)
+
+
+def ring_of(scene: Scene, reduced: Reduced, first: int) -> Ring:
+    """Four blades that may move as they like, a quarter of the waves of the wheel.
+
+    Args:
+        first: contact nodes of the first seat.
+    """
+    sectors = scene.disc.sectors
     omega, damping, shapes = [], [], []
     for n, body in reduced.sector.items():
         own_omega, own_damping, own = with_residual_modes(body, scene.operation.damping)
@@ -133,7 +145,7 @@ def ring_of(folder: str, loads: list[float]) -> tuple[Ring, list[LoadCase]]:
     damper_omega, damper_damping, damper = with_residual_modes(
         reduced.damper, scene.operation.damping
     )
-    ring = Ring(
+    return Ring(
         np.concatenate(omega),
         np.concatenate(damping),
         damper_omega,
@@ -142,10 +154,9 @@ def ring_of(folder: str, loads: list[float]) -> tuple[Ring, list[LoadCase]]:
         scene.excitation.force * everywhere[:, :, ports["load"]][:, :, 0],
         everywhere[:, :, ports["probe"]][:, :, 0].copy(),
         np.ascontiguousarray(damper.real[reduced.damper.ports["contact"]]),
-        len(ready.contact.problem.patches[0].area),
-        2 * np.pi * order / sectors,
+        first,
+        2 * np.pi * scene.excitation.engine_order / sectors,
     )
-    return ring, load_cases(scene, ready.mesh, ready.contact)
 
 
 @njit
@@ -278,7 +289,7 @@ def print_load(ring: Ring, case: LoadCase, told: pd.Series, steps: int) -> None:
     print(
         f"| {case.load:g} | {frequency:.2f} | {1e6 * amplitude:.1f} | {100 * told['error']:.1f} | "
         f"{1e6 * low:.1f} to {1e6 * high:.1f} | {100 * (amplitude / high - 1):+.1f} | {words} | "
-        f"{periods} | {seconds:.0f} |",
+        f"{periods}{' (not steady)' if periods >= MOST_PERIODS else ''} | {seconds:.0f} |",
         flush=True,
     )
 
@@ -292,7 +303,8 @@ def main() -> None:
     summary = pd.read_csv(Path(options.folder) / "summary.csv").set_index("load [N]")
     summary = summary[(summary.index > 0) & np.isfinite(summary.index)]
     loads = options.loads or list(summary.index)
-    ring, cases = ring_of(tempfile.mkdtemp(), loads)
+    scene, reduced, cases, first = reduced_scene(tempfile.mkdtemp(), loads)
+    ring = ring_of(scene, reduced, first)
     print(
         "| load [N] | at [Hz] | told [um] | estimated error [%] | marched [um] | told over marched "
         "[%] | from | periods | CPU [s] |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |"

@@ -30,6 +30,7 @@ from geometry.topology import FAMILY
 from geometry.whole_cells import OwnCells
 
 from ..data import ModeSet
+from ..errors import NotSolvedError
 from ..scene.tables import Material
 from ..util.arrays import BooleanArray, RealArray
 from .body import Body
@@ -49,7 +50,8 @@ FACTORS = {1: 1.3, 2: 2.0}
 LARGEST_SHARE = 0.9
 # energy that a step of the conjugate gradients adds, over that found, at which they end
 TOLERANCE = 0.01
-MAX_STEPS = 60
+# the shipped sector takes 7; the functions are few in each cell, so that finer meshes take no more
+MAX_STEPS = 500
 # functions of third order at a time
 FUNCTIONS_PER_BLOCK = 30_000
 # of the matrices of cells, beyond which each step computes them again
@@ -153,6 +155,9 @@ class _Operator:
 def _energies(operator: _Operator, force: RealArray) -> RealArray:
     """(fields, fields) e_i . A e_j of the solutions e of A e = force (functions, dim, fields), by
     conjugate gradients that the diagonal scales.
+
+    Raises:
+        NotSolvedError: they came to no end; what they found until then would be too small.
     """
     solution = np.zeros_like(force)
     rest = force
@@ -172,6 +177,11 @@ def _energies(operator: _Operator, force: RealArray) -> RealArray:
         before = slope
         slope = (rest * scaled).sum(axis=(0, 1))
         direction = scaled + _ratio(slope, before) * direction
+    else:
+        raise NotSolvedError(
+            f"estimated error of the mesh: {MAX_STEPS} conjugate gradients still add more than "
+            f"{100 * TOLERANCE:g} % each; cells are far too distorted"
+        )
     fields = force.shape[2]
     energies = solution.reshape(-1, fields).T @ (force - rest).reshape(-1, fields)
     return np.asarray(energies + energies.T) / 2

@@ -12,6 +12,8 @@ from mixed import cut, row
 from structured import box, sector, straightened
 from twisted import twisted
 
+from bladefem.errors import NotSolvedError
+from bladefem.fem import stiffness_error as module
 from bladefem.fem.body import assemble
 from bladefem.fem.cell_functions import few_points, reference_nodes
 from bladefem.fem.compat import MPI
@@ -203,3 +205,11 @@ def test_the_fourteen_points_of_a_tetrahedron():
         exact = np.prod([factorial(p) for p in powers]) / factorial(sum(powers) + 3)
         found = weight @ np.prod(at**powers, axis=1)
         assert found == pytest.approx(exact, rel=1e-13)
+
+
+def test_an_energy_that_is_not_found_is_not_told(monkeypatch):
+    """What conjugate gradients have found before their end is too small."""
+    monkeypatch.setattr(module, "MAX_STEPS", 1)
+    body = body_of(box((2, 1, 1), BAR, "hexahedron27"))
+    with pytest.raises(NotSolvedError, match="1 conjugate gradients still add more than 1 % each"):
+        frequency_errors(body, modes(constrain(body), 2))

@@ -16,6 +16,7 @@ from bladefem.study.pipeline import pipeline, response_stage
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import BestLoad
 from bladefem.study.pipeline.loads import best_curve, study_loads
+from bladefem.study.pipeline.response_remarks import best_load_remarks
 
 
 def best(load: float, mass: float | None = None, reason: str = "") -> BestLoad:
@@ -54,6 +55,14 @@ def studied(monkeypatch):
         return study_loads(None, cases, None, None, searches=searches)
 
     return study
+
+
+def test_a_search_is_told_as_a_search():
+    """Its end is the answer only where the judged resonances carry it."""
+    (found,) = best_load_remarks(SimpleNamespace(accuracy=0.05), (best(78.9107),))
+    assert found.startswith("search for the best load: it ended at 78.91 N, between 0.5 N and ")
+    (lost,) = best_load_remarks(SimpleNamespace(accuracy=0.05), (best(1.0, reason="no maximum"),))
+    assert lost.startswith("best load: not found between") and lost.endswith("no maximum")
 
 
 def test_a_best_load_that_was_not_given_takes_its_place(studied):

@@ -121,17 +121,7 @@ def survey_modes(
         run.messages.append(orders_remark(scene, on_root(comm, lambda: given_fields(folder))))
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
-        sizes = list(wanted.sizes) or default_sizes(scene)
-        excited = excited_set(run)
-        n = excited.nodal_diameter
-        # after the rigid modes, which any mesh has exactly
-        count = MODES_STUDIED + int(np.count_nonzero(excited.frequencies == 0))
-        result = replace(
-            result,
-            convergence=mesh_convergence(
-                scene, sizes, None if n is None else [n], count, comm, progress
-            ),
-        )
+        result = replace(result, convergence=_convergence(run, wanted.sizes, comm, progress))
         clock = _stage_seconds(run, "mesh refinement", clock)
     if wanted.loads is not None:
         result = replace(
@@ -141,6 +131,21 @@ def survey_modes(
             messages.append(method("the forced response has Coriolis forces"))
         clock = _stage_seconds(run, "forced response", clock)
     return result if other is None else _compare_modes(result, *other)
+
+
+def _convergence(
+    run: ModalRun,
+    sizes: Sequence[float],
+    comm: Communicator | None,
+    progress: Progress,
+) -> Convergence:
+    """The excited diameter on meshes of these sizes, of the usual ones where none are given."""
+    excited = excited_set(run)
+    n = excited.nodal_diameter
+    # after the rigid modes, which any mesh has exactly
+    count = MODES_STUDIED + int(np.count_nonzero(excited.frequencies == 0))
+    wanted = list(sizes) or default_sizes(run.scene)
+    return mesh_convergence(run.scene, wanted, None if n is None else [n], count, comm, progress)
 
 
 def rigid_mode_remarks(sets: Sequence[ModeSet]) -> list[str]:

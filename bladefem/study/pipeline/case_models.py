@@ -149,26 +149,17 @@ def softer_body(
     """All models of each load case on the blade less the error of its stiffness, and less half of
     it.
     """
-    half = _less(0.5, scene, mesh, reduced, patches, errors)
-    whole = _less(1.0, scene, mesh, reduced, patches, errors)
-    return None if whole is None else replace(whole, half=half)
 
+    def less(share: float) -> SofterBody | None:
+        part = replace(errors, energies=share * errors.energies)
+        softer = softened_sector(reduced, part)
+        if softer is None:
+            return None
+        ratio = frequency_ratio(reduced, softer, part, scene.excitation.mode)
+        return SofterBody(partial(family_of_case, scene, mesh, softer, list(patches)), ratio)
 
-def _less(
-    share: float,
-    scene: Scene,
-    mesh: Mesh,
-    reduced: Reduced,
-    patches: Sequence[Patch],
-    errors: ModeErrors,
-) -> SofterBody | None:
-    """The blade less a share of the error of its stiffness."""
-    part = replace(errors, energies=share * errors.energies)
-    softer = softened_sector(reduced, part)
-    if softer is None:
-        return None
-    ratio = frequency_ratio(reduced, softer, part, scene.excitation.mode)
-    return SofterBody(partial(family_of_case, scene, mesh, softer, list(patches)), ratio)
+    whole = less(1.0)
+    return None if whole is None else replace(whole, half=less(0.5))
 
 
 def affordable_harmonics(case: LoadCase) -> int:
