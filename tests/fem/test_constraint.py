@@ -119,6 +119,7 @@ def test_a_floating_sector_without_props_says_so():
 
 
 @pytest.mark.mpi
+@pytest.mark.two_ranks
 def test_symmetry_planes_leave_the_symmetric_modes():
     """Half and quarter of a bar, sliding in the cut planes, vibrate as the whole one does in its
     symmetric modes.

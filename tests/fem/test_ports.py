@@ -95,13 +95,9 @@ def test_static_flexibility_and_offset():
 
 
 @pytest.mark.mpi
+@pytest.mark.two_ranks
 @pytest.mark.parametrize(
-    "kind, clamp",
-    [
-        ("rubin", "clamp"),
-        pytest.param("rubin", None, marks=pytest.mark.two_ranks),
-        pytest.param("craig-bampton", "clamp", marks=pytest.mark.two_ranks),
-    ],
+    "kind, clamp", [("rubin", "clamp"), ("rubin", None), ("craig-bampton", "clamp")]
 )
 def test_shared_sweep_equals_each_alone(kind, clamp):
     """Ports inside and on the cut faces, five diameters at once and one by one."""

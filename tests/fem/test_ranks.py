@@ -56,7 +56,13 @@ def test_ports_do_not_depend_on_ranks(kind, n, clamp):
     np.testing.assert_allclose(a.shapes, b.shapes, atol=1e-6 * abs(b.shapes).max())
 
 
-@pytest.mark.parametrize("cells", [(1, 1, 1), (4, 2, 2)], ids=["fewer than ranks", "one of a part"])
+@pytest.mark.parametrize(
+    "cells",
+    [
+        pytest.param((1, 1, 1), id="fewer than ranks"),
+        pytest.param((4, 2, 2), id="one of a part", marks=pytest.mark.two_ranks),
+    ],
+)
 @pytest.mark.parametrize("even", [True, False])
 def test_a_rank_without_cells_of_a_crystal(cells, even):
     """All cells, or the single one of a crystal whose constants vary with temperature, are on one

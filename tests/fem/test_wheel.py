@@ -17,9 +17,8 @@ from bladefem.scene.tables import Material
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize(
-    "count, clamp", [pytest.param(13, "clamp", marks=pytest.mark.two_ranks), (14, None)]
-)
+@pytest.mark.two_ranks
+@pytest.mark.parametrize("count, clamp", [(13, "clamp"), (14, None)])
 def test_warm_start_equals_direct(count, clamp):
     """Frequencies, phases and shapes, for odd and even numbers of sectors, held and floating."""
     body = assemble(sector(count, (4, 2, 1), bump=0.2), "blade", Material())
