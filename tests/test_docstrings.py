@@ -65,15 +65,21 @@ def test_described_arguments_are_in_the_signature(package):
 
 
 MAPPED = (
+    "bladefem/contact",
     "bladefem/fem",
+    "bladefem/friction",
+    "bladefem/friction/simd",
     "bladefem/hbm",
     "bladefem/hbm/linear",
     "bladefem/hbm/solver",
+    "bladefem/report",
     "bladefem/study",
     "bladefem/study/adaptive",
     "bladefem/study/mistuning",
     "bladefem/study/modes",
     "bladefem/study/pipeline",
+    "bladefem/view",
+    "bladefem/wheel",
 )
 
 

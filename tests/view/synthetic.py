@@ -180,19 +180,3 @@ def campbell():
         ],
         ignore_index=True,
     )
-
-
-def method_map():
-    """A grid of loads and frequencies with the method that solved each."""
-    load, frequency = np.meshgrid([20, 50, 100, 200, 400, 800], np.linspace(780, 1000, 23))
-    method = np.where(abs(frequency - 800 - load / 5) < 15, "homotopy", "newton")
-    method = np.where(abs(frequency - 800 - load / 5) < 5, "shooting", method)
-    return pd.DataFrame(
-        {
-            "load": load.ravel(),
-            "frequency": frequency.ravel(),
-            "method": method.ravel(),
-            "iterations": np.where(method == "newton", 6, 25).ravel(),
-            "converged": (np.arange(load.size) % 37 != 5),
-        }
-    )

@@ -101,27 +101,6 @@ def campbell_tables(
     )
 
 
-def campbell_table(
-    bodies: Bodies,
-    speeds: Sequence[float],
-    diameters: Sequence[int] | None,
-    count: int = 5,
-) -> pd.DataFrame:
-    """One row a mode and speed.
-
-    Args:
-        diameters: nodal diameters of a wheel.
-
-    Returns:
-        columns nodal_diameter (wheels), mode, speed [rad/s], frequency [Hz] without Coriolis
-        forces, forward and
-        backward [Hz] with them, error [1]: how far the frequency moves when the middle speed's
-        modes are left out, a pessimistic measure of what the basis misses.
-    """
-    models = speed_models(bodies, speeds, diameters, count)
-    return pd.concat([model.table(speeds) for model in models], ignore_index=True)
-
-
 def speed_models(
     bodies: Bodies,
     speeds: Sequence[float],
