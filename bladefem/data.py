@@ -143,8 +143,6 @@ class Patch:
     faces: IntegerArray
     # (n,) node numbers in the mesh
     blade_nodes: IntegerArray
-    # (n,) node numbers in the mesh
-    damper_nodes: IntegerArray
     # (n, 3) where their forces act: centroids of the areas they represent [m]
     places: RealArray | None = None
 

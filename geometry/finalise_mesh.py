@@ -119,12 +119,7 @@ def refuse_flat(mesh: Mesh) -> None:
     )
 
 
-def check_count(
-    gmsh: ModuleType,
-    dimension: int,
-    size: float,
-    name: str = "mesh.size",
-) -> None:
+def check_count(gmsh: ModuleType, dimension: int, size: float) -> None:
     """Refuse a mesh that would never end.
 
     Raises:
@@ -137,9 +132,8 @@ def check_count(
     )
     if count > MAX_CELLS:
         raise InputError(
-            f"{name} = {size:.4g} m gives about {count:.1g} cells, expected at most "
-            f"{MAX_CELLS:.0e}; "
-            "choose larger elements, or check the length unit"
+            f"mesh.size = {size:.4g} m gives about {count:.1g} cells, expected at most "
+            f"{MAX_CELLS:.0e}; choose larger elements, or check the length unit"
         )
 
 

@@ -62,3 +62,32 @@ def test_described_arguments_are_in_the_signature(package):
                 described = set(described_arguments(ast.get_docstring(node) or ""))
                 wrong += [(file.name, node.name, one) for one in described - arguments_of(node)]
     assert wrong == []
+
+
+MAPPED = (
+    "bladefem/contact",
+    "bladefem/fem",
+    "bladefem/friction",
+    "bladefem/friction/simd",
+    "bladefem/hbm",
+    "bladefem/hbm/linear",
+    "bladefem/hbm/solver",
+    "bladefem/report",
+    "bladefem/study",
+    "bladefem/study/adaptive",
+    "bladefem/study/mistuning",
+    "bladefem/study/modes",
+    "bladefem/study/pipeline",
+    "bladefem/view",
+    "bladefem/wheel",
+)
+
+
+@pytest.mark.parametrize("package", MAPPED)
+def test_the_map_of_a_package_has_its_modules(package):
+    """A package of many modules says in its docstring which is for what."""
+    folder = ROOT / package
+    doc = ast.get_docstring(ast.parse((folder / "__init__.py").read_text(encoding="utf-8")))
+    there = {file.stem for file in folder.glob("*.py")} - {"__init__"}
+    there |= {file.parent.name for file in folder.glob("*/__init__.py")}
+    assert set(re.findall(r"``(\w+)``", doc)) == there

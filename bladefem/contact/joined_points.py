@@ -32,8 +32,7 @@ def aggregation_matrix(patch: Patch, points: int | None) -> sp.csr_matrix:
     Nodes are grouped by halving the patch again and again into parts of equal area: its shorter
     side first, then in turns, so that the parts have the proportions of the patch. A force leaves
     the middle sixth of the shorter side first: a damper that rolls lifts off there, and with one
-    point across it would roll freely (4000 N/mm^3 and 80 N on the shipped wedge: 40 um with 8
-    points along a seat, 56.1 um with 2 by 4 and 56.0 um with all 63).
+    point across it would roll freely.
     """
     n = len(patch.area)
     if points is None or points >= n:

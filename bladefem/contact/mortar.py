@@ -8,7 +8,6 @@ forces. Source of the method: Puso and Laursen, DOI 10.1016/j.cma.2003.10.010.
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from geometry.mesh import Mesh
 
@@ -20,11 +19,7 @@ from ..fem.surface import FaceRule, outward_signs, surface_quadrature, tangent_f
 
 
 def mortar_patch(mesh: Mesh, pair: str) -> Patch:
-    """The patch of a pair that does not match: master corners that carry part of the overlap.
-
-    `damper_nodes` are the nearest slave nodes; they serve pictures only.
-    """
-    p = mesh.pairs[pair]
+    """The patch of a pair that does not match: master corners that carry part of the overlap."""
     d = mesh.dimension
     o = _triangle_overlap(mesh, pair)
     used = np.unique(o.face[:, 0])
@@ -40,8 +35,6 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
         len(mesh.points),
     )
     normal = normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
-    across = np.unique(mesh.faces[p.slave])
-    nearest = cKDTree((mesh.points[across] - p.shift) @ p.rotation).query(mesh.points[nodes])[1]
     return Patch(
         pair,
         mesh.points[nodes],
@@ -49,7 +42,6 @@ def mortar_patch(mesh: Mesh, pair: str) -> Patch:
         tangent_frames(normal, d),
         numbers.reshape(-1, d),
         nodes,
-        across[nearest],
     )
 
 

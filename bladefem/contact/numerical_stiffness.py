@@ -28,15 +28,11 @@ from .seating import ContactProblem
 
 # Numerical stiffness over that of the bodies under a medium wave of pressure. The part of the
 # compliance that goes to the bodies is negative: where it outweighs their own compliance under
-# short waves, Newton's method loses points. On the shipped wedge with rigid faces, 16 points a
-# seat, 3 harmonics and 320 N, 0.006, 0.025 and 0.1 lose 3, 0 and 0 of 12 points without fallbacks,
-# in 320, 210 and 100 iterations; with 1e5 N/mm^3, 8 points and 80 N, where all contacts lift off,
-# 0.05 and 0.2 lose 2 and 1 of 11 in 508 and 304; but on the rigid patch of
-# tests/contact/test_stiff_sweep.py 0.05 and 0.2 lose 5 and 18 of 24.
+# short waves, Newton's method loses points, and where it is small it takes many iterations. Points
+# lost with other values: docs/verification.md, "Limits of marches and balances".
 STIFFNESS_OVER_BODY_STIFFNESS = 0.05
 # Stiffness that represents rigid faces in the balance over the same. Without any layer, forces of
-# short waves are all but undetermined and sweeps lose points; on the shipped wedge under 320 N
-# resonances with 2e5, 3.5e5 and 1e6 N/mm^3 (1.3, 2.3 and 6.5 times) differ by 0.1 %.
+# short waves are all but undetermined and sweeps lose points; 1.3 to 6.5 times differ by 0.1 %.
 RIGID_FACE_STIFFNESS_RATIO = 6.5
 
 

@@ -56,7 +56,7 @@ def make_patch(mesh: Mesh, pair: str) -> Patch:
 
 def _matched_patch(mesh: Mesh, pair: str) -> Patch:
     """The patch of faces that match."""
-    faces, slave = patch_faces(mesh, pair)
+    faces, _ = patch_faces(mesh, pair)
     corners = corner_count(mesh.dimension, faces.shape[1])
     nodes, numbers = np.unique(faces[:, :corners], return_inverse=True)
     weighted, hats = surface_quadrature(mesh, faces)
@@ -77,7 +77,6 @@ def _matched_patch(mesh: Mesh, pair: str) -> Patch:
         tangent_frames(normals, mesh.dimension),
         numbers,
         nodes,
-        slave[nodes],
     )
 
 

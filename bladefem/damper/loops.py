@@ -19,6 +19,9 @@ import numpy as np
 
 from .zmass import MassOnFoundation, Motion, ellipse, march, pulsating_load
 
+# difference of two cycles, over the largest velocity and force, that is none
+SAME_CYCLE = 1e-5
+
 
 @dataclass(frozen=True)
 class FoundationMotion:
@@ -181,7 +184,6 @@ def _smallest_period(
     motion: Motion,
     steps: int,
     q: int,
-    tolerance: float = 1e-5,
 ) -> int:
     """Foundation cycles after which (velocity, force) repeat: the smallest divisor of q that
     fits.
@@ -195,7 +197,7 @@ def _smallest_period(
     for cycles in range(1, q):
         if (
             q % cycles == 0
-            and np.abs(signal - np.roll(signal, -cycles * steps, axis=0)).max() < tolerance
+            and np.abs(signal - np.roll(signal, -cycles * steps, axis=0)).max() < SAME_CYCLE
         ):
             return cycles
     return q

@@ -7,13 +7,13 @@ foundation minus mass (Eq. 28 corrected: the printed per-axis limits of Eq. 29 a
 friction). The nodes turn with the mass by the full rotation, so theta need not stay small; N_i
 follows the load in proportion (Eq. 27, receding contact).
 
-The march is the leapfrog scheme with the return map of ``friction.march``, which finds the start of
-slip within the step and turns the force exactly: second order, on curved paths too.
+The march is the leapfrog scheme with the return map of ``friction.time_step``, which finds the
+start of slip within the step and turns the force exactly: second order, on curved paths too.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
@@ -91,18 +91,6 @@ def z_footprint(
     )
     points = np.vstack([top, -top, diagonal])
     return Footprint(points, np.full(len(points), 1 / len(points)))
-
-
-def skewed(footprint: Footprint, slope: tuple[float, float]) -> Footprint:
-    """The same nodes under a load that grows linearly: share (1 + slope . point / reach), never
-    below zero.
-
-    Args:
-        slope: relative growth from the centre to the farthest node, along x and y [1].
-    """
-    reach = np.abs(footprint.points).max()
-    share = footprint.share * np.maximum(1 + footprint.points @ np.asarray(slope) / reach, 0.0)
-    return replace(footprint, share=share / share.sum())
 
 
 def pulsating_load(

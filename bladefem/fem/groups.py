@@ -15,22 +15,17 @@ from .memory import available_memory, give_back, modal_solve_memory
 Result = TypeVar("Result")
 # more ranks on one sector have ever less to do between two exchanges
 MAX_RANKS_PER_SECTOR = 4
-# degrees of freedom of a rank from which its share of a sector pays: on the shipped wedge (78 000)
-# two ranks that share it take as long for the modes as two that share out its nodal diameters, and
-# the stresses take twice as long, as no rank has the whole sector's factors then
+# Measured in docs/verification.md, "Finite elements by ranks".
+# degrees of freedom of a rank from which its share of a sector pays. Below, ranks share out its
+# nodal diameters: modes take as long, and each rank has the whole sector's factors for the stresses
 MIN_DOFS_PER_RANK = 40_000
-# the same where more than two share it, so that none has the whole sector's factors anyway: on
-# 139 000 degrees of freedom four ranks that share it take as long as two pairs, 28 and 27 s for the
-# modes and 23 and 23 s for the reduction, with 1.20 and 1.29 GiB a rank; and what all ranks have
-# assembled serves both
+# the same where more than two share it, so that none has the whole sector's factors anyway, and
+# what all ranks have assembled serves modes and reduction
 MIN_DOFS_OF_FURTHER_RANKS = 30_000
 # tasks of a group up to which none of them helps another
 MAX_UNGROUPED_TASKS = 3
 # where nothing but a few nodal diameters is wanted: the common part, which ranks apart do once
-# each, is half of the work or more, and three diameters are no even share. On the shipped wedge
-# (74 000), beside other work, processor time of the slower of two ranks apart and together [s]:
-# three 10.3 and 8.4, 10.1 and 8.5, 10.5 and 10.4, 10.1 and 9.6; two 9.6 and 8.0; five 12.4 and 10.6
-# (one rank 10.6 and 11.5 for three), with 0.56 of the memory; on 41 000 it gains nothing sure
+# each, is half of the work or more, and three diameters are no even share
 MIN_DOFS_PER_RANK_FEW_TASKS = 35_000
 # tasks a group up to which they are few
 FEW_TASKS = 2.5

@@ -65,17 +65,17 @@ class HeldPart:
         return whole
 
 
-def part_above(mesh: Mesh, root: float, body: str = "blade") -> tuple[Mesh, np.ndarray]:
-    """The mesh with only those cells of a body that reach above a height x [m], and the numbers of
-    their nodes on that height or below.
+def part_above(mesh: Mesh, root: float) -> tuple[Mesh, np.ndarray]:
+    """The mesh with only those cells of the blade that reach above a height x [m], and the numbers
+    of their nodes on that height or below.
 
     Raises:
         InputError: no cell reaches above it.
     """
     tolerance = 1e-9
-    cells = mesh.bodies[body]
+    cells = mesh.bodies["blade"]
     # of a cell that is there in pieces all of them or none
-    reach = mesh.whole.get(body, cells)
+    reach = mesh.whole.get("blade", cells)
     above = ((mesh.points[reach, 0] > root + tolerance) & (reach >= 0)).any(axis=1)
     part = cells[above]
     if not len(part):
@@ -84,8 +84,8 @@ def part_above(mesh: Mesh, root: float, body: str = "blade") -> tuple[Mesh, np.n
     held = nodes[mesh.points[nodes, 0] <= root + tolerance]
     row = np.cumsum(above) - 1
     volumes = {name: row[rows[above[rows]]] for name, rows in mesh.parts.items()}
-    whole = chosen_whole(mesh, {body: (body, above)})
-    return replace(mesh, bodies={body: part}, parts=volumes, whole=whole), held
+    whole = chosen_whole(mesh, {"blade": ("blade", above)})
+    return replace(mesh, bodies={"blade": part}, parts=volumes, whole=whole), held
 
 
 def held_part(

@@ -69,7 +69,6 @@ def _load_coefficients(load: np.ndarray | None, nodes: np.ndarray, K: int) -> np
 def evaluate_exact(
     elements: Elements,
     w: np.ndarray,
-    jacobian: bool = True,
     *,
     load: np.ndarray | None = None,
     brackets: int | None = None,
@@ -115,7 +114,7 @@ def evaluate_exact(
     )
     return Forces(
         F,
-        J if jacobian else None,
+        J,
         shares,
         dissipated_energy(F, w),
         np.full(n, 2),

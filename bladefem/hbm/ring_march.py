@@ -87,17 +87,15 @@ class RingMarch:
     end: RingState
 
 
-def march_operations(
-    model: ReducedModel, periods: int, instants: int = INSTANTS_PER_PERIOD
-) -> float:
-    """Operations of a march of soft layers, roughly; one of stiff layers takes up to 20 times as
-    many.
+def march_operations(model: ReducedModel, periods: int) -> float:
+    """Operations of a march of soft layers with INSTANTS_PER_PERIOD, roughly; one of stiff layers
+    takes up to 20 times as many.
 
     Raises:
         InputError: the wave does not repeat within the harmonics that the model has bodies for.
     """
     m, M = _system(model).contact.shape
-    return 2.0 * periods * instants * (4 * M**2 + 4 * M * m + 5 * m**2)
+    return 2.0 * periods * INSTANTS_PER_PERIOD * (4 * M**2 + 4 * M * m + 5 * m**2)
 
 
 def never_enough(motion: np.ndarray) -> bool:

@@ -41,14 +41,14 @@ def require_browser() -> list[str]:
     return command
 
 
-def print_pdf(page: str | Path, file: str | Path | None = None) -> Path:
-    """Print a page; next to it under the same name when no file is named.
+def print_pdf(page: str | Path) -> Path:
+    """Print a page next to it, under the same name.
 
     Raises:
         InputError: no such page, or no Chromium. NotSolvedError: it wrote nothing, or did not end.
     """
     page = Path(page).resolve()
-    file = page.with_suffix(".pdf") if file is None else Path(file).resolve()
+    file = page.with_suffix(".pdf")
     if not page.is_file():
         raise InputError(f"{page}: there is no such report, expected one that a run has written")
     command = require_browser()

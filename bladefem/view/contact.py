@@ -177,13 +177,7 @@ def draw_pressure(
         if not line:
             add_colourbar(axes, peak, PRESSURE_COLOURS, "contact pressure [MPa]")
         label_outer(axes, line)
-        # an entry that only one of the faces has is in the legend as well
-        entries = {
-            label: handle
-            for ax in axes.flat
-            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=3)
+        common_legend(axes, ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
         return figure
 
@@ -196,6 +190,18 @@ def add_colourbar(axes: np.ndarray, largest: float, colours: str, label: str) ->
         aspect=25,
         pad=0.02,
         label=label,
+    )
+
+
+def common_legend(axes: np.ndarray, ncols: int) -> None:
+    """One legend below all axes, with entries that only one of them has as well."""
+    entries = {
+        label: handle
+        for ax in axes.flat
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
+    }
+    axes[0, 0].figure.legend(
+        entries.values(), entries.keys(), loc="outside lower center", ncols=ncols
     )
 
 

@@ -30,7 +30,6 @@ def draw_length(
     end: Point,
     text: str,
     away: float = 0.0,
-    offset: float = 0.0,
 ) -> None:
     """A dimension line from ``start`` to ``end``, moved to its left by ``away``, with the text on
     its outer side.
@@ -41,7 +40,6 @@ def draw_length(
         text: label.
         away: distance of the line from the measured points, to the left of the way from start to
             end.
-        offset: further distance of the text; 0 writes it close to the line.
     """
     first = np.asarray(start, float)
     last = np.asarray(end, float)
@@ -61,10 +59,9 @@ def draw_length(
     _draw_arrow(ax, a, b)
     turn = np.degrees(np.arctan2(way[1], way[0]))
     turn = turn - 180 if turn > 90 else turn + 180 if turn <= -90 else turn
-    place = (a + b) / 2 + side * offset * left
     ax.annotate(
         text,
-        place,
+        (a + b) / 2,
         7 * side * left,
         textcoords="offset points",
         rotation=turn,

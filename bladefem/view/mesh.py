@@ -315,7 +315,6 @@ def view_of(
 def photograph_mesh(
     mesh: Mesh,
     direction: tuple[float, float, float],
-    edges: bool,
 ) -> np.ndarray:
     """One view of the skin, a colour a body and a named face."""
     surface = skin(mesh)
@@ -336,16 +335,15 @@ def photograph_mesh(
                 mesh.faces.values(), label_colours(mesh)[len(mesh.bodies) :], strict=True
             )
         ]
-    if edges:
-        parts.append(
-            {
-                "mesh": edge_lines(surface, surface.points, direction),
-                "color": "#30363d",
-                "line_width": 0.6,
-                "lighting": False,
-                "opacity": 0.6,
-            }
-        )
+    parts.append(
+        {
+            "mesh": edge_lines(surface, surface.points, direction),
+            "color": "#30363d",
+            "line_width": 0.6,
+            "lighting": False,
+            "opacity": 0.6,
+        }
+    )
     return photograph(parts, direction, RADIAL_DIRECTION)
 
 
@@ -365,7 +363,6 @@ def draw_mesh(
     file: str | Path | None = None,
     *,
     title: str = "",
-    edges: bool = True,
 ) -> object:
     """Bodies and named faces in colour, as built and with the damper pulled away; returns the
     figure.
@@ -380,7 +377,7 @@ def draw_mesh(
         width_ratios=[1] * len(views) + [0.6],
     ) as axes:
         for ax, one, direction in zip(axes, shown, views, strict=False):
-            show_photograph(ax, photograph_mesh(one, direction, edges), direction, RADIAL_DIRECTION)
+            show_photograph(ax, photograph_mesh(one, direction), direction, RADIAL_DIRECTION)
             if one is apart and "damper" in mesh.bodies:
                 ax.set_title(
                     "damper drawn away from its seats",

@@ -336,15 +336,10 @@ def wheel_component(
     mesh: Mesh,
     wheel: Skin,
     motion: np.ndarray,
-    component: str | None,
 ) -> tuple[str, np.ndarray]:
-    """The wanted component of the motion, or the strongest one; scaled to a largest value of 1."""
+    """The strongest component of the motion, scaled to a largest value of 1."""
     parts = components(wheel, motion, flat=mesh.sector is not None and mesh.sector.count == 0)
-    which = (
-        COMPONENTS.index(component)
-        if component
-        else int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0)))
-    )
+    which = int(np.argmax(np.sum(np.abs(parts) ** 2, axis=0)))
     return COMPONENTS[which], parts[:, which] / max(np.abs(parts[:, which]).max(), 1e-300)
 
 
@@ -355,7 +350,6 @@ def draw_wheel_mode(
     file: str | Path | None = None,
     *,
     family: str = "",
-    component: str | None = None,
 ) -> object:
     """A mode on the full wheel: one signed component in colour, its nodal lines in black; returns
     the figure.
@@ -366,10 +360,9 @@ def draw_wheel_mode(
         number: which mode, counted from 0.
         file: PNG to write.
         family: name of the mode family, shown in the title.
-        component: "radial", "circumferential" or "axial"; the strongest when left out.
     """
     wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
-    name, signed = wheel_component(mesh, wheel, motion, component)
+    name, signed = wheel_component(mesh, wheel, motion)
     moved = wheel.points + scale_of(mesh, modes.shapes[number]) * motion.real
     surface = polydata(wheel, moved)
     surface.point_data["signed"] = signed.real
@@ -492,7 +485,7 @@ def wave_frames(
     wave with the opposite sign of time.
     """
     wheel, motion = wheel_motion(mesh, modes.shapes[number], modes.nodal_diameter or 0)
-    _, signed = wheel_component(mesh, wheel, motion, None)
+    _, signed = wheel_component(mesh, wheel, motion)
     factor = scale_of(mesh, modes.shapes[number])
     surface = polydata(wheel, wheel.points.copy())
     surface.point_data["signed"] = signed.real

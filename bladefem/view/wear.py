@@ -13,7 +13,7 @@ from matplotlib.tri import Triangulation
 
 from bladefem.data import Patch
 
-from .contact import add_colourbar, arrangement, label_outer, seat_name, unfold
+from .contact import add_colourbar, arrangement, common_legend, label_outer, seat_name, unfold
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
@@ -62,12 +62,7 @@ def draw_work(
         if not line:
             add_colourbar(axes, most, WORK_COLOURS, "friction work [J/m²]")
         label_outer(axes, line)
-        named = {
-            label: handle
-            for ax in axes.flat
-            for handle, label in zip(*ax.get_legend_handles_labels(), strict=True)
-        }
-        figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=2)
+        common_legend(axes, ncols=2)
         headline(figure, title or "friction work of a period")
         return figure
 

@@ -79,7 +79,6 @@ def draw_bands(
     quantiles: dict[str, np.ndarray],
     best: Sequence[tuple[str, float, float, float]],
     file: str | Path,
-    unit: str = "N",
 ) -> None:
     """Resonance amplitude against the load: the tuned wheel, and quantiles of the drawn ones.
 
@@ -100,7 +99,7 @@ def draw_bands(
         first = min((at for _, at, _, _ in best), default=0.0)
         for place, (name, at, lowest, highest) in enumerate(best):
             ax.axvline(at, color="#888888", linewidth=1.0, linestyle=("--", ":")[place % 2])
-            words = f"{name}: {at:.4g} {unit}"
+            words = f"{name}: {at:.4g} N"
             if highest > lowest:
                 ax.axvspan(lowest, highest, color="#888888", alpha=0.15, linewidth=0)
                 words += f" ({lowest:.4g} to {highest:.4g})"
@@ -120,7 +119,7 @@ def draw_bands(
             )
         log_axis(ax, "x")
         log_axis(ax, "y")
-        ax.set_xlabel(f"normal load of a seat [{unit}]")
+        ax.set_xlabel("normal load of a seat [N]")
         ax.set_ylabel("highest blade [µm]")
         ax.set_title("Highest blade of mistuned wheels")
         ax.legend(loc="best")

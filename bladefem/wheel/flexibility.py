@@ -30,8 +30,7 @@ class WheelFlexibility:
 
     omega: float
     parts: DiameterParts
-    # (N, H+1, k, k) modal impedances of the free bodies, T = (Z + N)^-1
-    Z: np.ndarray
+    # (N, H+1, k, k) inverse of the modal impedance of the bodies
     T: np.ndarray
     # (H+1, N, q, q) dynamic stiffness of the deviations, and LU factors of 1 + E A_yy in the
     # readings that deviate, None of a mean that takes no part; empty: tuned
@@ -97,8 +96,8 @@ def wheel_flexibility(
     # patterns of many wheels meet at the same frequencies
     if wheel.kept.get("last", (None,))[0] != key:
         Z = modal_impedance(parts, omega, harmonics)
-        wheel.kept["last"] = (key, Z, modal_flexibility(parts, Z), {})
-    _, Z, T, shared = wheel.kept["last"]
+        wheel.kept["last"] = (key, modal_flexibility(parts, Z), {})
+    _, T, shared = wheel.kept["last"]
     E = np.zeros((0, 0, 0, 0))
     factors: tuple[tuple[np.ndarray, np.ndarray] | None, ...] = ()
     active = np.zeros(0, dtype=bool)
@@ -118,7 +117,7 @@ def wheel_flexibility(
             None if A is None else _factorise_blocks(A, E[h], active)
             for h, A in enumerate(shared[dampers])
         )
-    return WheelFlexibility(omega, parts, Z, T, E, factors, active, deviating, wheel.coupled)
+    return WheelFlexibility(omega, parts, T, E, factors, active, deviating, wheel.coupled)
 
 
 def to_diameters(x: np.ndarray) -> np.ndarray:

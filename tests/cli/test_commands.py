@@ -96,7 +96,6 @@ def fake_run(folder):
         np.zeros((2, 3, 3)),
         np.zeros((1, 2)),
         None,
-        None,
     )
     seat = PressureMap(patch, np.array([40.0, 0.0]), np.array([0.0, 1e-6]), 1e-14)
     limits = fake_limit(0.0, 812.4), fake_limit(np.inf, 850.0)

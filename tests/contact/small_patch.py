@@ -28,7 +28,7 @@ def patch_on_half_space():
     frame = np.tile(np.eye(3), (n, 1, 1))
     points = np.column_stack([np.zeros(n), x, y])
     nodes = np.arange(n)
-    patch = Patch("this", points, np.full(n, h * h), frame, np.array([[0, 1]]), nodes, nodes)
+    patch = Patch("this", points, np.full(n, h * h), frame, np.array([[0, 1]]), nodes)
     return patch, rectangle_flexibility(x, y, h, h, 5.8e10)
 
 

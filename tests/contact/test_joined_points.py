@@ -28,15 +28,13 @@ def seat(name="this", rows=9, columns=7, turned=0.4):
     frame = np.array([[0.0, 0.0, 1.0], [c, n, 0.0], [-n, c, 0.0]])
     x = np.array([[a, b] for a in t for b in s]) @ frame[1:]
     count = rows * columns
-    none = np.zeros(count, int)
     return Patch(
         name,
         x,
         area * LENGTH * WIDTH / area.sum(),
         np.tile(frame, (count, 1, 1)),
         np.empty((0, 3), int),
-        none,
-        none,
+        np.zeros(count, int),
     )
 
 
@@ -78,8 +76,7 @@ def test_two_points_stand_where_gauss_puts_them():
     line = (np.arange(n) + 0.5) / n - 0.5
     points = np.column_stack([line, np.zeros((n, 2))])
     frame = np.tile(np.eye(3)[[2, 0, 1]], (n, 1, 1))
-    none = np.zeros(n, int)
-    patch = Patch("this", points, np.ones(n), frame, np.empty((0, 2), int), none, none)
+    patch = Patch("this", points, np.ones(n), frame, np.empty((0, 2), int), np.zeros(n, int))
     pick = joined_motion([patch], (line > 0).astype(int), np.ones(n))
     np.testing.assert_allclose(pick @ line, 0.5 / np.sqrt(3) * np.array([-1, 1]), rtol=1e-6)
 

@@ -39,7 +39,7 @@ def elements(kt=STIFFNESS, n0=(40.0, -2.0)):
 def maps(e):
     """Both on one patch of 2 mm^2."""
     frame = np.tile(np.eye(3), (2, 1, 1))
-    patch = Patch("this", np.eye(2, 3), np.full(2, 1e-6), frame, np.array([[0, 1]]), *[[0, 1]] * 2)
+    patch = Patch("this", np.eye(2, 3), np.full(2, 1e-6), frame, np.array([[0, 1]]), [0, 1])
     return [PressureMap(patch, np.maximum(e.n0, 0.0), np.maximum(-e.n0 / e.kn, 0.0), 0.0)]
 
 

@@ -44,7 +44,6 @@ def small_patch() -> Patch:
         RNG.random((3, 3, 3)),
         np.array([[0, 1, 2]]),
         np.arange(3),
-        np.arange(3) + 7,
     )
 
 

@@ -414,8 +414,7 @@ def test_seats_are_called_right_and_left_in_tables_and_files():
 def pressure_map(name):
     """Two nodes of a face that press."""
     frame = np.broadcast_to(np.eye(3), (2, 3, 3))
-    none = np.empty(0, int)
-    patch = Patch(name, np.eye(2, 3), np.ones(2), frame, np.empty((0, 2), int), none, none)
+    patch = Patch(name, np.eye(2, 3), np.ones(2), frame, np.empty((0, 2), int), np.empty(0, int))
     return PressureMap(patch, np.ones(2), np.zeros(2), 0.0)
 
 

@@ -171,16 +171,16 @@ def test_a_search_begins_with_few_harmonics_and_ends_with_those_that_are_needed(
     """Settings of another load may be far richer; where few harmonics are not solved, the search
     begins with these.
     """
-    search = best_load_module._search
+    search_once = best_load_module._search_once
     used = []
 
-    def watched(scene, case_at, family_of, settings, *others, **limits):
+    def watched(search, settings, *others):
         used.append(settings)
         if settings.harmonics <= 3 and not solved:
             raise NotSolvedError("no peak")
-        return search(scene, case_at, family_of, settings, *others, **limits)
+        return search_once(search, settings, *others)
 
-    monkeypatch.setattr(best_load_module, "_search", watched)
+    monkeypatch.setattr(best_load_module, "_search_once", watched)
     rich = replace(SETTINGS, harmonics=7, samples=256, chosen=("harmonics", "samples"))
     found = find_best_load(scene(), case_at, family, rich, None)
     assert used[0].harmonics == 3 and used[0].samples == 64

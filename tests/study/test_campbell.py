@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from wheels import bodies
 
@@ -14,11 +15,17 @@ from bladefem.fem.modes import modes
 from bladefem.hbm.linear_resonances import wave_frequencies
 from bladefem.scene.tables import Solver
 from bladefem.scene.toml import load_scene
-from bladefem.study.modes.campbell import campbell_table, campbell_tables, read_speeds
+from bladefem.study.modes.campbell import campbell_tables, read_speeds, speed_models
 from bladefem.study.modes.survey import Wanted, survey_modes
 from bladefem.study.pipeline.bodies import Bodies
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
+
+
+def campbell_table(wheel, speeds, diameters, count=5):
+    """One row a mode and speed, without the crossings."""
+    models = speed_models(wheel, speeds, diameters, count)
+    return pd.concat([model.table(speeds) for model in models], ignore_index=True)
 
 
 @pytest.fixture(scope="module")

@@ -37,7 +37,6 @@ def strip(name: str, shift: float) -> Patch:
     return Patch(
         name=name,
         blade_nodes=np.arange(8),
-        damper_nodes=np.arange(8),
         points=points,
         frame=frame,
         area=np.full(8, 1e-6),

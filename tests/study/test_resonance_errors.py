@@ -259,13 +259,13 @@ def test_harmonics_that_lift_off_has_changed_are_judged_again(monkeypatch):
 def test_an_error_stays_known_where_the_richer_model_is_not_solved_any_more(judged):
     """As it was before, unless its own respect has been refined since."""
     settings = replace(first_for(10), harmonics=7, points=4)
-    before = replace(settings, harmonics=3)
     known = judged(99, 99)
+    before = resonance_choice.Choice(replace(settings, harmonics=3), None, known)
     unknown = peak_errors.PeakErrors(
         {**known.height, "points": np.inf, "harmonics": np.inf},
         {**known.frequency, "points": np.inf, "harmonics": np.inf},
     )
-    found = resonance_choice._with_errors_before(unknown, settings, known, before)
+    found = resonance_choice._with_errors_before(unknown, settings, before)
     assert found.height["points"] == known.height["points"] > 0
     assert found.frequency["points"] == known.frequency["points"]
     assert found.height["harmonics"] == np.inf

@@ -22,7 +22,7 @@ from bladefem.report.wheel import (
 )
 from bladefem.study.mistuning import peak_choice
 from bladefem.study.mistuning.law_level import with_checks
-from bladefem.study.mistuning.peak_choice import chosen_peak, pattern_peak
+from bladefem.study.mistuning.peak_choice import SearchedWheel, chosen_peak, pattern_peak
 from bladefem.study.mistuning.sector_comparison import (
     SectorComparison,
     compared_with_sector,
@@ -50,14 +50,14 @@ def test_wheels_of_the_statistics_walk_as_one_wheel_does():
     grid = resonance() * np.linspace(0.95, 1.05, 11)
     drawn = drawn_patterns(held, Scatter(0.01), 2, lambda d: lumped_pattern(BLADES, d))
     balance = 3, 128
+
+    def searched(pattern):
+        return SearchedWheel(held, free, pattern, 1, DEFAULT_OPTIONS)
+
     found = scatter_statistics(
-        {4.0: drawn},
-        lambda _, pattern: pattern_peak(held, free, pattern, grid, balance, 1, DEFAULT_OPTIONS),
+        {4.0: drawn}, lambda _, pattern: pattern_peak(searched(pattern), grid, balance)
     )
-    alone = [
-        chosen_peak(held, pattern, grid, balance, 1, DEFAULT_OPTIONS, None, free=free)
-        for pattern in (Pattern(), *drawn)
-    ]
+    alone = [chosen_peak(searched(pattern), grid, balance, None) for pattern in (Pattern(), *drawn)]
     heights = np.array([one.free.peak.height for one in alone])
     assert found.mean_released.all()
     assert found.tuned[0] == pytest.approx(heights[0], rel=1e-6)
@@ -83,7 +83,8 @@ def test_a_free_maximum_beside_a_lost_point_does_not_count(monkeypatch):
     for peak, known in ((closed, True), (lost, False)):
         again = LocalPeak(peak, None, 0.0, 3)
         monkeypatch.setattr(peak_choice, "local_peak", lambda *_, again=again: again)
-        found = pattern_peak(held, free, Pattern(), grid, (2, 64), 1, DEFAULT_OPTIONS)
+        searched = SearchedWheel(held, free, Pattern(), 1, DEFAULT_OPTIONS)
+        found = pattern_peak(searched, grid, (2, 64))
         assert found.asked and (found.free is not None) == known
 
 

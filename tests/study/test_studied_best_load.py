@@ -112,7 +112,8 @@ def test_a_load_under_which_the_blade_keeps_far_more_is_not_the_best():
 def test_none_is_sought_without_friction(mu, count):
     """The response hangs on the load only where contacts lift off: the wedge's best was 47 kN."""
     scene = load_scene("scenes/wedge.toml", [f"contact.mu={mu}"])
-    searches = response_stage._best_load_searches(scene, None, None, None, None, None)
+    study = response_stage._Study(scene, None, None, None, None)
+    searches = response_stage._best_load_searches(study, None)
     assert len(searches) == count
 
 

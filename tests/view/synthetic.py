@@ -32,7 +32,7 @@ def seat(name, side, n, m):
     )
     pressure *= 120.0 / (pressure @ area)
     frame = np.tile(np.stack([normal, np.array([0.0, 0, 1]), slope]), (n * m, 1, 1))
-    patch = Patch(name, points, area, frame, faces, np.arange(n * m), np.arange(n * m))
+    patch = Patch(name, points, area, frame, faces, np.arange(n * m))
     return PressureMap(patch, pressure * area, np.where(pressure > 0, 0.0, 1e-7), 1e-12)
 
 
@@ -51,7 +51,7 @@ def line_seats(n=15):
     pressure = np.maximum(0, 1 - ((y - 0.006) / 0.005) ** 2) * 2e6
     frame = np.tile(np.array([[-1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]), (n, 1, 1))
     faces = np.stack([np.arange(n - 1), np.arange(1, n)], 1)
-    patch = Patch("this", points, area, frame, faces, np.arange(n), np.arange(n))
+    patch = Patch("this", points, area, frame, faces, np.arange(n))
     return [PressureMap(patch, pressure * area, np.zeros(n), 0.0)]
 
 
@@ -179,20 +179,4 @@ def campbell():
             )
         ],
         ignore_index=True,
-    )
-
-
-def method_map():
-    """A grid of loads and frequencies with the method that solved each."""
-    load, frequency = np.meshgrid([20, 50, 100, 200, 400, 800], np.linspace(780, 1000, 23))
-    method = np.where(abs(frequency - 800 - load / 5) < 15, "homotopy", "newton")
-    method = np.where(abs(frequency - 800 - load / 5) < 5, "shooting", method)
-    return pd.DataFrame(
-        {
-            "load": load.ravel(),
-            "frequency": frequency.ravel(),
-            "method": method.ravel(),
-            "iterations": np.where(method == "newton", 6, 25).ravel(),
-            "converged": (np.arange(load.size) % 37 != 5),
-        }
     )

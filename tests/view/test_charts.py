@@ -11,7 +11,6 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.study.modes.crossings import campbell_crossings, fold_order
 from bladefem.view.convergence import draw_convergence
-from bladefem.view.maps import draw_map
 from bladefem.view.speed import (
     draw_campbell,
     draw_interference,
@@ -81,16 +80,6 @@ def test_folding_is_that_of_the_tables():
     orders = np.arange(60)
     for sectors in (7, 12):
         assert folded(orders, sectors).tolist() == [fold_order(int(k), sectors) for k in orders]
-
-
-def test_maps_name_methods_and_cross_failures(folder):
-    table = synthetic.method_map()
-    figure = draw_map(table, "frequency", "load", "method", folder / "methods.png")
-    assert all(
-        word in texts(figure) for word in ("newton", "homotopy", "shooting", "not converged (4)")
-    )
-    draw_map(table, "frequency", "load", "iterations", folder / "iterations.png")
-    assert min(ink(folder / f"{n}.png") for n in ("methods", "iterations")) > 0.3
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,12 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.mistuning import peak_choice
-from bladefem.study.mistuning.peak_choice import chosen_peak, pattern_peak, with_free_change
+from bladefem.study.mistuning.peak_choice import (
+    SearchedWheel,
+    chosen_peak,
+    pattern_peak,
+    with_free_change,
+)
 from bladefem.wheel.local_peak import (
     FIRST_REACH,
     LocalBalances,
@@ -212,7 +217,9 @@ def test_amplification_with_free_means_is_that_of_marches(deviation):
     grid = resonance() * np.linspace(0.95, 1.05, 11)
     found = scatter_statistics(
         {0.0: [lumped_pattern(BLADES, deviation)]},
-        lambda _, pattern: pattern_peak(held, free, pattern, grid, (9, 512), 1, DEFAULT_OPTIONS),
+        lambda _, pattern: pattern_peak(
+            SearchedWheel(held, free, pattern, 1, DEFAULT_OPTIONS), grid, (9, 512)
+        ),
     )
     tuned, mistuned = (
         np.linalg.norm(march(omega, own, limits[:, None], 60, 512, phase)[0], axis=1).max()
@@ -241,10 +248,12 @@ def test_error_by_harmonics_where_no_richer_balance_walks(monkeypatch):
         found = judged_by(wheel, *args)
         return found if wheel is held else replace(found, change=np.nan)
 
-    def chosen():
-        return chosen_peak(held, pattern, grid, (2, 96), 1, DEFAULT_OPTIONS, None, free=free)
+    searched = SearchedWheel(held, free, pattern, 1, DEFAULT_OPTIONS)
 
-    truth = pattern_peak(held, free, pattern, grid, (15, 1024), 1, DEFAULT_OPTIONS).peak.height
+    def chosen():
+        return chosen_peak(searched, grid, (2, 96), None)
+
+    truth = pattern_peak(searched, grid, (15, 1024)).peak.height
     direct = chosen()
     monkeypatch.setattr(peak_choice, "_judged_by", without_walks)
     estimated = chosen()
@@ -252,7 +261,7 @@ def test_error_by_harmonics_where_no_richer_balance_walks(monkeypatch):
     assert error > 0.005
     assert direct.truncation == pytest.approx(error, rel=0.1)
     assert 0.5 * error < estimated.truncation < 2 * error
-    held_only = chosen_peak(held, pattern, grid, (2, 96), 1, DEFAULT_OPTIONS, None)
+    held_only = chosen_peak(replace(searched, free=None), grid, (2, 96), None)
     whole = with_free_change(held_only.truncation, estimated.free.change)
     assert estimated.truncation == pytest.approx(whole, rel=1e-9)
 

@@ -1,8 +1,8 @@
 """One friction element under a given motion and normal load: the paper's Fig. 1, 3 and 4.
 
-The laws are those of ``friction.printed``, as printed (Eq. 19-21) and corrected; the best linear
-force is that of ``friction.approximation``. Signs: f acts on the side that lags, so that f g' > 0
-is dissipated.
+The laws are those of ``printed_laws``, as printed (Eq. 19-21) and corrected; the best linear force
+is that of ``friction.equivalent_linear``. Signs: f acts on the side that lags, so that f g' > 0 is
+dissipated.
 """
 
 from __future__ import annotations

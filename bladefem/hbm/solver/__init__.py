@@ -1,1 +1,7 @@
-"""Solving one point: residual, Newton, iterations, fallbacks, arc length."""
+"""Solving one point.
+
+- ``residual`` the balance, ``walking`` dampers that walk
+- ``newton`` its loop, ``dense_lu``; ``newton_compiled`` and ``point_compiled`` small models
+- large patches: ``newton_krylov``, ``krylov`` the iterations, ``deflation`` their second level
+- ``fallback`` when Newton fails, ``arclength`` round folds
+"""

@@ -1,1 +1,11 @@
-"""Settings of the balance chosen by error indicators."""
+"""Settings of the balance chosen by error indicators.
+
+- what is chosen: ``settings``; from which models: ``family``
+- errors: ``indicators`` of a point, ``peak_errors`` of a resonance, ``contact_mesh`` of the contact
+  mesh, ``layer_change`` of a layer that stiffens with pressure, ``changed_peak`` of another model
+- choices: ``resonance_choice`` at a peak and ``resonance_curve`` of a whole curve, as runs use
+  them; ``choice`` at a point, ``frequency_list`` along given frequencies, ``check_points`` which
+  points are looked at
+- special cases: ``branch_choice`` peaks on folds, ``choice_in_time`` and ``stiff_layer`` where
+  contacts lift off, ``cheaper_settings`` poorer settings that serve as well
+"""

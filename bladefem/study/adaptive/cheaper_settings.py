@@ -14,7 +14,12 @@ from ...hbm.peak import Peak
 from ...hbm.solution import lifts_off
 from .family import Family, family_member, lowest_harmonics
 from .peak_errors import SHIFT_WEIGHT, PeakErrors, peak_from
-from .resonance_choice import LIFTING_POINTS, SUFFICIENT_SHARE, lacks_harmonics_for_lift_off
+from .resonance_choice import (
+    LIFTING_POINTS,
+    SUFFICIENT_SHARE,
+    Choice,
+    lacks_harmonics_for_lift_off,
+)
 from .settings import DAMPER_MODELS, FIRST_SETTINGS, Settings
 
 # points of the sweep that follows a choice
@@ -36,9 +41,8 @@ def cheaper_settings(
     peak: Peak,
     errors: PeakErrors,
     accuracy: float,
-) -> tuple[Settings, Peak, PeakErrors]:
-    """Settings from `choose_at_peak`, poorer in what is not needed; the peak with them, and its
-    errors.
+) -> Choice:
+    """Settings from `choose_at_peak`, poorer in what is not needed.
 
     A respect is made poorer where the error that its step back is expected to leave fits into the
     accuracy, where the sweep that follows saves more than the poorer peak takes, and where that
@@ -66,7 +70,7 @@ def cheaper_settings(
         settings = replace(poorer, error=errors.total)
         peak = found
         left = SUFFICIENT_SHARE * accuracy - sum(errors.needs.values())
-    return settings, peak, errors
+    return Choice(settings, peak, errors)
 
 
 def _too_few_points(settings: Settings, peak: Peak) -> bool:

@@ -61,7 +61,6 @@ def choose_settings(
     settings: Settings,
     point: Solution,
     accuracy: float,
-    fixed: tuple[str, ...] = (),
 ) -> tuple[Settings, Solution, Indicators]:
     """Settings whose estimated error at one point is below half the accuracy, or the best that may
     be chosen.
@@ -71,7 +70,6 @@ def choose_settings(
 
     Args:
         point: solved with `settings`; its frequency is kept.
-        fixed: names that may not be changed here although they are not the user's.
     """
     known: dict[str, float] = {}
     if (
@@ -79,7 +77,7 @@ def choose_settings(
         and point.converged
         and not sticks_safely(family_member(family, settings).model, point)
     ):
-        usual = likely_settings(family, settings, accuracy, fixed)
+        usual = likely_settings(family, settings, accuracy)
         further = moved_solution(family, settings, point, usual) if usual != settings else point
         settings, point = (usual, further) if further.converged else (settings, point)
     found: Indicators
@@ -92,7 +90,7 @@ def choose_settings(
         settings = replace(settings, error=found.total)
         if found.total <= accuracy / 2:
             break
-        better = next_settings(settings, found, accuracy, fixed)
+        better = next_settings(settings, found, accuracy)
         if better is None:
             break
         richer_point = _solved(family, settings, point, better, found)
@@ -148,7 +146,6 @@ def next_settings(
     settings: Settings,
     found: Indicators,
     accuracy: float,
-    fixed: tuple[str, ...] = (),
 ) -> Settings | None:
     """Enriched in each open respect that takes more than its share, the worst at least; None when
     nothing helps.
@@ -156,9 +153,7 @@ def next_settings(
     names = [
         name
         for name in settings.chosen
-        if name not in fixed
-        and name not in found.unknown
-        and found.errors.get(name, 0.0) > accuracy / 20
+        if name not in found.unknown and found.errors.get(name, 0.0) > accuracy / 20
     ]
     names.sort(key=lambda name: -found.errors[name])
     share = accuracy / 2 / max(len(settings.chosen), 1)

@@ -18,19 +18,15 @@ from ...hbm.peak import Peak
 from ...hbm.solution import Solution, mostly_lifts_off, size
 from .family import Family, lowest_harmonics
 from .peak_errors import PeakErrors, peak_errors, peak_from, too_large
-from .resonance_choice import LARGEST_BALANCE, MAX_ENRICHMENTS, MAX_LIFTING_UNKNOWNS
+from .resonance_choice import LARGEST_BALANCE, MAX_ENRICHMENTS, MAX_LIFTING_UNKNOWNS, Choice
 from .settings import DIRECTIONS, RICHEST_SETTINGS, Settings, enriched_settings
 
 # respects that a march leaves nothing of
 COVERED_IN_TIME = ("harmonics", "samples")
-# relative change of a peak by a richer model beyond which both may be different motions: on the
-# shipped wedge with ground faces under 9 N one harmonic has 2082 um with four contact points a seat
-# and 603 um with eight, whose march from the motion with four keeps to 1855 to 2136 um
+# relative change of a peak by a richer model beyond which both may be different motions
 OTHER_MOTION = 0.3
 # of the accuracy: width of a band, over its upper end, beyond which the blade keeps to no periodic
-# motion, so that no balance with more harmonics is tried. On the shipped wedge under 18 N three
-# harmonics have 921 um, the blade keeps between 1043 and 1068 um from there, and seven have another
-# motion of 638 um, which took 90 s to judge
+# motion, so that no balance with more harmonics is tried: it would find another motion, slowly
 PERIODIC_SHARE = 0.4
 
 
@@ -85,7 +81,7 @@ def choose_in_time(
     accuracy: float,
     march: March,
     fixed: tuple[str, ...] = (),
-) -> tuple[Settings, Peak, PeakErrors] | None:
+) -> Choice | None:
     """Settings at whose peak the blade keeps the amplitude of the balance, or the nearest to it;
     the peak with them, and its errors. None where a march is not possible.
 
@@ -96,14 +92,14 @@ def choose_in_time(
         peak: found with `settings`.
         fixed: names that may not be changed here although they are not the user's.
     """
-    found: tuple[Settings, Peak, PeakErrors] | None = None
+    found: Choice | None = None
     for _ in range(MAX_ENRICHMENTS):
         climbed = _with_enough_harmonics(family, settings, peak, accuracy, march)
         if climbed is None:
             break
         settings, peak, left_out = climbed
         errors = _with_left_out(family, settings, peak, accuracy, left_out)
-        found = replace(settings, error=errors.total), peak, errors
+        found = Choice(replace(settings, error=errors.total), peak, errors)
         needs = {n: need for n, need in errors.needs.items() if n not in COVERED_IN_TIME}
         if sum(needs.values()) <= accuracy:
             break
@@ -119,7 +115,7 @@ def choose_in_time(
         if kept is not None:
             name = next(n for n in DIRECTIONS if getattr(better, n) != getattr(settings, n))
             errors = _with_kept(errors, name, kept.farthest(peak.height))
-            return replace(settings, error=errors.total), peak, errors
+            return Choice(replace(settings, error=errors.total), peak, errors)
         settings, peak = better, further
     return found
 

@@ -41,16 +41,15 @@ JUDGE_ENOUGH_SHARE = 0.2
 SOFTENED_ENOUGH_SHARE = 0.5
 # Newton steps of a point of such a peak
 JUDGE_STEPS = 15
-# the same of a model that only estimates an error there, and of one with more contact points: on
-# the shipped wedge with 400 to 4000 N/mm^3 a peak with 7 harmonics and all 63 points of a seat,
-# 5670 unknowns, takes a second from one with fewer points, with 15 harmonics twelve
+# the same of a model that only estimates an error there, and of one with more contact points, whose
+# peak takes some seconds from one with fewer
 LIFTING_JUDGE = 3100
 LIFTING_POINTS_JUDGE = 6000
 # harmonics and contact points of a seat of the models that tell an error in another respect where
 # those of the judged one are too large
 REDUCED_SETTINGS = {"harmonics": (7, 3, 1), "points": (32, 16, 8, 4)}
-# harmonics from which half as many again judge them where contacts lift off: on the shipped wedge
-# with 1e5 N/mm^3 under 320 N 31 in place of 15, 3024 unknowns, took 41 s, 23 took 7
+# harmonics from which half as many again, and not twice as many, judge them where contacts lift
+# off: that takes a sixth of the time
 MANY_HARMONICS = 15
 # share of the contacts that lift off from which a judge has no more than twice the harmonics
 FEW_LIFTING = 0.25

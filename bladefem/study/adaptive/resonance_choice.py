@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -43,16 +44,23 @@ LARGEST_BALANCE = 6000
 # the same where contacts lift off: finer ones cost minutes a curve there
 MAX_LIFTING_UNKNOWNS = 3100
 # contact points of a seat with which a damper is tried first that comes off: with four, Newton's
-# method took 10 s for 4000 N/mm^3 under 80 N on the shipped wedge, with eight 0.5 s
+# method takes up to twenty times as long
 LIFTING_POINTS = 8
 # unknowns of a balance that is small, and what it is tried with first where most contacts lift off:
-# a point of its curve takes 0.8 ms with 7 harmonics and 256 samples and 0.7 with 3 and 64, nearly
-# all of it Python, and a second curve, for harmonics or samples that were missing, takes as long
+# its points cost no more with these, and a second curve, for what was missing, costs as much again
 SMALL_LIFTING_BALANCE = 300
 LIFTING_HARMONICS = 7
 LIFTING_SAMPLES = 256
 # contact points of a seat below which an error that does not fall is one of too few of them
 FEW_POINTS = 32
+
+
+class Choice(NamedTuple):
+    """Settings, the peak with them, and its estimated errors."""
+
+    settings: Settings
+    peak: Peak
+    errors: PeakErrors
 
 
 def choose_at_peak(
@@ -62,20 +70,18 @@ def choose_at_peak(
     accuracy: float,
     fixed: tuple[str, ...] = (),
     sufficient: float = SUFFICIENT_SHARE,
-) -> tuple[Settings, Peak, PeakErrors]:
+) -> Choice:
     """Settings whose estimated errors of height and frequency keep within a share of the accuracy,
-    or the best that may be chosen; the peak with them, and its errors.
+    or the best that may be chosen.
 
-    A respect in which the richer model was not solved is not refined, one whose error was
-    negligible not judged again, nor one that could not be judged where contacts lift off. There
-    refining ends once it does not halve an error that is far beyond the accuracy, unless there are
-    few contact points; what is left of it then in the richer model the poorer one has as well.
-    What is left is no reason to end where the respect that was made richer has halved its own
-    error: it is another respect's then, which is refined next (5800 N on an imported wedge: 64
-    points a seat leave nothing of 8.5 %, and bring out 7.6 % by the rigid damper).
-    Harmonics that are missing come first there, several at once, and where most contacts lift off:
-    with few of them more contact points lead away from the truth (36 N on the shipped wedge: 440 um
-    with 7 harmonics and 4 points, 452 with 31; 909 with 3 and 16 points).
+    - Not refined is a respect whose richer model was not solved; not judged again is one whose
+      error was negligible, or could not be judged where contacts lift off.
+    - Where contacts lift off, refining ends once it does not halve an error far beyond the
+      accuracy, unless there are few contact points; the error that the richer model still has
+      counts for the poorer one as well. It goes on where the respect made richer has halved its own
+      error: what is left is another respect's, which is refined next.
+    - Missing harmonics come first there, several at once, and where most contacts lift off: with
+      few of them more contact points lead away from the truth.
 
     Args:
         peak: found with `settings`.
@@ -86,7 +92,7 @@ def choose_at_peak(
         NotSolvedError: most contacts lift off, and the peak was not found with three harmonics.
     """
     known: dict[str, tuple[float, float]] = {}
-    before: tuple[Settings, Peak, PeakErrors] | None = None
+    before: Choice | None = None
     settings, peak = _with_usual_settings(family, settings, peak, accuracy, fixed)
     for _ in range(MAX_ENRICHMENTS):
         given = settings.harmonics
@@ -96,13 +102,13 @@ def choose_at_peak(
             known.pop("harmonics", None)
         errors = peak_errors(family, settings, peak, accuracy, known)
         if before is not None:
-            errors = _with_errors_before(errors, settings, before[2], before[0])
+            errors = _with_errors_before(errors, settings, before)
         settings = replace(settings, error=errors.total)
+        found = Choice(settings, peak, errors)
         far = errors.total > FAR_BEYOND * accuracy and _lift_off(peak, errors)
         if far and before is not None and _ends_refining(settings, errors, before, fixed):
-            poorer = _seen_from(errors, before)
-            return min(poorer, (settings, peak, errors), key=lambda found: found[2].total)
-        before = settings, peak, errors
+            return min(_seen_from(errors, before), found, key=lambda one: one.errors.total)
+        before = found
         known = _errors_to_keep(errors, NEGLIGIBLE_SHARE * accuracy, far)
         if _near_enough(settings, errors, sufficient * accuracy):
             break
@@ -111,7 +117,7 @@ def choose_at_peak(
         if richer is None:
             break
         settings, peak = richer
-    return settings, peak, errors
+    return Choice(settings, peak, errors)
 
 
 def _with_usual_settings(
@@ -180,9 +186,8 @@ def _richer_choice(
 
 
 def _near_enough(settings: Settings, errors: PeakErrors, limit: float) -> bool:
-    """The errors together keep to a limit, or more harmonics cost minutes on a layer that is a
-    softer one anyway: with an elastic damper 30 s on the shipped wedge with rigid faces under 80 N,
-    for the same error.
+    """The errors together keep to a limit, or more harmonics would cost minutes on a layer that is
+    a softer one anyway, for the same error.
     """
     settled = settings.softened and settings.harmonics >= MANY_HARMONICS
     return settled or sum(errors.needs.values()) <= limit
@@ -247,15 +252,9 @@ def settings_of_lift_off(settings: Settings, top: Solution) -> Settings:
     return richer
 
 
-def _seen_from(
-    errors: PeakErrors,
-    before: tuple[Settings, Peak, PeakErrors],
-) -> tuple[Settings, Peak, PeakErrors]:
-    """A choice whose errors are at least those that a richer model still has, where they are known.
-
-    A poor model may be blind: with one harmonic 36 N on the shipped wedge give 376 um, and more
-    contact points change that by 21 %; with seven they give 440 um, where a march in time keeps,
-    and more points change that by 36 %.
+def _seen_from(errors: PeakErrors, before: Choice) -> Choice:
+    """A choice whose errors are at least those that a richer model still has, where they are known:
+    a model with few harmonics may be blind to the error by its contact points.
     """
     settings, peak, own = before
     height, frequency = (
@@ -269,15 +268,10 @@ def _seen_from(
         )
     )
     seen = replace(own, height=height, frequency=frequency)
-    return replace(settings, error=seen.total), peak, seen
+    return Choice(replace(settings, error=seen.total), peak, seen)
 
 
-def _with_errors_before(
-    errors: PeakErrors,
-    settings: Settings,
-    errors_before: PeakErrors,
-    settings_before: Settings,
-) -> PeakErrors:
+def _with_errors_before(errors: PeakErrors, settings: Settings, before: Choice) -> PeakErrors:
     """Errors that are not known, because the richer model was not solved, as they were before in
     the respects that have not been refined since.
     """
@@ -285,31 +279,27 @@ def _with_errors_before(
         name
         for name, change in errors.height.items()
         if not np.isfinite(change)
-        and getattr(settings, name) == getattr(settings_before, name)
-        and np.isfinite(errors_before.height[name])
+        and getattr(settings, name) == getattr(before.settings, name)
+        and np.isfinite(before.errors.height[name])
     ]
     return replace(
         errors,
-        height={**errors.height, **{name: errors_before.height[name] for name in kept}},
-        frequency={**errors.frequency, **{name: errors_before.frequency[name] for name in kept}},
+        height={**errors.height, **{name: before.errors.height[name] for name in kept}},
+        frequency={**errors.frequency, **{name: before.errors.frequency[name] for name in kept}},
     )
 
 
 def _ends_refining(
     settings: Settings,
     errors: PeakErrors,
-    before: tuple[Settings, Peak, PeakErrors],
+    before: Choice,
     fixed: tuple[str, ...],
 ) -> bool:
     """Far beyond the accuracy richer models do not help, and there are enough contact points."""
     return _stalled(settings, errors, before) and not _few_points(settings, errors, fixed)
 
 
-def _stalled(
-    settings: Settings,
-    errors: PeakErrors,
-    before: tuple[Settings, Peak, PeakErrors],
-) -> bool:
+def _stalled(settings: Settings, errors: PeakErrors, before: Choice) -> bool:
     """Neither all errors together nor those of the respects that were made richer have halved."""
     poorer, _, own = before
     refined = [name for name in DIRECTIONS if getattr(settings, name) != getattr(poorer, name)]
@@ -319,7 +309,7 @@ def _stalled(
 
 def _few_points(settings: Settings, errors: PeakErrors, fixed: tuple[str, ...]) -> bool:
     """There are few contact points, and with more of them at most half of the contacts lift off: a
-    damper that comes off as a whole (36 N on the shipped wedge) gains nothing by them.
+    damper that comes off as a whole gains nothing by them.
     """
     more = errors.better.get("points")
     if settings.points is None or settings.points >= FEW_POINTS or more is None:
@@ -335,8 +325,7 @@ def _lift_off(peak: Peak, errors: PeakErrors) -> bool:
 
 def lacks_harmonics_for_lift_off(settings: Settings, top: Solution) -> bool:
     """At least half of the contacts lift off at the resonance, and there is one harmonic, which
-    knows nothing of that: on the shipped wedge under 18 N it finds 0.67 mm where three find 1.3 mm
-    and integration in time 1.5 mm.
+    knows nothing of that: it may find half of the amplitude.
     """
     one = settings.harmonics == 1 and "harmonics" in settings.chosen
     return one and mostly_lifts_off(top)

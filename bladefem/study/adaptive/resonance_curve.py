@@ -42,17 +42,12 @@ MAXIMUM_SHARE = 0.1
 # sweeps of one curve with ever richer settings
 MAX_SWEEPS = 3
 # share of a resonance with poor settings below which richer ones, whose points were not solved
-# there, have lost it: on the shipped wedge with ground faces under 9 N one harmonic has 2082 um at
-# 369.1 Hz, which a march confirms (1830 to 2170 um with four and eight points a seat); with three
-# no point between 367 and 371 Hz is solved, and the highest of the others has 416 um
+# there, have lost it: their highest solved point is then another one beside it
 LOST_HEIGHT_SHARE = 0.5
-# folds of a curve from which they may be those of few samples and contact points, and how many of
-# these it is followed with then: under 580 N on the shipped wedge with ground faces four points a
-# seat and 64 samples have 20 pieces between folds, 549 points in 15 s; 256 samples have 7, and with
-# 16 points there is one, 41 points in 1.3 s, 0.6 % higher
+# folds or points of a curve from which it is given up: many folds are mostly those of few samples
+# and contact points, and it is followed with more of both (docs/verification.md, "Limits of marches
+# and balances")
 MANY_FOLDS = 6
-# points of a curve from which it is given up as well: under 320 N with the default layer six folds
-# of four points a seat were found in 353 points and 12 s, 16 points have none
 MANY_POINTS = 100
 FOLDED_SAMPLES = 256
 FOLDED_POINTS = 16
@@ -244,8 +239,7 @@ def _resonance(family: Family, settings: Settings, points: Sequence[Solution]) -
     """The highest point; where the curve was followed round folds, the highest that is not
     unstable.
 
-    A damper that bounces has motions that no blade keeps: under 4 N on the plane blades they reach
-    6.3 um, and fall below 2 um in a march.
+    A damper that bounces has motions that no blade keeps: in a march they fall to a third.
     """
     if any(p.branch for p in points):
         return lasting_peak(family_member(family, settings).model, points)

@@ -8,19 +8,18 @@ another shape can move less, at a frequency of its own, and be nearer to its end
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import pi
 
 import numpy as np
 
-from ...hbm.solver.newton import Options
 from ...wheel.local_peak import LocalBalances, LocalPeak
-from ...wheel.model import Pattern, Wheel
+from ...wheel.model import Pattern
 from ...wheel.solve import WheelSolution, solve_wheel
 from ..pipeline.damped_motion import DampedStress
 from .other_blades import OtherBlades
 from .own_stress import OwnStress
-from .peak_choice import ChosenPeak, local_peak
+from .peak_choice import ChosenPeak, SearchedWheel, local_peak
 
 # stress of a blade by pattern, solution and its number: on the mesh of the tuned shape, and of a
 # blade of another shape also on its own
@@ -44,19 +43,6 @@ class DecidingBlade:
     def worst(self) -> DampedStress | OwnStress:
         """The stress on the mesh of its own shape."""
         return self.stress if self.own_stress is None else self.own_stress
-
-
-@dataclass(frozen=True)
-class SearchedWheel:
-    """A wheel with one pattern, and how its peak was searched."""
-
-    # with held means, and with free ones where these were searched too
-    wheel: Wheel
-    free: Wheel | None
-    pattern: Pattern
-    # of the scene's engine order
-    harmonic: int
-    options: Options
 
 
 def blade_groups(others: OtherBlades | None, count: int) -> list[np.ndarray]:
@@ -124,7 +110,7 @@ def group_peak(searched: SearchedWheel, found: ChosenPeak, group: np.ndarray) ->
     )
     ways = [(searched.wheel, searched.options)]
     if found.free is not None and searched.free is not None:
-        ways.insert(0, (searched.free, replace(searched.options, fallbacks=False)))
+        ways.insert(0, (searched.free, searched.without_fallbacks))
     for wheel, options in ways:
         balances = LocalBalances(wheel, searched.pattern, H, samples, options, start)
         own = local_peak(balances, found.peak, searched.harmonic, group)

@@ -30,6 +30,7 @@ from .law_level import law_level, with_checks
 from .other_blades import OtherBlades
 from .pattern_response import frequency_grid
 from .peak_choice import (
+    SearchedWheel,
     chosen_peak,
     first_balance,
     pattern_peak,
@@ -101,6 +102,14 @@ class DrawnWheels:
         """Circular frequencies at which the resonance with a pattern is looked for [rad/s]."""
         return frequency_grid(self.wheel, self.curve, pattern, self.spread, self.harmonic)
 
+    def searched(self, pattern: Pattern, free: bool) -> SearchedWheel:
+        """The wheel with a pattern; with free means too, if asked for and where the scene has
+        these.
+        """
+        options = solver_options(self.scene.accuracy)
+        means = self.free if free else None
+        return SearchedWheel(self.wheel, means, pattern, self.harmonic, options)
+
     @property
     def by_damper_law(self) -> bool:
         """The scene asks for the cheap level, with some wheels checked."""
@@ -115,15 +124,7 @@ class DrawnWheels:
         """
 
         def solve() -> PatternPeak:
-            return pattern_peak(
-                self.wheel,
-                self.free if free else None,
-                pattern,
-                self.grid(pattern),
-                balance,
-                self.harmonic,
-                solver_options(self.scene.accuracy),
-            )
+            return pattern_peak(self.searched(pattern, free), self.grid(pattern), balance)
 
         found = self.kept(solve, "peak", pattern, balance, free)
         return replace(found, asked=self.free is not None)
@@ -212,12 +213,9 @@ def _chosen_balance(drawn: DrawnWheels) -> tuple[int, int, float]:
     """
     pattern = drawn.patterns[0]
     found = chosen_peak(
-        drawn.wheel,
-        pattern,
+        drawn.searched(pattern, free=False),
         drawn.grid(pattern),
         scatter_balance(drawn.scene, drawn.wheel, drawn.curve),
-        drawn.harmonic,
-        solver_options(drawn.scene.accuracy),
         wanted_truncation(drawn.scene),
         SCATTER_HARMONICS,
     )

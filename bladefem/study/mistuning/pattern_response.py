@@ -7,20 +7,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...hbm.linear_resonances import free_resonances
-from ...hbm.solver.newton import DEFAULT_OPTIONS, Options
 from ...wheel.local_peak import LocalBalances
 from ...wheel.model import Pattern, Wheel
 from ...wheel.resonance import WheelPeak, find_wheel_peak
 from ...wheel.solve import WheelSolution, free_wheel, stuck_wheel
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
-from ...wheel.walking import with_free_means
 from ..pipeline.curve import Curve
-from .deciding_blades import BladeStress, DecidingBlade, SearchedWheel, deciding_blades
+from .deciding_blades import BladeStress, DecidingBlade, deciding_blades
 from .other_blades import OtherBlades
 from .peak_choice import (
     SEARCH_TOLERANCE,
     ChosenPeak,
+    SearchedWheel,
     chosen_peak,
     first_balance,
     in_common_period,
@@ -171,40 +170,30 @@ def linear_grid(wheel: Wheel, low: float, high: float) -> np.ndarray:
 
 
 def pattern_response(
-    wheel: Wheel,
-    pattern: Pattern,
+    searched: SearchedWheel,
     deviation: np.ndarray,
     curve: Curve,
     stress: BladeStress,
-    others: OtherBlades | None = None,
-    options: Options = DEFAULT_OPTIONS,
-    harmonic: int = 1,
-    wanted: float | None = None,
-    held_means: bool = True,
-    accuracy: float = 0.0,
+    others: OtherBlades | None,
+    wanted: float | None,
+    accuracy: float,
 ) -> PatternResponse:
     """The wheel with one pattern, under the load of a curve.
 
     Args:
-        wheel: the tuned wheel under that load.
-        pattern: what differs from blade to blade.
+        searched: the wheel under that load.
         deviation: (N, q) relative deviations of the blade-alone frequencies.
         stress: of a blade, by the pattern, the solution and the blade's number; of one of another
             shape also that on its own mesh.
         others: the blades of another shape in the pattern.
-        options: when a point is accepted.
-        harmonic: of the scene's engine order.
         wanted: estimated error by harmonics and samples above which there are more of them; None:
             those of the curve.
-        held_means: the scene holds them, and nobody asks what free ones do.
         accuracy: relative, of the comparison with the curve beyond its own error.
     """
+    wheel, pattern, harmonic = searched.wheel, searched.pattern, searched.harmonic
     grid = frequency_grid(wheel, curve, pattern, abs(deviation).max() + 0.005, harmonic)
-    free = None if held_means else with_free_means(wheel)
-    begin = first_balance(wheel, curve, harmonic)
-    found = chosen_peak(wheel, pattern, grid, begin, harmonic, options, wanted, free=free)
-    found, tuned = _with_tuned(wheel, free, found, curve, options, harmonic)
-    searched = SearchedWheel(wheel, free, pattern, harmonic, options)
+    found = chosen_peak(searched, grid, first_balance(wheel, curve, harmonic), wanted)
+    found, tuned = _with_tuned(searched, found, curve)
     blades, lost = deciding_blades(searched, found, others, stress)
     return PatternResponse(
         curve.load,
@@ -219,33 +208,30 @@ def pattern_response(
         _over_sector(wheel, tuned, curve),
         blades,
         compared_with_sector(wheel, curve, tuned.height, accuracy),
-        None if free is None else _free_means(found),
+        None if searched.free is None else _free_means(found),
         others,
         lost,
     )
 
 
 def _with_tuned(
-    wheel: Wheel,
-    free: Wheel | None,
-    found: ChosenPeak,
-    curve: Curve,
-    options: Options,
-    harmonic: int,
+    searched: SearchedWheel, found: ChosenPeak, curve: Curve
 ) -> tuple[ChosenPeak, WheelPeak]:
     """The peak of a pattern and that of the tuned wheel, the same way, so that their ratio compares
     like with like: with free means where both are found with these.
     """
     H, samples = found.harmonics, found.samples
+    harmonic, free = searched.harmonic, searched.free
+    respond = wheel_respond(searched.wheel, Pattern(), H, samples, searched.options)
     held = find_wheel_peak(
-        in_common_period(wheel_respond(wheel, Pattern(), H, samples, options), harmonic),
+        in_common_period(respond, harmonic),
         curve.peak.omega * np.array([0.998, 1.0, 1.002]),
         SEARCH_TOLERANCE,
     )
     if free is None or found.free is None:
         return found, held
-    simply = replace(options, fallbacks=False)
-    tuned = local_peak(LocalBalances(free, Pattern(), H, samples, simply), held, harmonic)
+    balances = LocalBalances(free, Pattern(), H, samples, searched.without_fallbacks)
+    tuned = local_peak(balances, held, harmonic)
     return (replace(found, free=None), held) if tuned is None else (found, tuned.peak)
 
 

@@ -34,6 +34,26 @@ MOST_JUDGING_PRODUCTS = 3000
 SEARCH_TOLERANCE = 0.01
 
 
+@dataclass(frozen=True)
+class SearchedWheel:
+    """A wheel with one pattern, and how its peak is searched."""
+
+    # with held means, and with free ones where these are searched too
+    wheel: Wheel
+    free: Wheel | None
+    pattern: Pattern
+    # of the scene's engine order, among those of the common period of all orders
+    harmonic: int
+    options: Options
+
+    @property
+    def without_fallbacks(self) -> Options:
+        """The options of balances that start from one nearby: what Newton does not reach from there
+        nothing else is likely to.
+        """
+        return replace(self.options, fallbacks=False)
+
+
 def in_common_period(respond: Respond, harmonic: int) -> Respond:
     """What a wheel answers at a circular frequency of its own engine order, from what it answers at
     that of the common period of all orders.
@@ -83,39 +103,31 @@ def wanted_truncation(scene: Scene) -> float | None:
 
 
 def chosen_peak(
-    wheel: Wheel,
-    pattern: Pattern,
+    searched: SearchedWheel,
     grid: np.ndarray,
     first: tuple[int, int],
-    harmonic: int,
-    options: Options,
     wanted: float | None,
     most: int = MOST_HARMONICS,
-    free: Wheel | None = None,
 ) -> ChosenPeak:
     """The peak with as many harmonics and samples as its error asks for.
 
     Args:
-        wheel: with held means.
         grid: (k,) circular frequencies of the scene's engine order to look at first [rad/s].
         first: harmonics and samples of the common period to begin with.
-        harmonic: of the scene's engine order.
         wanted: estimated error by harmonics and samples above which there are more of them; None:
             those given are kept.
         most: harmonics of the engine order.
-        free: the same wheel with free means, by which the peak is searched again.
     """
     H, samples = first
-    limit = most * harmonic
-    # what Newton does not reach from the nearest walking balance nothing else is likely to
-    simply = replace(options, fallbacks=False)
+    limit = most * searched.harmonic
     while True:
-        held, solution = _peak_of_pattern(wheel, pattern, grid, H, samples, harmonic, options)
+        held, solution = _peak_with_held_means(searched, grid, H, samples)
         found = ChosenPeak(held, solution, H, samples, float("nan"))
-        if free is not None:
-            balances = LocalBalances(free, pattern, H, samples, simply, solution)
-            found = replace(found, free=local_peak(balances, held, harmonic))
-        judged = _judged(wheel, free, pattern, found, options, wanted, limit)
+        if searched.free is not None:
+            options = searched.without_fallbacks
+            balances = LocalBalances(searched.free, searched.pattern, H, samples, options, solution)
+            found = replace(found, free=local_peak(balances, held, searched.harmonic))
+        judged = _judged(searched, found, wanted, limit)
         # of NaN nothing says that richer settings are solved
         if not _asks_for_more(judged, wanted, limit):
             change = judged.change
@@ -126,28 +138,23 @@ def chosen_peak(
 
 
 def pattern_peak(
-    wheel: Wheel,
-    free: Wheel | None,
-    pattern: Pattern,
-    grid: np.ndarray,
-    balance: tuple[int, int],
-    harmonic: int,
-    options: Options,
+    searched: SearchedWheel, grid: np.ndarray, balance: tuple[int, int]
 ) -> PatternPeak:
     """The highest blade by given harmonics and samples, with held means over the band and with free
-    ones round its peaks; the other arguments are those of `chosen_peak`.
+    ones round its peaks.
 
     Args:
+        grid: (k,) circular frequencies of the scene's engine order to look at first [rad/s].
         balance: harmonics and samples of the common period.
     """
-    held = LocalBalances(wheel, pattern, *balance, options)
+    pattern, harmonic, free = searched.pattern, searched.harmonic, searched.free
+    held = LocalBalances(searched.wheel, pattern, *balance, searched.options)
     first = find_wheel_peak(in_common_period(held, harmonic), grid, SEARCH_TOLERANCE)
     near = held.points[first.omega / harmonic]
     if free is None or not near.converged:
         return PatternPeak(first, asked=free is not None)
-    # what Newton does not reach from the nearest walking balance nothing else is likely to
-    simply = replace(options, fallbacks=False, iterations=MOST_WALKING_ITERATIONS)
-    walking = LocalBalances(free, pattern, *balance, simply, near, MOST_WALKING_PRODUCTS)
+    options = replace(searched.without_fallbacks, iterations=MOST_WALKING_ITERATIONS)
+    walking = LocalBalances(free, pattern, *balance, options, near, MOST_WALKING_PRODUCTS)
     again = local_peak(walking, first, harmonic)
     # the resonance may be higher beyond a point that was not solved
     known = again is not None and again.peak.closed_in
@@ -203,43 +210,40 @@ def richer_balance(wheel: Wheel, H: int, samples: int) -> tuple[int, int]:
     return more, max(2 * samples, 8 * (more + 1))
 
 
-def _peak_of_pattern(
-    wheel: Wheel,
-    pattern: Pattern,
-    grid: np.ndarray,
-    H: int,
-    samples: int,
-    harmonic: int,
-    options: Options,
+def _peak_with_held_means(
+    searched: SearchedWheel, grid: np.ndarray, H: int, samples: int
 ) -> tuple[WheelPeak, WheelSolution]:
     """The peak and its solution."""
-    solved = in_common_period(wheel_respond(wheel, pattern, H, samples, options), harmonic)
-    peak = find_wheel_peak(solved, grid, SEARCH_TOLERANCE)
-    omega = peak.omega / harmonic
+    wheel, pattern, options = searched.wheel, searched.pattern, searched.options
+    respond = wheel_respond(wheel, pattern, H, samples, options)
+    peak = find_wheel_peak(in_common_period(respond, searched.harmonic), grid, SEARCH_TOLERANCE)
+    omega = peak.omega / searched.harmonic
     return peak, solve_wheel(wheel, omega, H, samples, pattern=pattern, options=options)
 
 
-def _judged(
-    wheel: Wheel,
-    free: Wheel | None,
-    pattern: Pattern,
-    found: ChosenPeak,
-    options: Options,
-    wanted: float | None,
-    most: int,
-) -> Judged:
+def _judged(searched: SearchedWheel, found: ChosenPeak, wanted: float | None, most: int) -> Judged:
     """What richer harmonics and samples change at a peak: with free means where it has these, since
     how far dampers walk depends on the high harmonics, or with held ones where this is not solved.
     """
     present = found.harmonics, found.samples
-    if free is not None and found.free is not None:
-        simply = replace(options, fallbacks=False)
+    pattern = searched.pattern
+    if searched.free is not None and found.free is not None:
+        options = searched.without_fallbacks
         judged = _judged_by(
-            free, pattern, found.solution, present, simply, wanted, most, MOST_JUDGING_PRODUCTS
+            searched.free,
+            pattern,
+            found.solution,
+            present,
+            options,
+            wanted,
+            most,
+            MOST_JUDGING_PRODUCTS,
         )
         if np.isfinite(judged.change):
             return replace(judged, free=True)
-    return _judged_by(wheel, pattern, found.held_solution, present, options, wanted, most)
+    return _judged_by(
+        searched.wheel, pattern, found.held_solution, present, searched.options, wanted, most
+    )
 
 
 def with_free_change(truncation: float, change: float) -> float:

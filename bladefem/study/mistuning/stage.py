@@ -23,6 +23,7 @@ from ...wheel.statistics import (
     Amplification,
     joined_loads,
 )
+from ...wheel.walking import with_free_means
 from ..adaptive.choice import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
@@ -40,7 +41,7 @@ from .other_blades import OtherBlades, changed_blades, foot_of, held_aerofoil
 from .own_stress import OwnStress
 from .pattern_response import PatternResponse, pattern_response
 from .pattern_sentences import pattern_sentences
-from .peak_choice import wanted_truncation
+from .peak_choice import SearchedWheel, wanted_truncation
 from .scatter_use import ScatteredUse, scattered_use
 from .validate import refuse_scatter, scene_deviations
 from .wheel_utilisation import wheel_utilisation_message
@@ -101,8 +102,6 @@ def _best_response(
     """The response of all blades under the load of a curve, whose sectors the ranks share, with the
     stress of the highest one, on one rank.
     """
-    from ...fem.compat import MPI
-
     comm = bodies.comm
     # all ranks have to take the same decisions: from the same numbers to the last digit
     wheel, pattern, curve, others = on_root(
@@ -118,36 +117,59 @@ def _best_response(
     if others is not None:
         frequency = frequency + others.frequencies(*frequency.shape)
 
+    def solved_wheel(pattern: Pattern, solution: WheelSolution) -> SolvedWheel:
+        shapes = _shapes_on_one_rank(run, bodies, len(sector.families), root)
+        case = _cases(run)[curve.load, curve.mass]
+        return SolvedWheel(shapes, wheel, pattern, case, solution, curve.settings.points)
+
     def stress(
         pattern: Pattern, solution: WheelSolution, blade: int
     ) -> tuple[DampedStress, OwnStress | None]:
-        case = _cases(run)[curve.load, curve.mass]
-        alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
-        alone.kept.update(bodies.kept)
-        _, readings = blade_readings(alone, run.clamped, len(sector.families), run.modes, root)
-        patches = list(run.contact.problem.patches)
-        shapes = WheelShapes(alone, patches, all_modes(alone), readings)
-        points = curve.settings.points
-        solved = SolvedWheel(shapes, wheel, pattern, case, solution, points)
-        if others is None or blade not in others.changes:
-            return stress_of_motion(alone, case, blade_motion(solved, blade)), None
-        motion, own = odd_blade_stress(run, solved, blade, _given_blades(run.scene)[blade])
-        return stress_of_motion(alone, case, motion), own
+        return _blade_stress(run, solved_wheel(pattern, solution), blade, others)
 
     shared = replace(wheel, comm=comm)
-    return pattern_response(
+    held_means = run.scene.model.static == "uncoupled"
+    searched = SearchedWheel(
         shared,
+        None if held_means else with_free_means(shared),
         pattern,
+        own_harmonic(run.scene),
+        solver_options(run.scene.accuracy),
+    )
+    return pattern_response(
+        searched,
         frequency,
         curve,
         lambda *of_blade: on_root(comm, lambda: stress(*of_blade)),
         others,
-        solver_options(run.scene.accuracy),
-        own_harmonic(run.scene),
         wanted_truncation(run.scene),
-        run.scene.model.static == "uncoupled",
         run.scene.accuracy,
     )
+
+
+def _shapes_on_one_rank(run: SolvedRun, bodies: Bodies, families: int, root: bool) -> WheelShapes:
+    """The shapes that the motion of a blade is made of, from bodies of this rank alone.
+
+    Args:
+        root: with the motions of the blade's root.
+    """
+    from ...fem.compat import MPI
+
+    alone = Bodies(run.scene, run.mesh, MPI.COMM_SELF)
+    alone.kept.update(bodies.kept)
+    _, readings = blade_readings(alone, run.clamped, families, run.modes, root)
+    return WheelShapes(alone, list(run.contact.problem.patches), all_modes(alone), readings)
+
+
+def _blade_stress(
+    run: SolvedRun, solved: SolvedWheel, blade: int, others: OtherBlades | None
+) -> tuple[DampedStress, OwnStress | None]:
+    """The stress of a blade on the mesh of the tuned shape, and on its own where that differs."""
+    alone, case = solved.shapes.bodies, solved.case
+    if others is None or blade not in others.changes:
+        return stress_of_motion(alone, case, blade_motion(solved, blade)), None
+    motion, own = odd_blade_stress(run, solved, blade, _given_blades(run.scene)[blade])
+    return stress_of_motion(alone, case, motion), own
 
 
 def _run_deviations(run: SolvedRun) -> BladeDeviations:

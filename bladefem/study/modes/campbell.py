@@ -61,15 +61,13 @@ def campbell_tables(
     bodies: Bodies,
     speeds: Sequence[float],
     orders: Sequence[int],
-    diameters: Sequence[int] | None = None,
     count: int = 5,
 ) -> Campbell:
     """Campbell and interference tables of the blade or wheel without damper.
 
     Args:
         speeds: [rad/s]; the scene's own speed is added.
-        orders: engine orders.
-        diameters: nodal diameters; those that the orders excite when left out.
+        orders: engine orders; the tables have the nodal diameters that these excite.
         count: modes of each.
 
     Raises:
@@ -77,8 +75,7 @@ def campbell_tables(
     """
     sectors = sector_of(bodies.mesh).count if is_wheel(bodies.mesh) else 0
     operating = bodies.scene.operation.speed
-    if sectors and diameters is None:
-        diameters = sorted({fold_order(order, sectors) for order in orders})
+    diameters = sorted({fold_order(order, sectors) for order in orders}) if sectors else None
     all_speeds = sorted({*speeds, operating})
     models = speed_models(bodies, all_speeds, diameters, count)
     table = pd.concat([model.table(all_speeds) for model in models], ignore_index=True)
@@ -102,27 +99,6 @@ def campbell_tables(
         pd.concat([m for _, m in tables], ignore_index=True),
         operating,
     )
-
-
-def campbell_table(
-    bodies: Bodies,
-    speeds: Sequence[float],
-    diameters: Sequence[int] | None,
-    count: int = 5,
-) -> pd.DataFrame:
-    """One row a mode and speed.
-
-    Args:
-        diameters: nodal diameters of a wheel.
-
-    Returns:
-        columns nodal_diameter (wheels), mode, speed [rad/s], frequency [Hz] without Coriolis
-        forces, forward and
-        backward [Hz] with them, error [1]: how far the frequency moves when the middle speed's
-        modes are left out, a pessimistic measure of what the basis misses.
-    """
-    models = speed_models(bodies, speeds, diameters, count)
-    return pd.concat([model.table(speeds) for model in models], ignore_index=True)
 
 
 def speed_models(

@@ -190,12 +190,11 @@ class FamilyReferences:
 def family_references(
     mesh: Mesh,
     clamped: ModeSet | None = None,
-    body: str = "blade",
     root: float | None = None,
 ) -> FamilyReferences:
     """What serves all mode sets of a mesh; arguments as of `family_table`."""
     root = naming_root(mesh) if root is None else root
-    nodes = np.unique(mesh.bodies.get(body, np.concatenate(list(mesh.bodies.values()))))
+    nodes = np.unique(mesh.bodies.get("blade", np.concatenate(list(mesh.bodies.values()))))
     nodes = nodes[mesh.points[nodes, 0] >= root]
     pure = pure_shapes(mesh, nodes, root)
     below = "disc" if _is_wheel(mesh) else "foot"
@@ -216,7 +215,6 @@ def family_table(
     modes: ModeSet,
     mesh: Mesh,
     clamped: ModeSet | None = None,
-    body: str = "blade",
     root: float | None = None,
 ) -> pd.DataFrame:
     """Names of the modes: one row a mode with frequency [Hz], family, MAC against it, and the
@@ -233,10 +231,9 @@ def family_table(
         mesh: sector or blade.
         clamped: modes of the blade clamped at its root, on the same nodes, as references next to
             pure motions.
-        body: the aerofoil's body; the whole mesh when there is no such body.
         root: height x of the aerofoil's root [m]; found from the named faces when left out.
     """
-    return name_modes(modes, family_references(mesh, clamped, body, root))
+    return name_modes(modes, family_references(mesh, clamped, root))
 
 
 def name_modes(modes: ModeSet, references: FamilyReferences) -> pd.DataFrame:

@@ -54,7 +54,13 @@ class SpeedModel:
     sense: int
 
     def table(self, speeds: Sequence[float]) -> pd.DataFrame:
-        """Columns of ``campbell.campbell_table``, all speeds [rad/s]."""
+        """One row a mode and speed [rad/s].
+
+        Returns:
+            columns nodal_diameter (wheels), mode, speed [rad/s], frequency [Hz] without Coriolis
+            forces, forward and backward [Hz] with them, error [1]: how far the frequency moves when
+            the middle speed's modes are left out, a pessimistic measure of what the basis misses.
+        """
         frames = []
         for speed in speeds:
             f, forward, backward = self.waves_at(speed)

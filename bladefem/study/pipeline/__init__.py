@@ -1,1 +1,26 @@
-"""From a scene to forced responses, stage by stage."""
+"""From a scene to forced responses, stage by stage. Begin with ``pipeline``, then
+``response_stage``, ``loads`` and ``judged_resonance``.
+
+- the run: ``pipeline`` order of the stages, ``stage_runner`` computes or reads one,
+  ``stage_inputs`` what each depends on, ``run_records`` what they leave, ``preflight`` and
+  ``validate_mesh`` what is refused before
+- bodies: ``scene_mesh``, ``bodies`` finite elements, ``normal_modes``, ``ports``,
+  ``reduced_sector``, ``coriolis``
+- the damper on its seats: ``damper_contact`` the contact problem, ``seated_loads`` the stage,
+  ``history`` with friction, ``state_check`` the paper's table of states, ``liftoff`` light loads
+- models: ``assemble_model`` one load case, ``case_models`` its family from poor to rich,
+  ``changed_cases`` another contact parameter, ``joined_contacts`` fewer contact points
+- responses: ``response_stage`` the stage, ``loads`` a curve a load, ``curve`` its record,
+  ``best_load`` the search, ``resonance_list`` all maxima, ``linear_limits``, ``load_interval``,
+  ``shared_accuracy`` one accuracy for all errors, ``body_mesh`` the error by the mesh
+- which motion the blade keeps: ``judged_resonance`` decides; ``stability`` verdicts on a curve,
+  ``highest_stable`` its highest lasting motion, ``finer_contacts`` and ``other_diameters`` verdicts
+  with more contact points and in other nodal diameters
+- the same by marches in time: ``kept_band`` from an unstable motion, ``flank_motions`` beside a
+  resonance, ``strong_drive`` after a strong excitation, ``error_in_time`` the error of a balance,
+  ``resonance_in_time`` where balances fail
+- at the resonance: ``contact_cycle`` stick and slip, ``damped_motion`` motion and stress of all
+  nodes, ``utilisation`` of the endurance
+- flutter: ``flow`` damping of each wave, ``flutter`` limit cycles
+- words and tables: ``response_remarks``, ``stability_remarks``, ``design_table``
+"""

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, lru_cache, partial
+from functools import cache, lru_cache
 from typing import Any
 
 import numpy as np
@@ -46,14 +46,11 @@ HEIGHT_TOLERANCE_SHARE = 0.02
 SEATING_DIFFERENCE_STEP = 1e-4
 # searches, each with richer settings than the last
 MAX_SEARCHES = 3
-# of the first search, where these are open and those to begin with are richer: on an imported wedge
-# whose other loads need 15 harmonics and 16 contact points a search with these takes 40 s of CPU,
-# one with at most those 1 s, and both end 6 % of the load apart
+# of the first search, where these are open and those to begin with are richer: it comes within some
+# 6 % of the best load in a fortieth of the time
 FIRST_SEARCH = {"harmonics": 3, "points": 8}
 # unknowns of a balance in which contacts lift off from which a search with it is not worth its
-# time: on the wedge with mu = 0.6, 15 harmonics on 8 points a seat (1488 unknowns) take over six
-# minutes and end without a solution; 7 harmonics on 4 points (360) take 12 s, and end 5 % above a
-# march in time
+# time: with 1488 one took over six minutes and ended without a solution
 MAX_SEARCH_UNKNOWNS = 1400
 # the fewest that such a search is left with
 FEWEST_SEARCHED = {"points": 4, "harmonics": 3}
@@ -118,23 +115,25 @@ def find_best_load(
         near: the resonance under the start, of these models or similar ones, where it is known.
         with_range: loads around are tried as well, until the resonance is higher by the accuracy.
     """
-    tolerance = tolerance or HEIGHT_TOLERANCE_SHARE * scene.accuracy
-    case_at = lru_cache(maxsize=None)(case_at)
-    searched = search_range(scene)
-    family = family_of(case_at(start or _middle(searched)))
-    rise = scene.accuracy if with_range else 0.0
+    search = _Search(
+        scene,
+        lru_cache(maxsize=None)(case_at),
+        family_of,
+        search_range(scene),
+        tolerance or HEIGHT_TOLERANCE_SHARE * scene.accuracy,
+        scene.accuracy if with_range else 0.0,
+    )
+    family = search.family_at(start or _middle(search.loads))
     reason = ""
     # where the resonance is not solved with few harmonics, it may be with those that were asked for
     for begun in dict.fromkeys((_first_search_settings(family, settings), settings)):
         try:
-            found, chosen = _repeated_search(
-                scene, case_at, family_of, begun, searched, start, tolerance, near, rise
-            )
+            found, chosen = _repeated_search(search, begun, start, near)
         except NotSolvedError as error:
             reason = str(error)
             continue
-        return _record(scene, found, chosen, mass, searched, tolerance)
-    return _unknown(settings, mass, searched, reason)
+        return _record(search, found, chosen, mass)
+    return _unknown(settings, mass, search.loads, reason)
 
 
 def _first_search_settings(family: Family, settings: Settings) -> Settings:
@@ -150,16 +149,27 @@ def _first_search_settings(family: Family, settings: Settings) -> Settings:
     return with_excited_harmonics(family, replace(settings, **fewer))
 
 
+@dataclass(frozen=True)
+class _Search:
+    """What does not change from one search to the next with richer settings."""
+
+    scene: Scene
+    case_at: CaseAt
+    family_of: FamilyOf
+    # between which the best one is sought [N]
+    loads: tuple[float, float]
+    # of the height, relative
+    tolerance: float
+    # relative, of the resonances under the lowest and the highest load that are tried
+    rise: float
+
+    def family_at(self, load: float) -> Family:
+        """The models under a load [N]."""
+        return self.family_of(self.case_at(load))
+
+
 def _repeated_search(
-    scene: Scene,
-    case_at: CaseAt,
-    family_of: FamilyOf,
-    settings: Settings,
-    searched: tuple[float, float],
-    start: float | None,
-    tolerance: float,
-    known: Peak | None,
-    rise: float,
+    search: _Search, settings: Settings, start: float | None, known: Peak | None
 ) -> tuple[Optimum, Settings]:
     """The best load by settings that hold there, and these.
 
@@ -167,27 +177,26 @@ def _repeated_search(
 
     Args:
         known: the resonance under the start, where it is known.
-        rise: relative, of the resonances under the lowest and the highest load that are tried.
 
     Raises:
         NotSolvedError: a resonance was not.
     """
-    bounds = searched if start is None else _near(start, searched)
+    bounds = search.loads if start is None else _near(start, search.loads)
     points = 0
-    search = partial(_search, scene, case_at, family_of, tolerance=tolerance, rise=rise)
     for left in reversed(range(MAX_SEARCHES)):
-        found = search(settings, bounds, start, known)
+        found = _search_once(search, settings, bounds, start, known)
         points += found.points
-        if found.value in bounds and bounds != searched:
-            found = search(settings, searched, found.value, found.peak)
+        if found.value in bounds and bounds != search.loads:
+            found = _search_once(search, settings, search.loads, found.value, found.peak)
             points += found.points
         if not settings.chosen and settings.error is not None:
             break
-        family = family_of(case_at(found.value))
+        family = search.family_at(found.value)
         # the whole accuracy: the height changes little with the load, and its errors by the meshes
         # are estimated for the curves
+        accuracy = search.scene.accuracy
         richer, peak, _ = choose_at_peak(
-            family, settings, found.peak, scene.accuracy, fixed=("modes",), sufficient=1.0
+            family, settings, found.peak, accuracy, fixed=("modes",), sufficient=1.0
         )
         next_one = _smaller_settings(family, richer, peak.solution)
         smaller = next_one != richer
@@ -201,7 +210,7 @@ def _repeated_search(
             break
         start = found.value
         known = None if smaller else peak
-        bounds = _near(start, searched)
+        bounds = _near(start, search.loads)
     return replace(found, points=points), settings
 
 
@@ -255,20 +264,16 @@ def holding_load(scene: Scene) -> float:
     return scene.excitation.force / max(mu, 1e-3)
 
 
-def _search(
-    scene: Scene,
-    case_at: CaseAt,
-    family_of: FamilyOf,
+def _search_once(
+    search: _Search,
     settings: Settings,
     bounds: tuple[float, float],
     start: float | None,
     known: Peak | None,
-    *,
-    tolerance: float,
-    rise: float,
 ) -> Optimum:
     """The search with these settings, from a load and the resonance there, where they are known."""
-    along = load_variation(case_at, family_of, settings)
+    scene = search.scene
+    along = load_variation(search.case_at, search.family_of, settings)
     middle = start or _middle(bounds)
     band = scene.study.band or default_band(along.model_at(middle), scene.excitation.mode)
     return lowest_peak(
@@ -279,8 +284,8 @@ def _search(
         settings.samples,
         start=middle,
         near=known,
-        tolerance=tolerance,
-        rise=rise,
+        tolerance=search.tolerance,
+        rise=search.rise,
         options=solver_options(scene.accuracy),
     )
 
@@ -330,30 +335,23 @@ def _relative_rate(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return np.where(abs(rate) < SEATING_DIFFERENCE_STEP, 0.0, rate)
 
 
-def _record(
-    scene: Scene,
-    found: Optimum,
-    settings: Settings,
-    mass: float | None,
-    searched: tuple[float, float],
-    tolerance: float,
-) -> BestLoad:
+def _record(search: _Search, found: Optimum, settings: Settings, mass: float | None) -> BestLoad:
     tried = sorted(found.tried, key=lambda peak: peak.value)
     solution = found.peak.solution
     return BestLoad(
-        mass,
-        found.value,
-        solution.frequency,
-        found.peak.height,
-        solution.work.dissipated,
-        solution.work.input,
-        tolerance,
-        tolerated_loads(tried, scene.accuracy),
-        settings,
-        np.array([peak.value for peak in tried]),
-        np.array([peak.height for peak in tried]),
-        searched,
-        found.points,
+        mass=mass,
+        load=found.value,
+        frequency=solution.frequency,
+        amplitude=found.peak.height,
+        dissipated=solution.work.dissipated,
+        input_work=solution.work.input,
+        tolerance=search.tolerance,
+        between=tolerated_loads(tried, search.scene.accuracy),
+        settings=settings,
+        tried=np.array([peak.value for peak in tried]),
+        heights=np.array([peak.height for peak in tried]),
+        searched=search.loads,
+        points=found.points,
     )
 
 
@@ -363,11 +361,22 @@ def _unknown(
     searched: tuple[float, float],
     reason: str,
 ) -> BestLoad:
-    nan = np.nan
     return BestLoad(
-        mass, nan, nan, nan, nan, nan, nan, (nan, nan), replace(settings, error=np.inf),
-        np.zeros(0), np.zeros(0), searched, 0, reason,
-    )  # fmt: skip
+        mass=mass,
+        load=np.nan,
+        frequency=np.nan,
+        amplitude=np.nan,
+        dissipated=np.nan,
+        input_work=np.nan,
+        tolerance=np.nan,
+        between=(np.nan, np.nan),
+        settings=replace(settings, error=np.inf),
+        tried=np.zeros(0),
+        heights=np.zeros(0),
+        searched=searched,
+        points=0,
+        reason=reason,
+    )
 
 
 def tolerated_loads(tried: Sequence[Peak], accuracy: float) -> tuple[float, float]:

@@ -109,14 +109,13 @@ def family_of_case(
         joined = joined_member(model, patches, settings.points, scene.contact.points).model
         return softened_layer(joined) if settings.softened else joined
 
-    family = Family(
+    return Family(
         shared,
         max(len(body.omega) for body in reduced.sector.values()),
         2 * most + 1,
         DAMPER_MODELS,
         disturbed if others is not None else None,
     )
-    return family
 
 
 def other_diameters(

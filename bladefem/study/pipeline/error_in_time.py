@@ -42,9 +42,8 @@ class Marches:
     def band(self, settings: Settings, point: Solution) -> KeptBand | None:
         """What the blade keeps to after a motion; None where a march by steps is not affordable.
 
-        Steps serve small models too: an exact march tells the same to 0.6 % (plane blades, contacts
-        of 2e4 to 1e8 N/m) and takes 5 to 28 times as long, 10 s for a resonance under 8 N. It
-        is asked where steps come to no end.
+        Steps serve small models too: an exact march tells the same to 0.6 % and takes 5 to 28 times
+        as long. It is asked where steps come to no end.
         """
         key = replace(settings, error=None), point.omega, size(point)
         if key not in self.done:

@@ -1,10 +1,8 @@
 """What the blade keeps to beside a resonance: marches from unstable motions nearly as high.
 
-A ripple that is weak at the resonance may grow far from a flank of it. Plane blades under 4 N are
-stable at 2.15 um and 1077 Hz; from 2.06 um at 1016 Hz, which is not, they come to bounce between
-1.15 and 3.6 um. Where every motion along a flat top is unstable, the blade may keep most of another
-local maximum of it than of the highest: of 150.0 um at 382.7 Hz under 79 N on the shipped wedge
-137.7 are left, of 149.7 um at 386.9 Hz 147.5.
+A ripple that is weak at the resonance may grow far from a flank of it, and lead to more than the
+resonance. Where every motion along a flat top is unstable, the blade may keep most of another local
+maximum of it than of the highest (docs/stability.md, F38 and F40).
 """
 
 from __future__ import annotations

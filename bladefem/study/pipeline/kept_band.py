@@ -43,47 +43,39 @@ SAMPLES_PER_PERIOD = 256
 # steps of the whole march above which it is not begun: some 20 s
 MAX_STEPS = 4e6
 SECONDS_PER_STEP = 5e-6
-# the same for marches by steps, in operations: 8.8e10 with 16 points a seat of the shipped wedge,
-# 200 periods, take 1.4 s under 9 N and 5.5 s under 25 N; 1.1e11 with ground faces, 10 modes and an
-# elastic damper. Fewer points may lead elsewhere: under 1100 N there 16 points a seat keep 517 um
-# of the 536 that they are solved for, eight some 460 of 531, four some 475 of 530
+
+# Marches by steps. Figures behind their limits: docs/verification.md, "Limits of marches and
+# balances".
+# operations, as estimated, above which a march is not begun: fewer contact points are tried
 MAX_MARCH = 1.5e11
-# and of those that its first period shows to be needed, some 30 s: the march above takes 22 s; more
-# of it where no fewer contact points are left to march with
+# operations that the first period shows to be needed above which it is given up, some 30 s; the
+# second where no fewer contact points are left to march with
 MAX_COUNTED = 3e11
 SECONDS_PER_OPERATION = 30.0 / MAX_COUNTED
 MAX_COUNTED_LAST = 6e11
-# periods of these before the amplitudes are taken, and those in which they are
+# periods before the amplitudes are taken, and those in which they are
 LEFT_BY_STEPS = 150
 KEPT_BY_STEPS = 50
 # contact points of a patch below which a march is given up rather than made coarser
 FEWEST_POINTS = 4
-# instants of a period of these, and periods before and after with more of them
+# instants of a period, and periods before and after with more than the first of them
 INSTANTS_BY_STEPS = (256, 512, 1024)
 REFINED_PERIODS = (75, 25)
-# of the motion at the start: a band that reaches beyond it is marched again with more instants.
-# Steps that are too long for impacts feed them energy: on the shipped wedge with 8e3 N/mm^3 under
-# 80 N, 58 um, 256 instants end between 120 and 550 um, 512 and 1024 on 58.0 +- 0.4 um
+# of the motion at the start: a band that reaches beyond it is marched again with more instants, as
+# steps that are too long for impacts feed them energy
 GROWN_RATIO = 1.2
-# of the motion at the start: a band beyond it that was marched by steps too long for forces that
-# are linear in them is marched again with more instants, until two agree by AGREEING_SHARE. Under
-# 1100 N on the shipped wedge with ground faces, 530 um with four points a seat, 256 instants end on
-# 446, 1024 on 472, 4096 on 475 um; with eight points, 531 um, 256 on 508, 1024 and 2048 on 455 and
-# 460
+# of the motion at the start: a band farther from it, by steps too long for forces that are linear
+# in them, is marched again with more instants, until two agree by AGREEING_SHARE
 HELD_SHARE = 0.03
 AGREEING_SHARE = 0.02
-# relative change of the ends of a band, from one PERIODS_AT_ONCE to the next, that is none: an
-# imported wedge's first unstable resonances settle after 75 to 125 of 200 periods; with 1e-3 one at
-# 390 N, whose ends keep to 1.3e-3 from the hundredth on, took 175
+# relative change of the ends of a band, from one PERIODS_AT_ONCE to the next, that is none
 SETTLED_BAND = 2e-3
-# growth of the width of a band in two parts that leads on: a ripple that grows by 3 % a period,
-# plane blades under 8 N, had left the start by 1.4 % after 75 periods and by 12 % after 400
+# growth of the width of a band, in two parts of a march, from which it goes on: slow ripples grow
+# by a few per cent a period
 GROWING_RATIO = 1.1
 # of the amplitude: a width that is none, whatever it was before
 NO_WIDTH = 1e-6
-# periods at most that a march goes on for while its band widens and its operations are not used up,
-# over those that it has otherwise: plane blades under 4 N, 2.1 um at 1016 Hz, keep between 1.87 and
-# 2.28 um after 200 periods, between 1.15 and 3.6 um after 300 and 600
+# periods of a march whose band widens, at most, over those that it has otherwise
 LONGER_WHILE_WIDENING = 4
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
@@ -182,8 +174,7 @@ def _with_points(
     models: Family, settings: Settings, point: Solution, fewer: Settings
 ) -> Solution | None:
     """The motion with other contact points, which is only where a march starts: None where it is
-    not solved in a few steps from there. On the shipped wedge with 1e4 N/mm^3 under 80 N all ways
-    to it took 17 s, and none led there.
+    not solved in a few steps from there. All ways to it would take longer than the march.
     """
     if fewer == settings:
         return point
@@ -300,9 +291,7 @@ def band_by_steps(
 
 def _instants_to_try(model: ReducedModel, omega: float) -> tuple[int, ...]:
     """From the fewest instants on with steps short enough for forces that are linear in them; all
-    where none are. Longer steps take more iterations each: on the shipped wedge with ground faces,
-    1100 N and 16 points a seat, 100 periods of 256 instants took 30 s of CPU, and of 512, whose
-    steps are short enough, 22 s, for the same 517 um.
+    where none are. Longer steps take more iterations each, and more time in all.
     """
     for k, instants in enumerate(INSTANTS_BY_STEPS):
         if steps_are_resolved(model, omega, instants):

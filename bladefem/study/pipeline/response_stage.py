@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
 from geometry.mesh import Mesh, sector_of
@@ -47,6 +47,24 @@ from .stage_runner import StageRunner
 from .utilisation import utilisation_message
 
 
+@dataclass(frozen=True)
+class _Study:
+    """What all parts of the stage share."""
+
+    scene: Scene
+    mesh: Mesh
+    # of a load case, its models
+    family: Callable[[LoadCase], Family]
+    # to begin with
+    settings: Settings
+    keep: StageRunner
+
+    @property
+    def sectors(self) -> int:
+        """Of the wheel; 0 without one."""
+        return sector_of(self.mesh).count if is_wheel(self.mesh) else 0
+
+
 def run_response(
     before: ReducedRun,
     bodies: Bodies,
@@ -65,10 +83,10 @@ def run_response(
     """
     scene = before.scene
     mesh = before.mesh
-    settings = before.settings
     clock = keep.clock
     family = partial(family_of_case, scene, mesh, before.reduced, patches)
-    searches = _best_load_searches(scene, mesh, before.contact, family, settings, keep)
+    study = _Study(scene, mesh, family, before.settings, keep)
+    searches = _best_load_searches(study, before.contact)
     best: list[BestLoad] = []
     if scene.study.loads is None:
         with clock("best load"):
@@ -84,15 +102,12 @@ def run_response(
             "errors by the body's mesh are not estimated: the reduced model has other modes than "
             "those of the stage, or its elements are far too large"
         )
-    sectors = sector_of(mesh).count if is_wheel(mesh) else 0
-    response, cases = _load_responses(
-        scene, cases, family, settings, keep, softer, sectors, best, searches
-    )
+    response, cases = _load_responses(study, cases, softer, best, searches)
     loads = [case.load for case in cases]
     before = replace(before, contact=with_more_loads(scene, before.contact, loads, clock.messages))
     clock.messages.extend(lower_studied_remarks(scene, response.best, response.curves))
     with clock("influences"):
-        found = _influences(scene, mesh, before.contact, family, response.best_found, keep)
+        found = _influences(study, before.contact, response.best_found)
     curves = response.curves
     with clock("stresses"):
         damped = keep(
@@ -159,13 +174,9 @@ def _stresses(
 
 
 def _load_responses(
-    scene: Scene,
+    study: _Study,
     cases: list[LoadCase],
-    family: Callable[[LoadCase], Family],
-    settings: Settings,
-    keep: StageRunner,
     softer: SofterBody | None,
-    sectors: int,
     best: Sequence[BestLoad],
     searches: Sequence[Search],
 ) -> tuple[Response, list[LoadCase]]:
@@ -173,10 +184,11 @@ def _load_responses(
     the curves, which are more where a best load was found that was not given.
 
     Args:
-        sectors: of the wheel; 0 without one.
+        softer: the body less the error of its stiffness, for the error by its mesh.
         best: loads that were searched before.
         searches: for those that were not.
     """
+    scene, family, settings, keep = study.scene, study.family, study.settings, study.keep
     clock = keep.clock
     with clock("response"):
         cases, curves, found = study_loads(
@@ -196,7 +208,7 @@ def _load_responses(
             searches,
         )
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
-        limits = _limits_of_masses(scene, cases, family, settings, softer, band)
+        limits = _limits_of_masses(study, cases, softer, band)
         models = family(cases[-1])
     best = (*best, *found)
     clock.messages.extend(best_load_remarks(scene, best))
@@ -205,52 +217,45 @@ def _load_responses(
     others: dict[int, tuple[ClassVerdict, ...]] = {}
     if scene.study.stability:
         order = scene.excitation.engine_order
-        judged = judged_disturbances(models, settings, order, sectors, has_flow(scene))
+        judged = judged_disturbances(models, settings, order, study.sectors, has_flow(scene))
         with clock("response"):
             k = best_curve(curves, best)
-            others[k] = _class_verdicts(scene, family(cases[k]), curves[k], sectors, keep)
+            others[k] = _class_verdicts(study, family(cases[k]), curves[k])
     clock.messages.extend(response_remarks(scene, settings, curves, nodes, judged))
     clock.messages.extend(_class_remarks(curves, others, judged))
     return Response(settings, curves, limits, best, others=others), cases
 
 
 def _limits_of_masses(
-    scene: Scene,
+    study: _Study,
     cases: Sequence[LoadCase],
-    family: Callable[[LoadCase], Family],
-    settings: Settings,
     softer: SofterBody | None,
     band: tuple[float, float],
 ) -> tuple[Limit, ...]:
     """No damper, and full stick of each mass of the damper under its largest load."""
-    mode, open_points = scene.excitation.mode, not scene.contact.points
+    mode, open_points = study.scene.excitation.mode, not study.scene.contact.points
     found: list[Limit] = []
     # the last case of each mass
     for mass, case in {case.mass: case for case in cases}.items():
         soft = None if softer is None else softer.family(case)
-        free, stuck = judged_limits(family(case), settings, soft, mode, band, open_points)
+        models = study.family(case)
+        free, stuck = judged_limits(models, study.settings, soft, mode, band, open_points)
         found = [free, *found[1:], replace(stuck, mass=mass)]
     return tuple(found)
 
 
-def _class_verdicts(
-    scene: Scene,
-    models: Family,
-    curve: Curve,
-    sectors: int,
-    keep: StageRunner,
-) -> tuple[ClassVerdict, ...]:
+def _class_verdicts(study: _Study, models: Family, curve: Curve) -> tuple[ClassVerdict, ...]:
     """Verdicts on the resonance of a curve in other nodal diameters, kept with the run."""
     if models.disturbed is None:
         return ()
-    order = scene.excitation.engine_order
+    order = study.scene.excitation.engine_order
 
     def compute() -> tuple[ClassVerdict, ...]:
-        return class_verdicts(models, curve.settings, curve.peak, order, sectors)
+        return class_verdicts(models, curve.settings, curve.peak, order, study.sectors)
 
     known = curve.load, curve.mass, curve.peak.f, replace(curve.settings, error=None)
-    key = stage_key("response", scene, "other diameters", *known)
-    return keep("other_diameters", key, lambda: on_root(keep.comm, compute))
+    key = stage_key("response", study.scene, "other diameters", *known)
+    return study.keep("other_diameters", key, lambda: on_root(study.keep.comm, compute))
 
 
 def _class_remarks(
@@ -272,27 +277,21 @@ def _mass_label(mass: float | None) -> str:
     return "" if mass is None else f"_{1e3 * mass:g}g"
 
 
-def _best_load_searches(
-    scene: Scene,
-    mesh: Mesh,
-    contact: Seating,
-    family: Callable[[LoadCase], Family],
-    settings: Settings,
-    keep: StageRunner,
-) -> list[Search]:
+def _best_load_searches(study: _Study, contact: Seating) -> list[Search]:
     """The search for the best load of each mass of the damper, on one rank; none where a single
-    load was asked for, or where no friction makes one load better than another: on the shipped
-    wedge it ended at 47 kN, where nothing lifts off.
+    load was asked for, or where no friction makes one load better than another.
     """
+    scene, settings = study.scene, study.settings
     loads = scene.study.loads
     if loads is not None and (len(loads) == 1 or is_frictionless(scene)):
         return []
 
     def search(mass: float | None) -> tuple[BestLoad, Callable[[float], LoadCase]]:
-        case_at = cases_of(scene, contact.problem, mesh.dimension - 1, mass, contact.rough)
+        tangents = study.mesh.dimension - 1
+        case_at = cases_of(scene, contact.problem, tangents, mass, contact.rough)
         key = stage_key("response", scene, "best load", mass, replace(settings, error=None))
-        find = partial(find_best_load, scene, case_at, family, settings, mass)
-        return keep.alone(f"best_load{_mass_label(mass)}", key, find), case_at
+        find = partial(find_best_load, scene, case_at, study.family, settings, mass)
+        return study.keep.alone(f"best_load{_mass_label(mass)}", key, find), case_at
 
     return [partial(search, mass) for mass in scene.study.masses or (None,)]
 
@@ -301,18 +300,13 @@ def _best_of(search: Search) -> BestLoad:
     return search()[0]
 
 
-def _influences(
-    scene: Scene,
-    mesh: Mesh,
-    contact: Seating,
-    family: Callable[[LoadCase], Family],
-    best: BestLoad | None,
-    keep: StageRunner,
-) -> tuple[Influence, ...]:
+def _influences(study: _Study, contact: Seating, best: BestLoad | None) -> tuple[Influence, ...]:
     """What the best load depends on; none where it was not found or not wanted."""
+    scene, keep = study.scene, study.keep
     if best is None or not scene.study.influences:
         return ()
-    changed = changed_cases(scene, contact.problem, mesh.dimension - 1, best.mass, contact.rough)
+    tangents = study.mesh.dimension - 1
+    changed = changed_cases(scene, contact.problem, tangents, best.mass, contact.rough)
     # a history of the seating has its friction already
     frictionless = scene.contact.history == FRICTIONLESS
     flank_angles = kind_named(scene.kind).flank_angles
@@ -320,7 +314,7 @@ def _influences(
     parameters = parameters_of(scene, angles)
 
     def compute() -> list[Influence]:
-        return influences(scene, best, family, changed, parameters, keep.comm)
+        return influences(scene, best, study.family, changed, parameters, keep.comm)
 
     key = stage_key("response", scene, "influences", best)
     try:

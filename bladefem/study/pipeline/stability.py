@@ -38,8 +38,8 @@ MAX_JUDGED_MAXIMA = 4
 CURVE_OPERATIONS = 1.2e10
 # of solving a point again with JUDGED_HARMONICS; more take as many times more as their square
 RICHER_OPERATIONS = 5e8
-# points that are judged in addition, until the highest one that is not unstable is known: a curve
-# with thirty points takes six, one of seventeen pieces whose upper nine are unstable forty
+# points that are judged in addition, until the highest one that is not unstable is known: by
+# bisection a curve of thirty points takes six
 POINTS_JUDGED_IN_ADDITION = 40
 # with which points of one harmonic are judged
 JUDGED_HARMONICS = 7
@@ -47,9 +47,8 @@ JUDGED_SAMPLES = 128
 # a motion that Newton's method does not reach from the point is not looked for: one such search
 # cost twice the verdicts of a curve
 JUDGED_OPTIONS = replace(DEFAULT_OPTIONS, iterations=25, fallbacks=False)
-# harmonics and samples up to which an unstable motion is followed to be judged again: with seven,
-# waves of the shipped wedge under 290 N grow by 28 % a period that a march lets decay, and with
-# fifteen under 73 N by 26 %
+# harmonics and samples with which unstable motions are judged again, from poor to rich: with few
+# harmonics a motion may seem to grow by 28 % a period that a march lets decay
 CONFIRMING = ((15, 256), (31, 512))
 # of the amplitude: by which the motion with so many may differ to be the same one
 SAME_MOTION = 0.03
@@ -59,8 +58,7 @@ CONFIRMED_MOTIONS = 2
 CONFIRMING_OPERATIONS = 1e11
 # modes of marches and of verdicts on the highest motions, where the scene leaves their number to
 # the choice: ripples live in modes far above the excitation, of which the motion itself may need
-# none. On the shipped wedge under 73 N a wave of 151.8 um is stable with 10 modes; with 20 a ripple
-# near 5.5 kHz leaves 144.7 um of it
+# none
 MODES_IN_TIME = 20
 # harmonics with whose bodies a travelling wave is asked whether it repeats
 RING_HARMONICS = (7, 15, 31)

@@ -33,9 +33,9 @@ from .error_in_time import Marches, carried_motion
 from .kept_band import KeptBand, amplitudes_of_periods
 from .stability import model_in_time, settings_in_time
 
-# excitation over its own, and periods of it: of plane blades under 8 N, at eight frequencies from
-# 1025 to 1032 Hz, 2 and 4 times lead to the higher motion never, 8 times at one, 16 times at seven,
-# 32 times at six, and over 50 periods 16 and 32 times at four and three
+# Figures behind these limits: docs/verification.md, "Limits of marches and balances".
+# excitation over its own, and periods of it: weaker, stronger or longer drives lead to the higher
+# motion at fewer frequencies
 STRONG_DRIVE = 16.0
 DRIVEN_PERIODS = 25
 # share of the highest motion of a curve from which another is driven from, and how many of them,
@@ -45,25 +45,22 @@ MOST_FREQUENCIES = 8
 # periods marched at once, after which it is asked whether the blade is back on the motion known
 PERIODS_OF_LOOK = 150
 # what the blade does at first is its way down; after FEWEST_LOOKS it may be back. What is still
-# above it is marched to the end: bursts under 3 N die out only after a thousand periods, and under
-# 20 N at 1027 Hz, four points a seat, a band of 8.0 to 11.9 um has 8.1 to 11.7 um two looks later
-# and 9.1 to 9.6 um after ten
+# above it is marched to the end: bursts may die out only after a thousand periods
 FEWEST_LOOKS = 2
 MOST_LOOKS = 12
-# that count at the end. Under 2.547 N at 1130 Hz single looks have 5 to 15 um, without a period
+# that count at the end: without a period single looks have amplitudes three times apart
 COUNTED_LOOKS = 6
 # relative rise above what is known that is none
 NO_RISE = 0.02
 # step of the frequency uphill, over the half width of the resonance, and how many of them
 STEP_SHARE = 0.25
 MOST_STEPS = 10
-# what is given has to last these with short steps as well: in an explicit march of plane blades
-# under 20 N beats last with 500 steps a period that die out with 1000
+# what is given has to last these with short steps as well: beats may last with long ones that die
+# out with these
 FINE_INSTANTS = 1024
 FINE_LOOKS = 4
 # operations of all marches of a curve that end at once, some 7 s of plane blades with eight points
-# a seat. The shipped wedge would need more: on a coarse mesh of it, with 8 points a seat, 8 times
-# its excitation led to no other motion under 18, 36, 73 and 121 N at two to seven frequencies
+# a seat; the shipped wedge would need more
 MOST_OPERATIONS = 1.5e10
 
 
