@@ -231,14 +231,7 @@ def _split_bodies(
     source: str,
 ) -> Mesh:
     """Solid cells in bodies, in file order."""
-    used = set(np.unique(solids.block).tolist())
-    rows = {
-        _family_word(name): np.concatenate(
-            [np.flatnonzero((solids.block == b) & np.isin(solids.row, some)) for b, some in parts]
-        )
-        for name, parts in raw.groups.items()
-        if parts and all(b in used for b, _ in parts)
-    }
+    rows = _rows_of_groups(raw, solids)
     damper = np.unique(rows.get("damper", np.empty(0, dtype=int)))
     blade = np.setdiff1d(np.arange(len(solids.cells)), damper)
     if "blade" in rows and np.intersect1d(rows["blade"], damper).size:
@@ -269,6 +262,24 @@ def _split_bodies(
         numbers=padded_numbers(raw.numbers, len(solids.points)),
         whole={name: whole[name] for name in bodies if name in whole},
     )
+
+
+def _rows_of_groups(raw: RawMesh, solids: SolidCells) -> dict[str, IntegerArray]:
+    """Solid cells of each group, those of names that differ in case or blanks together; shells and
+    beams that a group holds besides them are left out.
+    """
+    used = set(np.unique(solids.block).tolist())
+    rows: dict[str, IntegerArray] = {}
+    for name, parts in raw.groups.items():
+        own = [
+            np.flatnonzero((solids.block == b) & np.isin(solids.row, some))
+            for b, some in parts
+            if b in used
+        ]
+        if own:
+            word = _family_word(name)
+            rows[word] = np.unique(np.concatenate([rows.get(word, own[0]), *own]))
+    return rows
 
 
 def _positive_cells(
@@ -325,19 +336,20 @@ def _with_faces(
         bodies={n: number[c] for n, c in mesh.bodies.items()},
         whole={n: np.where(c < 0, -1, number[c]) for n, c in mesh.whole.items()},
     )
-    sets = {
-        _family_word(name): number[nodes][number[nodes] >= 0]
-        for name, nodes in raw.node_sets.items()
-    }
+    sets: dict[str, IntegerArray] = {}
+    for name, nodes in raw.node_sets.items():
+        inside = number[nodes][number[nodes] >= 0]
+        word = _family_word(name)
+        sets[word] = np.union1d(sets[word], inside) if word in sets else inside
     faces = named_facets(cells, mesh.cell_type, _corners_of_faces(raw, mesh.dimension, number))
     skin = boundary_facets(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
     joined = {_family_word(name) for name in wanted}
     for name, nodes in sets.items():
         if name in faces and name not in joined:
             continue
-        inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
+        on_set = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
         # three corners of a quadrilateral are no face
-        held = without_halves(mesh, skin[inside])
+        held = without_halves(mesh, skin[on_set])
         if not len(held):
             continue
         faces[name] = np.vstack([faces[name], held]) if name in faces else held
@@ -368,9 +380,9 @@ def _corners_of_faces(
     for name, parts in raw.groups.items():
         words = [raw.blocks[b][0] for b, _ in parts]
         if words and all(DIMENSION[FAMILY[word]] == dimension - 1 for word in words):
-            corners[_family_word(name)] = [
+            corners.setdefault(_family_word(name), []).extend(
                 raw.blocks[b][1][rows][:, : CORNERS[FAMILY[raw.blocks[b][0]]]] for b, rows in parts
-            ]
+            )
     for name, surface in raw.surfaces.items():
         if surface:
             corners.setdefault(_family_word(name), []).extend(surface)
