@@ -461,8 +461,27 @@ def _matched_contact(
     except InputError as error:
         if sectors and _faces_look(mesh, names, rotation, shift):
             return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
-        hint = "" if sectors else "; on a wheel, imported.sectors must be given"
+        hint = _side_hint(mesh, names, rotation, sectors)
         raise InputError(f"{error}{hint}") from None
+
+
+def _side_hint(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, sectors: int) -> str:
+    """What to change where the flank lies one sector before its seat, as in a mirrored model."""
+    if not sectors:
+        return "; on a wheel, imported.sectors must be given"
+    seat, flank = (mesh.points[np.unique(mesh.faces[name])].mean(axis=0) for name in names)
+    back = turn_about_axis(-2 * np.pi / sectors)
+    if np.linalg.norm(back @ seat - flank) > _measure_face(mesh, names[0])[0]:
+        return ""
+    if np.array_equal(rotation, np.eye(3)):
+        return (
+            f"; the damper is the one on the other side of the blade: expected it turned by "
+            f"{360 / sectors:.6g} deg about imported.axis, between {names[0]} and the next blade"
+        )
+    return (
+        "; blades follow each other the other way round about imported.axis: expected the axis in "
+        "the opposite direction, about which the next blade is on the side of seat_right"
+    )
 
 
 def _faces_look(

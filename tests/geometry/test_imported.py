@@ -281,6 +281,35 @@ def test_groups_whose_names_differ_in_case_alone_are_one():
     assert len(mesh_of_raw(damper, 1.0, 0, (0, 0, 1), "two.inp").bodies["damper"]) == 1
 
 
+def test_a_mirrored_sector_says_what_to_change(coarse_sector, tmp_path):
+    """With the names as they were the next blade is on the other side, with names that fit the
+    mirrored sides the damper is; both remedies give all pairs.
+    """
+    mirrored = replace(coarse_sector, points=coarse_sector.points * [1, -1, 1])
+    write_inp(mirrored, tmp_path / "a.inp")
+    with pytest.raises(InputError, match="expected the axis in the opposite direction"):
+        read_mesh(tmp_path / "a.inp", sectors=36)
+    pairs = read_mesh(tmp_path / "a.inp", sectors=36, axis=(0, 0, -1)).pairs
+    assert {n: p.nodes.shape for n, p in pairs.items()} == {
+        n: p.nodes.shape for n, p in coarse_sector.pairs.items()
+    }
+    side = {"left": "right", "right": "left"}
+    faces = {
+        f"{part}_{side[word]}" if word in side else name: face
+        for name, face in mirrored.faces.items()
+        for part, _, word in [name.rpartition("_")]
+    }
+    write_inp(replace(mirrored, faces=faces), tmp_path / "b.inp")
+    with pytest.raises(InputError, match="turned by 10 deg about imported.axis, between seat_righ"):
+        read_mesh(tmp_path / "b.inp", sectors=36)
+    points = mirrored.points.copy()
+    damper = np.unique(mirrored.bodies["damper"])
+    points[damper] = points[damper] @ turn_about_axis(np.radians(10)).T
+    write_inp(replace(mirrored, faces=faces, points=points), tmp_path / "c.inp")
+    found = read_mesh(tmp_path / "c.inp", sectors=36).pairs
+    assert found["this"].nodes.size and found["next"].nodes.size
+
+
 def test_groups_of_one_name_in_a_gmsh_file(tmp_path):
     """Two of one dimension are one; a face keeps its name beside the body of the same."""
     with gmsh_session() as gmsh:
