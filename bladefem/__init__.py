@@ -7,11 +7,14 @@ cheap.
 
 from __future__ import annotations
 
+from .util.cache_folder import provide_cache_folder
 from .util.lazy import lazy_getattr
 from .util.processor import use_wide_registers
 
 # before NumPy is loaded
 use_wide_registers()
+# before numba and dolfinx are loaded
+provide_cache_folder()
 
 __version__ = "0.1.0"
 

@@ -231,14 +231,7 @@ def _split_bodies(
     source: str,
 ) -> Mesh:
     """Solid cells in bodies, in file order."""
-    used = set(np.unique(solids.block).tolist())
-    rows = {
-        _family_word(name): np.concatenate(
-            [np.flatnonzero((solids.block == b) & np.isin(solids.row, some)) for b, some in parts]
-        )
-        for name, parts in raw.groups.items()
-        if parts and all(b in used for b, _ in parts)
-    }
+    rows = _rows_of_groups(raw, solids)
     damper = np.unique(rows.get("damper", np.empty(0, dtype=int)))
     blade = np.setdiff1d(np.arange(len(solids.cells)), damper)
     if "blade" in rows and np.intersect1d(rows["blade"], damper).size:
@@ -269,6 +262,24 @@ def _split_bodies(
         numbers=padded_numbers(raw.numbers, len(solids.points)),
         whole={name: whole[name] for name in bodies if name in whole},
     )
+
+
+def _rows_of_groups(raw: RawMesh, solids: SolidCells) -> dict[str, IntegerArray]:
+    """Solid cells of each group, those of names that differ in case or blanks together; shells and
+    beams that a group holds besides them are left out.
+    """
+    used = set(np.unique(solids.block).tolist())
+    rows: dict[str, IntegerArray] = {}
+    for name, parts in raw.groups.items():
+        own = [
+            np.flatnonzero((solids.block == b) & np.isin(solids.row, some))
+            for b, some in parts
+            if b in used
+        ]
+        if own:
+            word = _family_word(name)
+            rows[word] = np.unique(np.concatenate([rows.get(word, own[0]), *own]))
+    return rows
 
 
 def _positive_cells(
@@ -325,19 +336,20 @@ def _with_faces(
         bodies={n: number[c] for n, c in mesh.bodies.items()},
         whole={n: np.where(c < 0, -1, number[c]) for n, c in mesh.whole.items()},
     )
-    sets = {
-        _family_word(name): number[nodes][number[nodes] >= 0]
-        for name, nodes in raw.node_sets.items()
-    }
+    sets: dict[str, IntegerArray] = {}
+    for name, nodes in raw.node_sets.items():
+        inside = number[nodes][number[nodes] >= 0]
+        word = _family_word(name)
+        sets[word] = np.union1d(sets[word], inside) if word in sets else inside
     faces = named_facets(cells, mesh.cell_type, _corners_of_faces(raw, mesh.dimension, number))
     skin = boundary_facets(cells, mesh.cell_type) if sets else np.empty((0, 0), int)
     joined = {_family_word(name) for name in wanted}
     for name, nodes in sets.items():
         if name in faces and name not in joined:
             continue
-        inside = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
+        on_set = np.isin(skin, nodes)[:, : _facet_corners(mesh.cell_type)].all(axis=1)
         # three corners of a quadrilateral are no face
-        held = without_halves(mesh, skin[inside])
+        held = without_halves(mesh, skin[on_set])
         if not len(held):
             continue
         faces[name] = np.vstack([faces[name], held]) if name in faces else held
@@ -368,9 +380,9 @@ def _corners_of_faces(
     for name, parts in raw.groups.items():
         words = [raw.blocks[b][0] for b, _ in parts]
         if words and all(DIMENSION[FAMILY[word]] == dimension - 1 for word in words):
-            corners[_family_word(name)] = [
+            corners.setdefault(_family_word(name), []).extend(
                 raw.blocks[b][1][rows][:, : CORNERS[FAMILY[raw.blocks[b][0]]]] for b, rows in parts
-            ]
+            )
     for name, surface in raw.surfaces.items():
         if surface:
             corners.setdefault(_family_word(name), []).extend(surface)
@@ -449,8 +461,27 @@ def _matched_contact(
     except InputError as error:
         if sectors and _faces_look(mesh, names, rotation, shift):
             return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
-        hint = "" if sectors else "; on a wheel, imported.sectors must be given"
+        hint = _side_hint(mesh, names, rotation, sectors)
         raise InputError(f"{error}{hint}") from None
+
+
+def _side_hint(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, sectors: int) -> str:
+    """What to change where the flank lies one sector before its seat, as in a mirrored model."""
+    if not sectors:
+        return "; on a wheel, imported.sectors must be given"
+    seat, flank = (mesh.points[np.unique(mesh.faces[name])].mean(axis=0) for name in names)
+    back = turn_about_axis(-2 * np.pi / sectors)
+    if np.linalg.norm(back @ seat - flank) > _measure_face(mesh, names[0])[0]:
+        return ""
+    if np.array_equal(rotation, np.eye(3)):
+        return (
+            f"; the damper is the one on the other side of the blade: expected it turned by "
+            f"{360 / sectors:.6g} deg about imported.axis, between {names[0]} and the next blade"
+        )
+    return (
+        "; blades follow each other the other way round about imported.axis: expected the axis in "
+        "the opposite direction, about which the next blade is on the side of seat_right"
+    )
 
 
 def _faces_look(

@@ -133,23 +133,39 @@ def from_gmsh_model(gmsh: ModuleType) -> RawMesh:
             if dim and word in NODES:
                 of_entity.setdefault((dim, entity), []).append(len(blocks))
                 blocks.append((word, place[nodes.astype(int)].reshape(-1, NODES[word])))
-    groups = {}
-    sets = {}
+    of_dimension: list[dict[str, list[int]]] = [{}, {}, {}, {}]
+    sets: dict[str, np.ndarray] = {}
     for dim, tag in gmsh.model.getPhysicalGroups():
         name = (
             gmsh.model.getPhysicalName(dim, tag)
             or f"{'point curve surface volume'.split()[dim]}_{tag}"
         )
         if dim == 0:
-            sets[name] = place[gmsh.model.mesh.getNodesForPhysicalGroup(0, tag)[0].astype(int)]
+            nodes = place[gmsh.model.mesh.getNodesForPhysicalGroup(0, tag)[0].astype(int)]
+            sets[name] = np.union1d(sets.get(name, nodes), nodes)
             continue
-        parts = [
+        # several groups of one dimension may have one name
+        of_dimension[dim].setdefault(name, []).extend(
             b
             for e in gmsh.model.getEntitiesForPhysicalGroup(dim, tag)
             for b in of_entity.get((dim, int(e)), [])
-        ]
-        groups[name] = [(b, np.arange(len(blocks[b][1]))) for b in parts]
-    return RawMesh(xyz.reshape(-1, 3), blocks, groups, sets, numbers=tags.astype(int))
+        )
+    groups: dict[str, list[tuple[int, np.ndarray]]] = {}
+    surfaces: dict[str, list[np.ndarray]] = {}
+    top = max((dim for dim, names in enumerate(of_dimension) if names), default=0)
+    for dim in range(top, 0, -1):
+        for name, parts in of_dimension[dim].items():
+            if name in groups and dim == top - 1:
+                # a face that is called as its body
+                surfaces[name] = [_corners(*blocks[b]) for b in parts]
+            elif name not in groups:
+                groups[name] = [(b, np.arange(len(blocks[b][1]))) for b in parts]
+    return RawMesh(xyz.reshape(-1, 3), blocks, groups, sets, surfaces, numbers=tags.astype(int))
+
+
+def _corners(word: str, cells: np.ndarray) -> np.ndarray:
+    """(nc, k) corner nodes of cells."""
+    return cells[:, : CORNERS[FAMILY[word]]]
 
 
 def read_by_meshio(file: Path) -> RawMesh:

@@ -82,11 +82,13 @@ def _join_parts(
     groups: Mapping[str, list[Part]], wanted: Mapping[str, list[str]]
 ) -> dict[str, list[Part]]:
     """Parts of the old names under the new ones, as far as this kind of group has them."""
-    known = {name.lower(): name for name in groups}
-    taken = {known[old.lower()] for olds in wanted.values() for old in olds if old.lower() in known}
+    known: dict[str, list[Part]] = {}
+    for name, parts in groups.items():
+        known.setdefault(name.lower(), []).extend(parts)
+    taken = {old.lower() for olds in wanted.values() for old in olds}
     joined = {
-        new: [part for old in olds if old.lower() in known for part in groups[known[old.lower()]]]
+        new: [part for old in olds for part in known.get(old.lower(), [])]
         for new, olds in wanted.items()
     }
-    kept = {name: list(parts) for name, parts in groups.items() if name not in taken}
+    kept = {name: list(parts) for name, parts in groups.items() if name.lower() not in taken}
     return kept | {new: parts for new, parts in joined.items() if parts}

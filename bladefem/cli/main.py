@@ -10,6 +10,7 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
+from io import TextIOWrapper
 
 from ..util.communicator import Communicator
 from . import backbone, commands, ranks, scatter, study
@@ -111,6 +112,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code; messages go to the error stream of rank 0."""
     # more BLAS threads only get in each other's way
     os.environ.setdefault("OMP_NUM_THREADS", "1")
+    _replace_unknown_letters()
     words = list(sys.argv[1:] if arguments is None else arguments)
     # what follows -- is for PETSc, and part of the scene: stored stages know of it
     cut = words.index("--") if "--" in words else len(words)
@@ -126,6 +128,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options.function(options, comm)
 
     return ranks.exit_code_of(command, options)
+
+
+def _replace_unknown_letters() -> None:
+    """Print "?" for letters that the terminal's encoding does not have, as ± and ∞ in Latin 1; the
+    summary of a run would end in a traceback.
+    """
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="replace")
 
 
 def parser() -> argparse.ArgumentParser:

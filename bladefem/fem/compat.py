@@ -9,6 +9,7 @@ from doing so here.
 from __future__ import annotations
 
 import ctypes
+import locale
 import logging
 import sys
 import time
@@ -102,6 +103,22 @@ def no_error_messages() -> Iterator[None]:
         PETSc.Sys.popErrorHandler()
 
 
+@contextmanager
+def decimal_points() -> Iterator[None]:
+    """Numbers are printed with points meanwhile: SCOTCH prints its own and reads them again, and
+    fails where the caller's locale has decimal commas.
+    """
+    if locale.localeconv()["decimal_point"] == ".":
+        yield
+        return
+    before = locale.setlocale(locale.LC_NUMERIC)
+    locale.setlocale(locale.LC_NUMERIC, "C")
+    try:
+        yield
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, before)
+
+
 # meshes of one rank, and on the communicator of each a vector that keeps PETSc's copy of it
 _guards: list[tuple[weakref.ref[Any], PETSc.Vec]] = []
 
@@ -133,13 +150,15 @@ def build_mesh(
         domain = ufl.Mesh(
             ufl.VectorElement("Lagrange", ufl.Cell(shape, geometric_dimension=gdim), degree)
         )
-        mesh = dolfinx.mesh.create_mesh(comm, mine, x, domain, **how)
+        with decimal_points():
+            mesh = dolfinx.mesh.create_mesh(comm, mine, x, domain, **how)
     else:
         import basix.ufl
 
         domain = ufl.Mesh(basix.ufl.element("Lagrange", shape, degree, shape=(gdim,)))
         x = np.ascontiguousarray(x)
-        mesh = dolfinx.mesh.create_mesh(comm, cells=mine, x=x, e=domain, **how)
+        with decimal_points():
+            mesh = dolfinx.mesh.create_mesh(comm, cells=mine, x=x, e=domain, **how)
     if comm.size == 1:
         _guards.append((weakref.ref(mesh), PETSc.Vec().createMPI(1, comm=mesh.comm)))
     return mesh, np.asarray(mesh.topology.original_cell_index)

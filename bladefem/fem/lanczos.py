@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.linalg import eigh
 
-from ..errors import NotSolvedError
+from ..errors import InputError, NotSolvedError
 from .compat import MPI
 from .constraint import Constrained
 from .linalg import apply_block, inner_products, linear_combinations, recombine, subtract_product
@@ -74,7 +74,8 @@ def lowest_eigenpairs(
         vectors.
 
     Raises:
-        NotSolvedError: fewer than ``count`` pairs exist, or the iteration does not converge.
+        InputError: fewer than ``count`` pairs exist.
+        NotSolvedError: the iteration does not converge.
     """
     space = _Space()
     block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
@@ -92,7 +93,10 @@ def lowest_eigenpairs(
         rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
         if not len(rest) and k < count:
-            raise NotSolvedError(f"{count} elastic modes were asked of a body that has {k}")
+            raise InputError(
+                f"{count} elastic modes were asked of a body that has {k}: expected fewer modes, "
+                "or a mesh with more degrees of freedom"
+            )
         if (k >= count and error < tolerance) or not len(rest):
             # of no more use where memory is at its peak
             del block, Mblock

@@ -65,7 +65,7 @@ def modes(
         prove: count the eigenvalues by the inertia of one more factorisation.
 
     Raises:
-        InputError: count is not positive.
+        InputError: count is not positive, or more than the body has.
         NotSolvedError: no convergence; a mode that stays lost.
     """
     if count < 1:
@@ -221,7 +221,8 @@ def elastic_pairs(
         guard: pairs beyond count, as far as they have come.
 
     Raises:
-        NotSolvedError: there are fewer, or no convergence.
+        InputError: there are fewer.
+        NotSolvedError: no convergence.
     """
     inverse = inverse or (lambda B: compliance(flex, B))
     few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(count)

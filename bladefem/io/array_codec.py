@@ -16,6 +16,8 @@ from zipfile import BadZipFile, ZipFile
 import numpy as np
 from numpy.lib.format import write_array
 
+from ..util.message import Message
+
 _HOMES = ("bladefem", "geometry")
 
 
@@ -68,6 +70,9 @@ def tree_of(value: Any) -> tuple[str, list[np.ndarray]]:
 
 
 def _encode(value: Any, arrays: list[np.ndarray]) -> Any:
+    # a text with a level, which as a plain one would come back as information
+    if isinstance(value, Message):
+        return {"w": [str(value), value.level]}
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, float):
@@ -135,6 +140,7 @@ _DECODERS = {
     "a": lambda body, arrays: arrays[body],
     "p": lambda body, arrays: _sparse(tuple(body[0]), *(arrays[part["a"]] for part in body[1:])),
     "s": lambda body, _: slice(*body),
+    "w": lambda body, _: Message(*body),
     "m": lambda body, arrays: {_decode(k, arrays): _decode(v, arrays) for k, v in body},
     "l": lambda body, arrays: [_decode(v, arrays) for v in body],
     "t": lambda body, arrays: tuple(_decode(v, arrays) for v in body),

@@ -11,7 +11,7 @@ import pandas as pd
 
 from ..scene.units import newtons, parse, plain_number, readable_units, show
 from ..study.contact_identification import ContactFit
-from ..study.fit_intervals import UNKNOWN_LOG_HALF_WIDTH
+from ..study.fit_intervals import UNKNOWN_LOG_HALF_WIDTH, Product
 from ..study.fit_truncation import LeftOut
 from ..study.measured_models import FEWEST_HARMONICS
 from ..study.measured_responses import LARGEST_AMPLITUDE, FittedField, FittedScene
@@ -141,6 +141,7 @@ def fit_sentences(found: FittedScene) -> list[str]:
         *_more_than_the_scene(found),
         _known_sentence(fit),
         *_absolute_sentences(found),
+        *_product_sentences(found),
     ]
     if found.scene_values:
         rows = (f"{name} = {_value(name, value)}" for name, value in found.scene_values.items())
@@ -191,6 +192,35 @@ def _absolute_sentences(found: FittedScene) -> list[str]:
         for one in found.absolute_values
         if fit.knowledge.known[one.parameter]
     ]
+
+
+def _product_sentences(found: FittedScene) -> list[str]:
+    """What is known of two parameters that are not known apart."""
+    return [
+        f"{one.names[0]} times {one.names[1]} is known: {value}, 95 % interval {interval}; "
+        f"{one.names[0]} follows from a {NAMES[one.names[1]]} that is known, and the other way "
+        "round"
+        for one in found.fit.knowledge.products
+        for value, interval in [_product_words(found, one)]
+    ]
+
+
+def _product_words(found: FittedScene, one: Product) -> tuple[str, str]:
+    """Value and interval of a product: of friction coefficient and normal load in newtons where
+    there is one of each, else as factors on the scene's.
+    """
+    fit = found.fit
+    numbers = [fit.names.index(name) for name in one.names]
+    factor = float(np.prod(fit.factors[numbers]))
+    values = [[a for a in found.absolute_values if a.parameter == n] for n in numbers]
+    digits = int(np.clip(np.ceil(-np.log10(max(one.half, 1e-12))) + 1, FEWEST_DIGITS, MOST_DIGITS))
+    ends = np.exp([-one.half, one.half])
+    if set(one.names) == {"mu", "load"} and all(len(some) == 1 for some in values):
+        force = values[0][0].value * values[1][0].value
+        low, high = force * ends
+        return f"{plain_number(force, digits)} N", f"{low:.3g} to {high:.3g} N"
+    low, high = factor * ends
+    return f"{plain_number(factor, digits)} times the scene's", f"{low:.3g} to {high:.3g}"
 
 
 def _field_name(one: FittedField) -> str:
@@ -247,6 +277,10 @@ def fit_headlines(found: FittedScene) -> list[Headline]:
             )
             for one in values
         ]
+    for product in fit.knowledge.products:
+        value, interval = _product_words(found, product)
+        name = " times ".join(NAMES[part] for part in product.names)
+        numbers.append(Headline(name, value, f"95 % interval {interval}", ""))
     return numbers
 
 

@@ -202,12 +202,11 @@ def fit_contact(
     if richer is None:
         richer = richer_balances([level.model for level in levels], H, samples)
     left = tuple(_left_out(fit, end, one, SMALL_SHIFT * known.half) for one in richer)
-    shifts = [abs(one.shift) for one in left if one.widens]
-    together = np.sum([np.zeros(len(chosen)), *shifts], axis=0)
+    shifts = [one.shift for one in left if one.widens]
     return ContactFit(
         chosen,
         np.exp(end.x),
-        known.widened(together, chosen),
+        known.widened(np.reshape(shifts, (-1, len(chosen))), chosen),
         float(np.sqrt(np.mean(end.fun**2))),
         fit.amplitudes(begun),
         fitted,

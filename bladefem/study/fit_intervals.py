@@ -28,6 +28,15 @@ PART_OF_DIRECTION = 0.3
 
 
 @dataclass(frozen=True)
+class Product:
+    """Of two parameters that the data do not tell apart their product, which they determine."""
+
+    names: tuple[str, str]
+    # half width of the 95 % interval of its logarithm
+    half: float
+
+
+@dataclass(frozen=True)
 class Knowledge:
     """What a fit is worth, of p parameters."""
 
@@ -39,6 +48,8 @@ class Knowledge:
     intervals: RealArray
     # parameters that the data leave open, alone or together
     open: list[tuple[str, ...]]
+    # determined within a factor of two, of two open parameters
+    products: tuple[Product, ...] = ()
 
     @property
     def known(self) -> BooleanArray:
@@ -46,18 +57,24 @@ class Knowledge:
         low, high = self.intervals.T
         return (self.half < UNKNOWN_LOG_HALF_WIDTH) & (low > 0) & np.isfinite(high)
 
-    def widened(self, by: RealArray, names: Sequence[str]) -> Knowledge:
-        """With an error of the model that all readings share.
+    def widened(self, shifts: RealArray, names: Sequence[str]) -> Knowledge:
+        """With errors of the model that all readings share.
 
         Args:
-            by: (p,) shifts of the logarithms, not negative.
+            shifts: (k, p) of the logarithms by each of k errors.
             names: of the parameters.
         """
+        by = abs(shifts).sum(axis=0)
         half = np.minimum(self.half + by, MAX_LOG_HALF_WIDTH)
         ends = self.intervals * np.exp(np.outer(np.minimum(by, MAX_LOG_HALF_WIDTH), SIDES))
         # beyond what is told nothing is known on either side
         ends[half >= MAX_LOG_HALF_WIDTH] = 0.0, np.inf
-        wide = replace(self, half=half, intervals=ends)
+        products = (
+            replace(one, half=one.half + float(abs(shifts @ _both(one.names, names)).sum()))
+            for one in self.products
+        )
+        known = tuple(one for one in products if one.half < UNKNOWN_LOG_HALF_WIDTH)
+        wide = replace(self, half=half, intervals=ends, products=known)
         named = {name for one in self.open for name in one}
         lost = [n for n, k in zip(names, wide.known, strict=True) if not k and n not in named]
         return replace(wide, open=[*self.open, *((name,) for name in lost)])
@@ -105,7 +122,32 @@ def what_is_known(
             if not any(name in one for one in found):
                 found.append((name,))
             ends[i] = np.exp(x[i] + np.array([_reach(partial(seen, i), sign) for sign in SIDES]))
-    return Knowledge(half, ends, found)
+    return Knowledge(half, ends, found, _known_products(J, deviations, names, found))
+
+
+def _both(pair: tuple[str, str], names: Sequence[str]) -> RealArray:
+    """(p,) one at the two parameters whose logarithms add, else zero."""
+    return np.array([float(name in pair) for name in names])
+
+
+def _known_products(
+    J: np.ndarray,
+    misfit: np.ndarray,
+    names: Sequence[str],
+    open_ones: Sequence[tuple[str, ...]],
+) -> tuple[Product, ...]:
+    """The products of pairs of open parameters that the data determine within a factor of two."""
+    sizes, V = _directions(J)
+    if not sizes.max() > 0:
+        return ()
+    slope = V / np.maximum(sizes, BLIND_SHARE * sizes.max())
+    found = []
+    for one in open_ones:
+        if len(one) == 2:
+            pair = (one[0], one[1])
+            deviation = float(np.linalg.norm(_both(pair, names) @ slope))
+            found.append(Product(pair, _quantile(J, misfit) * deviation))
+    return tuple(one for one in found if one.half < UNKNOWN_LOG_HALF_WIDTH)
 
 
 def _reach(seen: Callable[[float], bool], sign: float) -> float:

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -165,6 +166,15 @@ def test_check_prints_every_field_and_marks_what_was_given(capsys):
         " * " not in rows["aerofoil.sweep"]
         and "largest thickness" in rows["aerofoil.thickness_tip"]
     )
+
+
+def test_letters_that_a_terminal_does_not_have_are_no_error(monkeypatch):
+    """The summary of a run has ± and ∞, of which Latin 1 has one."""
+    written = BytesIO()
+    monkeypatch.setattr(sys, "stdout", TextIOWrapper(written, encoding="latin-1"))
+    assert main(["check", str(SCENES / "plane.toml"), "--set", "title=± ∞"]) == 0
+    sys.stdout.flush()
+    assert "± ?" in written.getvalue().decode("latin-1")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ import ctypes
 import gc
 import logging
 import os
+import shutil
 import subprocess
 import sys
 
@@ -91,3 +92,19 @@ def test_matrices_that_are_dropped_are_freed():
     for _ in range(4):
         assemble(mesh, "blade", Material(), compat.MPI.COMM_SELF)
     assert kept_memory() - before < 1.5 * size
+
+
+def test_decimal_commas_of_the_callers_locale(tmp_path):
+    """SCOTCH ends with an error where numbers are printed with commas."""
+    made = tmp_path / "de_DE.UTF-8"
+    define = shutil.which("localedef")
+    if not define or subprocess.run([define, "-i", "de_DE", "-f", "UTF-8", made]).returncode:
+        pytest.skip("no German locale can be made here")
+    code = (
+        "import locale; locale.setlocale(locale.LC_ALL, 'de_DE.UTF-8');"
+        "import numpy as np; from bladefem.fem.compat import MPI, build_mesh;"
+        "build_mesh(MPI.COMM_SELF, 'triangle', np.array([[0, 1, 2]]), np.eye(3)[:, :2]);"
+        "assert locale.localeconv()['decimal_point'] == ','"
+    )
+    environment = {**os.environ, "LOCPATH": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", code], env=environment, check=True, timeout=120)

@@ -152,6 +152,47 @@ def test_estimate_of_a_rotating_blade():
     assert frequency_errors(body, coarse)[0] > 20 * true[0]
 
 
+def test_energies_between_modes_tell_how_responses_change():
+    """Heights of four resonances of a tapered, twisted blade, at its tip across the force, against
+    a mesh twice as fine: +1.9, -3.1, +11 and -51 %. The energies between the modes, which turn
+    their shapes, give the signs and sizes (+2.7, -2.0, +14 and -68 %); those of each mode alone do
+    not (+3.3, +3.3, +11 and +15 %).
+    """
+    size, turn = (0.12, 0.02, 0.008), 0.8
+
+    def bend(x):
+        angle, width = turn * x[:, 0] / size[0], 1 - 0.35 * x[:, 0] / size[0]
+        cos, sin = width * np.cos(angle), width * np.sin(angle)
+        across, along = x[:, 1] * cos - x[:, 2] * sin, x[:, 1] * sin + x[:, 2] * cos
+        return np.stack([x[:, 0], across, along], 1)
+
+    def solved(divisions):
+        origin = (0, -size[1] / 2, -size[2] / 2)
+        body = body_of(box(divisions, size, "hexahedron27", origin=origin, map=bend))
+        found = modes(constrain(body, "x0"), 8)
+        at = np.unique(body.mesh.faces["x1"])
+        tip = at[(body.mesh.points[at] @ [0, 1, 1.1]).argmax()]
+        seen = found.shapes[:, tip] @ np.array([[0, 1, 0.6], [0, 0.2, 1]]).T
+        return body, found, (2 * np.pi * found.frequencies) ** 2, seen
+
+    def heights(squares, seen):
+        damping = 0.002
+        near = np.sqrt(squares[:4, None]) * (1 + damping * np.linspace(-3, 3, 301))
+        below = squares - near[..., None] ** 2 + 2j * damping * np.sqrt(squares) * near[..., None]
+        return abs((seen.prod(axis=1) / below).sum(axis=2)).max(axis=1)
+
+    body, found, squares, seen = solved((4, 1, 1))
+    energies = stiffness_error(body, found.shapes, squares)
+    softer, vectors = np.linalg.eigh(np.diag(squares) - energies)
+    before = heights(squares, seen)
+    told = heights(softer, vectors.T @ seen) / before - 1
+    alone = heights(squares - energies.diagonal(), seen) / before - 1
+    _, _, fine, fine_seen = solved((8, 2, 2))
+    true = heights(fine, fine_seen) / before - 1
+    assert ((told / true > 0.5) & (told / true < 2)).all()
+    assert (alone / true)[[1, 3]].max() < 0
+
+
 def test_forms_of_complex_waves():
     """Hermitian, not below zero, and turned with the modes."""
     body = body_of(sector(9, (3, 2, 1)))

@@ -24,11 +24,13 @@ from bladefem.scene.tables import Material, Materials
 from bladefem.study.pipeline import pipeline
 from geometry.export import write_msh
 from geometry.face_distance import distance_to_face
-from geometry.imported import read_mesh
+from geometry.imported import mesh_of_raw, read_mesh
 from geometry.look import look_at, starting_scene
 from geometry.parameters import Aerofoil, Disc, MeshSize, Plane, Platform, Shank, Wedge
 from geometry.plane import plane_blades
 from geometry.profile import turn_about_axis
+from geometry.raw_mesh import RawMesh, from_gmsh_model
+from geometry.renaming import renamed_raw
 from geometry.sector import wedge_sector
 from geometry.session import gmsh_session
 from geometry.step_file import read_step, step_face_names
@@ -255,6 +257,76 @@ def test_groups_get_the_users_names(coarse_sector, tmp_path):
         read_step(tmp_path / "a.step", size, names=["clamp = face_9"])
     with pytest.raises(InputError, match='expected "new = old"'):
         read_mesh(tmp_path / "a.msh", sectors=36, names=["foot"])
+
+
+def test_groups_whose_names_differ_in_case_alone_are_one():
+    """Shells that a group has besides its cells do not take these away."""
+    points = np.array([[x, y, z] for z in (0, 1, 2) for x, y in ((0, 0), (1, 0), (1, 1), (0, 1))])
+    cells = np.array([[0, 1, 2, 3, 4, 5, 6, 7], [4, 5, 6, 7, 8, 9, 10, 11]])
+    skin = np.array([[0, 1, 2, 3], [8, 9, 10, 11]])
+    one, two = np.array([0]), np.array([1])
+    raw = RawMesh(
+        0.1 * points,
+        [("hexahedron", cells), ("quad", skin)],
+        {"Fan": [(0, one)], "FAN": [(0, two), (1, one)], "Ends": [(1, one)], "ends": [(1, two)]},
+        {"foot": np.array([0, 1]), "Foot": np.array([2, 3])},
+    )
+    mesh = mesh_of_raw(raw, 1.0, 0, (0, 0, 1), "two.inp")
+    assert len(mesh.parts["fan"]) == 2
+    assert len(mesh.faces["ends"]) == 2
+    assert list(mesh.nodes["foot"]) == [0, 1, 2, 3]
+    renamed = renamed_raw(raw, {"disc": ["fan"]})
+    assert sum(len(rows) for b, rows in renamed.groups["disc"] if b == 0) == 2
+    damper = replace(raw, groups={"Damper": [(0, one), (1, one)]})
+    assert len(mesh_of_raw(damper, 1.0, 0, (0, 0, 1), "two.inp").bodies["damper"]) == 1
+
+
+def test_a_mirrored_sector_says_what_to_change(coarse_sector, tmp_path):
+    """With the names as they were the next blade is on the other side, with names that fit the
+    mirrored sides the damper is; both remedies give all pairs.
+    """
+    mirrored = replace(coarse_sector, points=coarse_sector.points * [1, -1, 1])
+    write_inp(mirrored, tmp_path / "a.inp")
+    with pytest.raises(InputError, match="expected the axis in the opposite direction"):
+        read_mesh(tmp_path / "a.inp", sectors=36)
+    pairs = read_mesh(tmp_path / "a.inp", sectors=36, axis=(0, 0, -1)).pairs
+    assert {n: p.nodes.shape for n, p in pairs.items()} == {
+        n: p.nodes.shape for n, p in coarse_sector.pairs.items()
+    }
+    side = {"left": "right", "right": "left"}
+    faces = {
+        f"{part}_{side[word]}" if word in side else name: face
+        for name, face in mirrored.faces.items()
+        for part, _, word in [name.rpartition("_")]
+    }
+    write_inp(replace(mirrored, faces=faces), tmp_path / "b.inp")
+    with pytest.raises(InputError, match="turned by 10 deg about imported.axis, between seat_righ"):
+        read_mesh(tmp_path / "b.inp", sectors=36)
+    points = mirrored.points.copy()
+    damper = np.unique(mirrored.bodies["damper"])
+    points[damper] = points[damper] @ turn_about_axis(np.radians(10)).T
+    write_inp(replace(mirrored, faces=faces, points=points), tmp_path / "c.inp")
+    found = read_mesh(tmp_path / "c.inp", sectors=36).pairs
+    assert found["this"].nodes.size and found["next"].nodes.size
+
+
+def test_groups_of_one_name_in_a_gmsh_file(tmp_path):
+    """Two of one dimension are one; a face keeps its name beside the body of the same."""
+    with gmsh_session() as gmsh:
+        boxes = [gmsh.model.occ.addBox(0, 0, z, 0.1, 0.1, 0.1) for z in (0.0, 0.2)]
+        gmsh.model.occ.synchronize()
+        for tag, volume in enumerate(boxes, 1):
+            gmsh.model.addPhysicalGroup(3, [volume], tag)
+            gmsh.model.setPhysicalName(3, tag, "damper" if tag == 2 else "blade")
+        face = gmsh.model.getBoundary([(3, boxes[1])], oriented=False)[0][1]
+        gmsh.model.addPhysicalGroup(2, [face], 1)
+        gmsh.model.setPhysicalName(2, 1, "damper")
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 0.1)
+        gmsh.option.setNumber("Mesh.ElementOrder", 2)
+        gmsh.model.mesh.generate(3)
+        raw = from_gmsh_model(gmsh)
+    mesh = mesh_of_raw(raw, 1.0, 0, (0, 0, 1), "a.msh")
+    assert len(mesh.bodies["damper"]) and len(mesh.faces["damper"]) > 1
 
 
 def test_a_file_in_millimetres_is_not_taken_for_metres(coarse_sector, tmp_path):

@@ -16,6 +16,7 @@ from bladefem.errors import InputError
 from bladefem.io.array_codec import read_npz, write_npz
 from bladefem.io.stage_cache import cached_stage, code_of, key_of, open_folder, write_atomically
 from bladefem.scene.tables import Scene
+from bladefem.util.message import by_level, warning
 from geometry.mesh import Mesh, Pair, Sector
 
 RNG = np.random.default_rng(1)
@@ -89,6 +90,12 @@ def assert_same(a, b):
 def test_nouns_come_back_bit_by_bit(noun, tmp_path):
     write_npz(tmp_path / "x.npz", "key", noun)
     assert_same(noun, read_npz(tmp_path / "x.npz", "key"))
+
+
+def test_a_stored_warning_stays_a_warning(tmp_path):
+    write_npz(tmp_path / "x.npz", "key", [warning("coarse"), "plain"])
+    back = read_npz(tmp_path / "x.npz", "key")
+    assert by_level(back) == by_level([warning("coarse"), "plain"])
 
 
 def test_sparse_matrices_come_back(tmp_path):

@@ -90,6 +90,18 @@ def test_standing_waves_have_coriolis_forces(wheel):
         assert max(off) < 0.1 * shift.max()
 
 
+def test_no_order_crosses_rigid_motions():
+    """A free wheel turns and slides along its axis without force at any speed; small matrices gave
+    these motions up to 0.01 Hz, which orders met at 0.003 rad/s.
+    """
+    free = bodies(count=6, divisions=(1, 1, 1), inner=0.24, bump=0.0)
+    scene = replace(free.scene, support=replace(free.scene.support, clamp=""))
+    found = campbell_tables(Bodies(scene, free.mesh), [0.0, 300.0, 600.0], [6, 12], [0], 3)
+    rigid = found.table[found.table["mode"] <= 2]
+    assert (rigid["frequency"] == 0).all() and rigid["forward"].max() < 1e-8
+    assert found.crossings.empty
+
+
 @pytest.mark.parametrize(
     ("text", "rpm"),
     [

@@ -158,6 +158,14 @@ def test_a_constant_normal_load_and_friction_are_known_by_their_product():
     assert 1.5 * factors["kt"] == pytest.approx(1.0, rel=1e-3)
     known = dict(zip(fit.names, fit.knowledge.known, strict=True))
     assert known == {"mu": False, "kt": True, "load": False}
+    # as well as friction alone where the load is given
+    alone = fit_contact([level], ("mu", "kt"), H=5, samples=128, error=0.01)
+    (product,) = fit.knowledge.products
+    assert product.names == ("mu", "load")
+    low, high = alone.knowledge.intervals[0]
+    given = np.log(high / low) / 2
+    # one parameter more is fitted to the five readings
+    assert given < product.half < 1.5 * given
 
 
 def test_sticking_contacts_tell_their_stiffness_alone():

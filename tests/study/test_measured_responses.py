@@ -2,6 +2,7 @@
 bad files.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,7 +15,7 @@ from bladefem.errors import InputError
 from bladefem.report.measured import fit_headlines, fit_sentences, parameter_table
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.contact_identification import ContactFit
-from bladefem.study.fit_intervals import Knowledge
+from bladefem.study.fit_intervals import Knowledge, Product
 from bladefem.study.fit_truncation import LeftOut
 from bladefem.study.measured_models import BODY_MESH, Readings
 from bladefem.study.measured_responses import FittedScene, read_readings
@@ -132,6 +133,20 @@ def test_no_value_for_the_scene_that_is_open_or_out_of_range():
     assert high.level == "warning" and "a scene takes 0 to 2" in high
     (wide,) = (one for one in said if "no value of contact.kt_area" in one)
     assert wide.level == "warning"
+
+
+def test_a_product_of_open_parameters_is_told():
+    """Under one load friction and load are known together: 80 N of load times mu = 0.3."""
+    wide = [[0.0, np.inf]] * 2
+    plain = fitted_scene([0.5, 1.2], wide, names=("mu", "load"))
+    half = float(np.log(1.1))
+    knowledge = replace(plain.fit.knowledge, products=(Product(("mu", "load"), half),))
+    found = replace(plain, fit=replace(plain.fit, knowledge=knowledge))
+    (said,) = (one for one in fit_sentences(found) if "mu times load is known" in one)
+    # 0.15 times 96 N
+    assert "14.4 N, 95 % interval 13.1 to 15.8 N" in said
+    (both,) = (one for one in fit_headlines(found) if "times" in one.what)
+    assert both.what == "friction coefficient times normal load" and both.value == "14.4 N"
 
 
 def test_headlines_are_values_and_what_they_leave_out():

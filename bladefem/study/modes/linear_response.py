@@ -29,6 +29,7 @@ from ..pipeline.ports import blade_ports
 
 if TYPE_CHECKING:
     from ...fem.flexibility import Flexibility
+    from ...fem.rotation import SteadyState
 
 DEFAULT_MODES = 20
 
@@ -200,8 +201,8 @@ def half_widths(response: Forced) -> np.ndarray:
 
 
 def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
-    """(n_points, dim) displacement [m] by rotation, heat and a steady load [N] that is the same on
-    all blades.
+    """(n_points, dim) linear displacement [m] by rotation, heat and a steady load [N] that is the
+    same on all blades.
     """
     offset = bodies.scene.operation.speed**2 * bodies.swell + bodies.thermal_displacement
     if load is None:
@@ -210,6 +211,28 @@ def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
         offset
         + _static_motion(bodies.factorised(0), np.real(load))[:, : bodies.mesh.dimension].real
     )
+
+
+def steady_state(bodies: Bodies) -> SteadyState:
+    """The state of rotation and heat that stresses are told of: the nonlinear preload where the
+    modes vibrate about it, else the linear answer.
+
+    A leaning blade straightens: at 800 rad/s the linear answer of a twisted one of 200 mm that
+    leans by 20 mm is 45 mm, where it moves by 14.
+    """
+    from ...fem.rotation import SteadyState
+
+    if bodies.state is not None and stands_on_large_state(bodies):
+        return bodies.state
+    return SteadyState(static_offset(bodies), bodies.scene.operation.speed)
+
+
+def stands_on_large_state(bodies: Bodies) -> bool:
+    """Whether the nonlinear preload is known at the speed; without stiffening it is that of the
+    heat alone.
+    """
+    state = bodies.state
+    return state is not None and state.large and state.speed == bodies.scene.operation.speed
 
 
 def _modal_amplitudes(response: Forced, frequency: float) -> np.ndarray:

@@ -28,7 +28,8 @@ from .linear_response import (
     linear_response,
     pressure_load,
     probe_response,
-    static_offset,
+    stands_on_large_state,
+    steady_state,
 )
 
 if TYPE_CHECKING:
@@ -167,7 +168,7 @@ def stress_states(
     states = {}
     heated = has_thermal_strain(bodies.still_blade)
     if bodies.scene.operation.speed > 0 or heated:
-        u0 = static_offset(bodies)
+        u0 = steady_state(bodies).displacement
         states[STATIC_STATES[heated]] = np.pad(u0, ((0, 0), (0, 3 - u0.shape[1])))
     for i, shape in enumerate(modes.shapes[:count]):
         largest = max(np.linalg.norm(shape, axis=1).max(), 1e-300)
@@ -192,8 +193,10 @@ def stress_table(
     """
     # all ranks assemble it, those without a state too
     body = bodies.still_blade
+    # of the static state; the others are small motions about it
+    large = stands_on_large_state(bodies)
     found = share_work(
-        lambda name: _state_stress(body, name, states[name]), list(states), bodies.comm
+        lambda name: _state_stress(body, name, states[name], large), list(states), bodies.comm
     )
     rows = [row for row, _, _ in found]
     fields = {row["state"]: at_nodes for row, at_nodes, _ in found}
@@ -208,12 +211,18 @@ def _state_stress(
     body: Body,
     name: str,
     u: np.ndarray,
+    large: bool,
 ) -> tuple[dict[str, Any], dict[str, np.ndarray], np.ndarray]:
-    """A row of the table, fields at the nodes, and von Mises stresses [Pa] in the cells (nc,)."""
+    """A row of the table, fields at the nodes, and von Mises stresses [Pa] in the cells (nc,).
+
+    Args:
+        large: the static state is one of large displacements.
+    """
     from ...fem.stress import gauss_and_nodal_stress, principal_stresses, von_mises
 
     heated = name == STATIC_STATES[True]
-    at_points, stress = gauss_and_nodal_stress(body, u, heated=heated)
+    large = large and name in STATIC_STATES.values()
+    at_points, stress = gauss_and_nodal_stress(body, u, large=large, heated=heated)
     size = von_mises(stress)
     sides = principal_stresses(stress)
     inside = von_mises(at_points.stress).max(1)

@@ -52,6 +52,8 @@ class SpeedModel:
     g: ComplexArray
     # +1 where the sectors are counted in the sense of the rotation, else -1
     sense: int
+    # rigid motions without stiffness at all speeds
+    rigid: int = 0
 
     def table(self, speeds: Sequence[float]) -> pd.DataFrame:
         """One row a mode and speed [rad/s].
@@ -101,7 +103,10 @@ class SpeedModel:
         """All frequencies [Hz] of the basis and their vectors."""
         weights = _lagrange_weights(self.squares, speed**2)
         K = reduce(np.add, [weight * part for weight, part in zip(weights, self.K, strict=True)])
-        return _basis_frequencies(K[chosen][:, chosen], self.M[chosen][:, chosen])
+        f, Z = _basis_frequencies(K[chosen][:, chosen], self.M[chosen][:, chosen])
+        # in the small matrices they have a frequency of rounding, which orders would cross
+        f[: self.rigid] = 0.0
+        return f, Z
 
     def _errors(
         self, speed: float, f: RealArray, forward: RealArray, backward: RealArray
@@ -152,7 +157,8 @@ def speed_model(
     M = hermitian_part(inner_products(body.comm, X, apply_block(body.M, X)))
     g = project_coriolis(body, X, axis)
     count = len(sets[0].frequencies)
-    return SpeedModel(sets[0].nodal_diameter, shown, count, squares, K, M, g, sense)
+    rigid = min(int(np.count_nonzero(at.frequencies == 0)) for at in sets)
+    return SpeedModel(sets[0].nodal_diameter, shown, count, squares, K, M, g, sense, rigid)
 
 
 def _coriolis_answers(

@@ -13,7 +13,7 @@ from ...util.arrays import RealArray
 from ..pipeline.bodies import Bodies
 from ..pipeline.coriolis import mode_shift
 from ..pipeline.ports import blade_ports
-from .linear_response import static_offset
+from .linear_response import steady_state
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,29 @@ def mode_strength(bodies: Bodies, modes: ModeSet) -> Strength:
     mean = np.zeros(len(bodies.mesh.points))
     steady, place = rest
     if bodies.scene.operation.speed > 0 or has_thermal_strain(bodies.still_blade):
-        offset = static_offset(bodies)
-        steady, place = _worst_place(bodies, offset, heated=True)
-        mean = signed_von_mises(nodal_stress(bodies.still_blade, offset, heated=True))
+        state = steady_state(bodies)
+        steady, place = _worst_place(bodies, state.displacement, heated=True, large=state.large)
+        stress = nodal_stress(
+            bodies.still_blade, state.displacement, heated=True, large=state.large
+        )
+        mean = signed_von_mises(stress)
     return Strength(
         excitation.mode, alternating, there, steady, place, mean, mode_shift(bodies, [modes])
     )
 
 
-def _worst_place(bodies: Bodies, u: np.ndarray, heated: bool = False) -> tuple[float, np.ndarray]:
-    """Largest von Mises stress [Pa] of displacements (n_points, d) and its place (3,) [m]; heated:
-    of the static state.
+def _worst_place(
+    bodies: Bodies, u: np.ndarray, heated: bool = False, large: bool = False
+) -> tuple[float, np.ndarray]:
+    """Largest von Mises stress [Pa] of displacements (n_points, d) and its place (3,) [m].
+
+    Args:
+        heated: of the static state.
+        large: of one with large displacements.
     """
     from ...fem.stress import gauss_stress, von_mises
 
-    found = gauss_stress(bodies.still_blade, u, heated=heated)
+    found = gauss_stress(bodies.still_blade, u, heated=heated, large=large)
     size = von_mises(found.stress)
     worst = np.unravel_index(size.argmax(), size.shape)
     return float(size[worst]), found.points[worst]

@@ -45,8 +45,9 @@ class Bodies:
     stress about the linear preload, or about the nonlinear one where ``operation.preload`` says so.
     Seating the damper uses the elastic stiffness at rest, under the whole centrifugal load: both
     are first-order theory, in which displacements grow with the square of the speed, and the
-    stiffness under rotation would count the rotation twice. For static displacements the difference
-    is of the order of the strain.
+    stiffness under rotation would count the rotation twice. At the seats, near the root, the
+    difference is small; a leaning aerofoil moves less than first-order theory says, and its
+    stresses are told of the state that the vibrations are about.
     """
 
     scene: Scene
