@@ -32,7 +32,7 @@ from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
-from loads_in_time import BLADES, march, ring_of, start_at_rest
+from loads_in_time import layer_of, march, ring_of, start_at_rest
 
 MODES = 12
 STEPS = 1000
@@ -77,22 +77,22 @@ def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
     # where every node slips the tangential forces turn fast: 15 harmonics are 0.4 % off
     top = solve(model, highest.omega, harmonics, 512, start=highest)
     assert top.converged
-    e = case.elements
-    nodes = len(e.kt)
-    ring = ring_of(scene, wheel.reduced, len(wheel.patches[0].area))
-    state = start_at_rest(ring, nodes)
+    nodes = len(case.elements.kt)
+    layer = layer_of(case)
+    ring = ring_of(scene, wheel.reduced, wheel.reduced.following.start)
+    state = start_at_rest(ring, layer)
     heights = []
     places = []
     for _ in range(PERIODS):
-        heights.append(march(ring, case, state, top.frequency, STEPS))
+        heights.append(march(ring, layer, state, top.frequency, STEPS))
         places.append(state.p @ ring.damper.T)
     assert heights[-1] == pytest.approx(heights[-5], rel=1e-3), "not steady"
     # all four blades, each with its own phase
-    assert heights[-1] == pytest.approx(np.full(BLADES, size(top)), rel=5e-3)
+    assert heights[-1] == pytest.approx(np.full(ring.blades, size(top)), rel=5e-3)
     # the step that each damper makes in a period, at the contact that moves most
-    step = (places[-1] - places[-2]).reshape(BLADES, nodes, 3)
+    step = (places[-1] - places[-2]).reshape(ring.blades, nodes, 3)
     speed = np.linalg.norm(step, axis=2).max(axis=1) * top.omega / (2 * np.pi)
     # amplitudes and phases that still change move the places: no walk is told from less than that
     unsteady = 3 * np.abs(heights[-1] - heights[-2]).max() * top.omega / (2 * np.pi)
-    assert speed == pytest.approx(np.full(BLADES, top.drift), rel=0.05, abs=unsteady)
+    assert speed == pytest.approx(np.full(ring.blades, top.drift), rel=0.05, abs=unsteady)
     assert unsteady < 3e-5

@@ -6,7 +6,8 @@ enriched in direction d, solved from the point that is judged: a step or two whe
 closed. One Newton step alone would overshoot where they lift off (docs/stability.md, F23).
 
 Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15, since
-fewer miss internal resonances (F20), from 7 on with twice as many; contact points with the finest
+fewer miss internal resonances (F20; at a peak, `peak_errors` compares 1 with 15), from 7 on with
+twice as many; contact points with the finest
 ones, because a number half as large again can be blind (F19).
 
 Where all contacts stick, friction is linear: harmonics and samples are exact and need no look. A
