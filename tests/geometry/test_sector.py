@@ -282,6 +282,14 @@ def test_variants_are_meshed(changes):
     assert set(mesh.pairs) == {"cyclic", "this", "next"}
 
 
+def test_a_thin_straight_part_of_the_damper_gets_shorter_elements():
+    """0.2 mm below the flanks: with seats of six elements, 6.7 mm long, flat cells were left."""
+    size = MeshSize(size=1.4e-2, seat_elements=3, algorithm="delaunay")
+    mesh = build(size, wedge={"base": 2e-4})
+    assert mesh.report["worst quality"] > 0.04
+    assert "notes" not in mesh.report
+
+
 def test_fillet_is_a_quarter_groove_round_the_root():
     """Its nodes lie on the outline moved outwards by the arc; a spline between its points is off it
     by 3.9 %.

@@ -179,10 +179,10 @@ def read_speeds(text: str) -> list[float]:
             out.append(number)
             continue
         end = numbers[i + 1] if i + 1 < len(numbers) else None
-        if len(out) < 2 or end is None or not out[-1] > out[-2]:
+        if len(out) < 2 or end is None or not end > out[-1] > out[-2]:
             raise InputError(
-                f"campbell = {text}: expected two rising speeds before '...' and the last one "
-                "after it"
+                f"campbell = {text}: expected two rising speeds before '...' and a higher one, "
+                "the last, after it"
             )
         step = out[-1] - out[-2]
         if (end - out[-1]) / step > MAX_SPEEDS:
