@@ -47,4 +47,5 @@ if comm.rank == 0:
         os.makedirs("runs/demos", exist_ok=True)
         draw_mode_sheet(mesh, found, "runs/demos/blade_modes.png")
         save_modes_vtu(mesh, found, "runs/demos/blade_modes.vtu")
+        print("written: runs/demos/blade_modes.png, runs/demos/blade_modes.vtu")
     print(f"first natural frequency [Hz]: {found.frequencies[0]:.2f}")

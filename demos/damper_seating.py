@@ -50,4 +50,5 @@ if comm.rank == 0:
 
         os.makedirs("runs/demos", exist_ok=True)
         draw_pressure(maps, "runs/demos/pressure.png")
+        print("written: runs/demos/pressure.png")
     print(f"normal force over F / (2 sin alpha): {maps[0].force.sum() / expected:.6g}")

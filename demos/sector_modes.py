@@ -37,19 +37,19 @@ if comm.rank == 0:
     print("nodal diameter, frequencies [Hz], largest residual")
     for s in sets:
         print(
-            s.nodal_diameter,
+            f"{s.nodal_diameter:2d}",
             " ".join(f"{f:10.3f}" for f in s.frequencies),
             f"residual {s.residuals.max():.1e}",
         )
     excited = next(s for s in sets if s.nodal_diameter == scene.excitation.engine_order)
-    if comm.size == 1:
-        from bladefem.report.mode_table import mode_table
-        from bladefem.view.modes import draw_wheel_mode
-        from bladefem.view.speed import draw_nodal_diameters
+    from bladefem.report.mode_table import mode_table
+    from bladefem.view.modes import draw_wheel_mode
+    from bladefem.view.speed import draw_nodal_diameters
 
-        os.makedirs("runs/demos", exist_ok=True)
-        draw_nodal_diameters(mode_table(sets, mesh), "runs/demos/nodal_diameters.png")
-        draw_wheel_mode(mesh, excited, 0, "runs/demos/wheel_mode.png")
+    os.makedirs("runs/demos", exist_ok=True)
+    draw_nodal_diameters(mode_table(sets, mesh), "runs/demos/nodal_diameters.png")
+    draw_wheel_mode(mesh, excited, 0, "runs/demos/wheel_mode.png")
+    print("written: runs/demos/nodal_diameters.png, runs/demos/wheel_mode.png")
     print(
         f"first frequency of nodal diameter {excited.nodal_diameter} [Hz]: "
         f"{excited.frequencies[0]:.2f}"

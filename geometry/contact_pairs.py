@@ -15,6 +15,7 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.scene.units import show
 
 from .draw import (
     boundary_centres,
@@ -116,7 +117,9 @@ def _check_range(
     meaning: str,
 ) -> None:
     if not value <= limit:
-        raise InputError(f"{name} = {value:.4g} m: expected at most {limit:.4g} m ({meaning})")
+        raise InputError(
+            f"{name} = {show(value, 'm')}: expected at most {show(limit, 'm')} ({meaning})"
+        )
 
 
 def _bend_indenter(

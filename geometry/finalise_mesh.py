@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.scene.units import show
 
 from .curving import second_order
 from .extract_arrays import Groups, extract_mesh
@@ -132,7 +133,7 @@ def check_count(gmsh: ModuleType, dimension: int, size: float) -> None:
     )
     if count > MAX_CELLS:
         raise InputError(
-            f"mesh.size = {size:.4g} m gives about {count:.1g} cells, expected at most "
+            f"mesh.size = {show(size, 'm')} gives about {count:.1g} cells, expected at most "
             f"{MAX_CELLS:.0e}; choose larger elements, or check the length unit"
         )
 

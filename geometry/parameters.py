@@ -284,7 +284,8 @@ class MeshSize:
         2,
         64,
         "elements across the width of a wedge's seats, a grid with contact_size, or a sixth of "
-        "the length, along them; 8 when left out, free triangles where contact_size alone is given",
+        "the length and at most 12 times damper.base, along them; 8 when left out, free triangles "
+        "where contact_size alone is given",
     )
     fillet_elements: int | None = quantity(
         None,

@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.scene.units import show
 
 from .draw import draw_polygon, tie_meshes
 from .extract_arrays import Groups
@@ -76,20 +77,21 @@ def check_plane(plane: Plane) -> None:
     for name, value, other, limit, words in rules:
         if not value < limit:
             raise InputError(
-                f"plane.{name} = {value:.4g} m: expected {words} plane.{other} = {limit:.4g} m"
+                f"plane.{name} = {show(value, 'm')}: expected {words} plane.{other} = "
+                f"{show(limit, 'm')}"
             )
     top = plane.platform_height + plane.platform_thickness
     if not top < plane.length:
         raise InputError(
-            f"plane.platform_height = {plane.platform_height:.4g} m: the platform's top at "
-            f"{top:.4g} m is not below the tip, expected less than plane.length = "
-            f"{plane.length:.4g} m"
+            f"plane.platform_height = {show(plane.platform_height, 'm')}: the platform's top at "
+            f"{show(top, 'm')} is not below the tip, expected less than plane.length = "
+            f"{show(plane.length, 'm')}"
         )
     room = 0.98 * (plane.platform_width - plane.thickness) / 2
     if not plane.seat_width <= room:
         raise InputError(
-            f"plane.seat_width = {plane.seat_width:.4g} m: expected at most {room:.4g} m (98 % of "
-            "the platform's overhang next to the blade)"
+            f"plane.seat_width = {show(plane.seat_width, 'm')}: expected at most {show(room, 'm')} "
+            "(98 % of the platform's overhang next to the blade)"
         )
 
 

@@ -12,6 +12,7 @@ from math import cos, pi, sin, tan
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.scene.units import show
 
 from .parameters import Disc, Root, Shank
 
@@ -83,8 +84,8 @@ def check_root(root: Root, shank: Shank, disc: Disc) -> None:
     step = (neck - shank.width) / 2
     if step < 0 or 0 < step < STEP * neck:
         raise InputError(
-            f"root.neck = {neck:.4g} m: expected shank.width = {shank.width:.4g} m or at least "
-            f"{shank.width / (1 - 2 * STEP):.4g} m, since the shank stands on the root"
+            f"root.neck = {show(neck, 'm')}: expected shank.width = {show(shank.width, 'm')} or at "
+            f"least {show(shank.width / (1 - 2 * STEP), 'm')}, since the shank stands on the root"
         )
     idle = _idle_height(root)
     if idle < (1 - HIGHEST_BEARING) * root.pitch:
@@ -103,15 +104,15 @@ def _check_room(root: Root, shank: Shank, disc: Disc) -> None:
     limit = DEEPEST * (disc.rim_radius - disc.bore_radius)
     if deepest > limit:
         raise InputError(
-            f"root.lobes = {root.lobes}: the root is {deepest:.4g} m deep, expected at most "
-            f"{limit:.4g} m (60 % of the height of the disc); choose fewer lobes or a smaller "
+            f"root.lobes = {root.lobes}: the root is {show(deepest, 'm')} deep, expected at most "
+            f"{show(limit, 'm')} (60 % of the height of the disc); choose fewer lobes or a smaller "
             "root.pitch"
         )
     if start[-1, 1] < NARROWEST_NECK * start[0, 1]:
         raise InputError(
-            f"root.taper = {root.taper:.4g} rad: the innermost neck is {2 * start[-1, 1]:.3g} m "
-            f"wide, expected at least {2 * NARROWEST_NECK * start[0, 1]:.3g} m; choose less taper "
-            "or fewer lobes"
+            f"root.taper = {show(root.taper, 'rad')}: the innermost neck is "
+            f"{show(2 * start[-1, 1], 'm', 3)} wide, expected at least "
+            f"{show(2 * NARROWEST_NECK * start[0, 1], 'm', 3)}; choose less taper or fewer lobes"
         )
     reach = end + root.clearance * _along_flank(root)
     # the groove's floor is as wide as its last flank, further in
@@ -119,15 +120,16 @@ def _check_room(root: Root, shank: Shank, disc: Disc) -> None:
     free = (1 - POST) * reach[:, 0] * tan(pi / disc.sectors) - reach[:, 1]
     if free.min() < 0:
         raise InputError(
-            f"root.neck = {_neck(root, shank):.4g} m: the lobes leave too thin a post of the disc "
-            f"between two roots, by {-free.min():.3g} m; choose a narrower neck (and shank.width), "
-            "a smaller root.bearing or fewer disc.sectors"
+            f"root.neck = {show(_neck(root, shank), 'm')}: the lobes leave too thin a post of the "
+            f"disc between two roots, by {show(-free.min(), 'm', 3)}; choose a narrower neck (and "
+            "shank.width), a smaller root.bearing or fewer disc.sectors"
         )
 
 
 def _refuse(name: str, value: float, limit: float, meaning: str) -> None:
     raise InputError(
-        f"root.{name} = {value:.4g} m is too large: expected at most {limit:.4g} m ({meaning})"
+        f"root.{name} = {show(value, 'm')} is too large: expected at most {show(limit, 'm')} "
+        f"({meaning})"
     )
 
 

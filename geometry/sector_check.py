@@ -9,12 +9,13 @@ from math import pi, radians, sin
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.scene.units import show
 
 from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
 from .profile import Profile, sector_profile
 from .root import check_root
-from .section import section_shape
+from .section import section_outline, section_shape
 from .sector_names import clearing_shift
 from .shroud import shroud_block
 
@@ -24,6 +25,9 @@ NO_SHROUD = Shroud()
 MIN_STRIP_SHARE = 0.02
 # thickness of the platform over its length or its pitch: at 1/290 a quarter of the cells stays flat
 THINNEST_PLATE = 1 / 150
+
+# sections along the span that are compared with those of the next blade
+CHECKED_HEIGHTS = 9
 
 
 def check_sector(
@@ -57,6 +61,7 @@ def check_sector(
     check_platform(section, platform, shank, disc, wedge)
     check_pocket(section, shank, disc, wedge)
     check_aerofoil(aerofoil, platform, section)
+    check_neighbours(aerofoil, disc, section)
     check_root(root, shank, disc)
     shroud_block(shroud, aerofoil, disc, section.top)
 
@@ -70,7 +75,7 @@ def _at_most(
 ) -> None:
     if not value <= limit:
         raise InputError(
-            f"{name} = {value:.4g} {unit} is too large: expected at most {limit:.4g} {unit} "
+            f"{name} = {show(value, unit)} is too large: expected at most {show(limit, unit)} "
             f"({meaning})"
         )
 
@@ -85,8 +90,8 @@ def _no_strip(
     _at_most(name, value, limit, other)
     if 0 < limit - value < MIN_STRIP_SHARE * limit:
         raise InputError(
-            f"{name} = {value:.6g} m ends {limit - value:.2g} m before {other}, expected the same "
-            f"length or at most {(1 - MIN_STRIP_SHARE) * limit:.4g} m"
+            f"{name} = {show(value, 'm')} ends {show(limit - value, 'm', 3)} before {other}, "
+            f"expected the same length or at most {show((1 - MIN_STRIP_SHARE) * limit, 'm')}"
         )
 
 
@@ -131,8 +136,8 @@ def check_platform(
     widest = max(platform.length, 2 * half)
     if platform.thickness < THINNEST_PLATE * widest:
         raise InputError(
-            f"platform.thickness = {platform.thickness:.4g} m is too small: expected at least "
-            f"{THINNEST_PLATE * widest:.4g} m, a {1 / THINNEST_PLATE:.0f}th of the platform's "
+            f"platform.thickness = {show(platform.thickness, 'm')} is too small: expected at least "
+            f"{show(THINNEST_PLATE * widest, 'm')}, a {1 / THINNEST_PLATE:.0f}th of the platform's "
             "length and of its pitch"
         )
     room = np.abs(section.seats[:, 1, 1]).min() - shank.width / 2
@@ -165,13 +170,13 @@ def check_pocket(
     inside = shank.width / 2 - below[:, 1].min(initial=np.inf)
     if inside > 0:
         raise InputError(
-            f"damper.base = {wedge.base:.4g} m: the {wedge.shape} does not fit between shank and "
-            f"platform (it enters the shank by {inside:.3g} m); choose a smaller damper.base, "
-            "shank.width or platform.seat_width"
+            f"damper.base = {show(wedge.base, 'm')}: the {wedge.shape} does not fit between shank "
+            f"and platform (it enters the shank by {show(inside, 'm', 3)}); choose a smaller "
+            "damper.base, shank.width or platform.seat_width"
         )
     if np.hypot(*corners.T).min() < disc.rim_radius:
         raise InputError(
-            f"damper.base = {wedge.base:.4g} m: the {wedge.shape} enters the rim of the disc; "
+            f"damper.base = {show(wedge.base, 'm')}: the {wedge.shape} enters the rim of the disc; "
             "choose a smaller damper.base or a larger shank.height"
         )
 
@@ -196,26 +201,52 @@ def check_aerofoil(
     for room, (what, cure) in zip(platform_room(blade, platform, section), rules, strict=True):
         if room < 0:
             raise InputError(
-                f"aerofoil.chord_root = {blade.chord_root:.4g} m: the root section overhangs the "
-                f"platform {what} by {-room:.3g} m; choose a smaller {cure}"
+                f"aerofoil.chord_root = {show(blade.chord_root, 'm')}: the root section, with a "
+                f"tenth of platform.thickness round it, overhangs the platform {what} by "
+                f"{show(-room, 'm', 3)}; choose a smaller {cure}"
             )
     thinnest = blade.thickness_root * blade.chord_root
     _at_most("aerofoil.fillet", blade.fillet_radius, thinnest, "the thickness of the root section")
 
 
+def check_neighbours(
+    blade: Aerofoil,
+    disc: Disc,
+    section: Profile,
+) -> None:
+    """Aerofoils that stay clear of each other: root and tip may fit where long twisted chords do
+    not.
+    """
+    for t in np.linspace(0, 1, CHECKED_HEIGHTS):
+        x, y, z = section_outline(blade, section.top, t).T
+        # seen along the radius; points at the same angle have nearly the same radius
+        own = np.column_stack([np.arctan2(y, x), z / section.top])
+        if polygons_cross(own, own + np.array([2 * section.theta, 0.0])):
+            end = "root" if t < 0.5 else "tip"
+            chord = getattr(blade, f"chord_{end}")
+            raise InputError(
+                f"aerofoil.chord_{end} = {show(chord, 'm')}: {100 * t:.0f} % up the span the "
+                "aerofoil runs into the next one, expected a smaller chord, thickness or "
+                f"aerofoil.twist, or fewer than {_count(disc)}"
+            )
+
+
 def crosses_itself(polygon: np.ndarray) -> bool:
     """Do two edges of the closed polygon (n, 2) cross?"""
-    a = polygon
-    b = np.roll(polygon, -1, axis=0)
+    return polygons_cross(polygon, polygon)
+
+
+def polygons_cross(first: np.ndarray, second: np.ndarray) -> bool:
+    """Does an edge of one closed polygon (n, 2) cross one of the other (m, 2)?"""
 
     def side(p: np.ndarray, q: np.ndarray, r: np.ndarray) -> np.ndarray:
         return (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (
             r[..., 0] - p[..., 0]
         )
 
-    ai = a[:, None]
-    bi = b[:, None]
-    aj = a[None]
-    bj = b[None]
+    ai = first[:, None]
+    bi = np.roll(first, -1, axis=0)[:, None]
+    aj = second[None]
+    bj = np.roll(second, -1, axis=0)[None]
     crossing = (side(ai, bi, aj) * side(ai, bi, bj) < 0) & (side(aj, bj, ai) * side(aj, bj, bi) < 0)
     return bool(crossing.any())

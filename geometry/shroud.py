@@ -8,6 +8,7 @@ from math import cos, pi, tan
 import numpy as np
 
 from bladefem.errors import InputError
+from bladefem.scene.units import show
 from bladefem.util.arrays import RealArray
 
 from .parameters import Aerofoil, Disc, Shroud
@@ -65,8 +66,8 @@ def shroud_block(
     width = room if shroud.width is None else shroud.width
     if width > room:
         raise InputError(
-            f"shroud.width = {width:.4g} m: expected at most {room:.4g} m, what shroud.gap leaves "
-            "between neighbours"
+            f"shroud.width = {show(width, 'm')}: expected at most {show(room, 'm')}, what "
+            "shroud.gap leaves between neighbours"
         )
     if at_tip:
         _check_cover(shroud, np.array([width, length]), reach, margin)
@@ -85,8 +86,8 @@ def _check_height(shroud: Shroud, aerofoil: Aerofoil, middle: float) -> None:
     free = middle - shroud.thickness / 2 - above
     if free < 0:
         raise InputError(
-            f"shroud.thickness = {shroud.thickness:.4g} m: the block comes within "
-            f"{above:.3g} m of the platform, expected a thinner one, or a larger shroud.at"
+            f"shroud.thickness = {show(shroud.thickness, 'm')}: the block comes within "
+            f"{show(above, 'm', 3)} of the platform, expected a thinner one, or a larger shroud.at"
         )
     if shroud.at < 1 and middle + 1.5 * shroud.thickness > aerofoil.span:
         raise InputError(
@@ -107,13 +108,13 @@ def _check_cover(
             continue
         if name == "width" and shroud.width is None:
             raise InputError(
-                f"shroud.gap = {shroud.gap:.4g} m: leaves a block of {given:.4g} m, expected "
-                f"{needed:.4g} m to cover the tip section; choose fewer disc.sectors, a smaller "
-                "aerofoil.chord_tip or less stagger and twist"
+                f"shroud.gap = {show(shroud.gap, 'm')}: leaves a block of {show(given, 'm')}, "
+                f"expected {show(needed, 'm')} to cover the tip section; choose fewer "
+                "disc.sectors, a smaller aerofoil.chord_tip or less stagger and twist"
             )
         raise InputError(
-            f"shroud.{name} = {given:.4g} m: expected at least {needed:.4g} m to cover the tip "
-            "section"
+            f"shroud.{name} = {show(given, 'm')}: expected at least {show(needed, 'm')} to cover "
+            "the tip section"
         )
 
 
@@ -133,13 +134,13 @@ def _check_snubber(
     limit = 2 * (np.abs(edges).min() - margin)
     if length > limit:
         raise InputError(
-            f"shroud.length = {length:.4g} m: expected at most {max(limit, 0.0):.4g} m, between "
-            "the edges of the aerofoil; or shroud.at = 1 for a tip shroud"
+            f"shroud.length = {show(length, 'm')}: expected at most {show(max(limit, 0.0), 'm')}, "
+            "between the edges of the aerofoil; or shroud.at = 1 for a tip shroud"
         )
     inside = np.abs(rings[:, 1]) <= length / 2 + margin
     needed = 2 * (np.abs(rings[inside, 0]).max(initial=0.0) + margin)
     if width < needed:
         raise InputError(
-            f"shroud.width = {width:.4g} m: expected at least {needed:.4g} m, so that a snubber "
-            "stands out of both sides of the aerofoil; or a smaller shroud.length"
+            f"shroud.width = {show(width, 'm')}: expected at least {show(needed, 'm')}, so that a "
+            "snubber stands out of both sides of the aerofoil; or a smaller shroud.length"
         )

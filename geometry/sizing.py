@@ -24,6 +24,9 @@ LEADING_EDGE_SIZE = 0.6
 # elements along a seat at least
 MIN_ELEMENTS_ACROSS_SEAT = 8
 MIN_ELEMENTS_ALONG_SEAT = 6
+# length of elements along a seat over the height of the damper's straight part: at 25 its cells
+# have a shape quality of 0.02
+MAX_LENGTH_OVER_BASE = 12.0
 # cells above the rim at the finest, when the size is left open
 MAX_AUTOMATIC_CELLS = 40_000
 # elements over the arc of a fillet: its largest stress is then within some 5 % of the limit
@@ -104,9 +107,7 @@ def sector_sizes(
     thin = 0.6 * min((tip + root) / 2, platform.thickness, shank.width / 2)
     automatic = max(thin, _affordable_size(aerofoil, platform, shank, disc))
     base = size.size or automatic
-    contact = size.contact_size or min(
-        base, platform.seat_width, wedge.length / MIN_ELEMENTS_ALONG_SEAT
-    )
+    contact = size.contact_size or min(base, platform.seat_width, seat_length(wedge))
     arc_elements = size.fillet_elements or max(1, round(ARC_ELEMENTS * automatic / base))
     slender = AEROFOIL_COARSENING if aerofoil.fillet and size.size is None else 1.0
     return Sizes(
@@ -251,13 +252,7 @@ def set_grids(
     Raises:
         InputError: a seat is no rectangle with one edge on each side.
     """
-    along = max(
-        2,
-        round(
-            wedge.length
-            / (size.scale * (size.contact_size or wedge.length / MIN_ELEMENTS_ALONG_SEAT))
-        ),
-    )
+    along = max(2, round(wedge.length / (size.scale * (size.contact_size or seat_length(wedge)))))
     wanted = size.seat_elements or MIN_ELEMENTS_ACROSS_SEAT
     across = max(2, round(wanted / size.scale))
     for seat in seats:
@@ -274,6 +269,11 @@ def set_grids(
         # One direction of all diagonals: hat functions of inner nodes then have equal areas, where
         # alternating ones give 1:2, which the pressure of rigid faces follows.
         gmsh.model.mesh.setTransfiniteSurface(seat, "Left")
+
+
+def seat_length(wedge: Wedge) -> float:
+    """Length of the elements along a seat where it is left open [m]."""
+    return min(wedge.length / MIN_ELEMENTS_ALONG_SEAT, MAX_LENGTH_OVER_BASE * wedge.base)
 
 
 def set_fillet_grid(

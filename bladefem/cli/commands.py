@@ -151,7 +151,7 @@ def _parse_sizes(text: str | None, option: str) -> list[float] | None:
 
     if text is None:
         return None
-    size = field_at("mesh.size")._replace(name=option)
+    size = field_at("mesh.size")._replace(name=f"--{option}")
     sizes = [convert_value(item, size) for item in split_values(text)]
     if len(set(sizes)) < len(sizes):
         raise InputError(f"--{option} {text}: a size is given twice, expected each once")

@@ -60,7 +60,7 @@ def mode_shapes(result: ModalRun) -> xr.Dataset:
             "shape": (
                 ("nodal_diameter", "mode", "node", "direction"),
                 shapes,
-                {"units": "kg^-1/2"},
+                {"units": "kg^-1/2", "long_name": "mass-normalised over one sector, or the body"},
             ),
             "position": (("node", "direction"), result.mesh.points, {"units": "m"}),
         },

@@ -201,10 +201,7 @@ def _file_writers(
 
     def write_stresses() -> None:
         fields, inside = stresses
-        shapes = {
-            f"mode {i + 1}, {f:.6g} Hz": excited.shapes[i]
-            for i, f in enumerate(excited.frequencies[:pictures])
-        }
+        shapes = modes.named_shapes(excited, pictures)
         mesh.save_vtu(run.mesh, folder / "stress.vtu", {**shapes, **fields}, inside)
 
     out: dict[str, Callable[[], object]] = {

@@ -163,14 +163,14 @@ def readable_units(unit: str) -> tuple[str, ...]:
     return _READABLE.get(unit, (unit,))
 
 
-def show(value: float, unit: str = "1") -> str:
-    """Six digits in the unit that an engineer would write.
+def show(value: float, unit: str = "1", digits: int = 6) -> str:
+    """Some digits in the unit that an engineer would write.
 
     >>> show(0.14, "m"), show(2.1e11, "Pa"), show(267.0353755, "rad/s")
     ('140 mm', '210 GPa', '2550 rpm')
     """
     number, written = _scale_unit(value, unit or "1")
-    return f"{number:.6g} {written}".rstrip()
+    return f"{number:.{digits}g} {written}".rstrip()
 
 
 def newtons(force: float, digits: int = 6) -> str:

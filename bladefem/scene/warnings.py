@@ -25,6 +25,7 @@ def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_doubtful_materials(scene), *_doubtful_masses(scene), *_doubtful_mesh(scene)]
     said += [*_unused_stiffnesses(scene), *_unused_solver_fields(scene), *_unused_phase(scene)]
+    said += _unused_diameters(scene)
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
@@ -105,6 +106,17 @@ def _unused_phase(scene: Scene) -> Iterator[str]:
             f"excitation.phase = {show(scene.excitation.phase, 'rad')} is not used: on a wheel "
             f"excitation.engine_order = {scene.excitation.engine_order} and {sectors} = "
             f"{value_at(scene, sectors)} give the phase between blades"
+        )
+
+
+def _unused_diameters(scene: Scene) -> Iterator[str]:
+    """Nodal diameters of what is no wheel."""
+    sectors = kind_named(scene.kind).sectors
+    listed = scene.model.nodal_diameters
+    if listed and (sectors is None or not value_at(scene, sectors)):
+        yield (
+            f"model.nodal_diameters = {', '.join(map(str, listed))} is not used: this scene has a "
+            "single blade, no wheel"
         )
 
 

@@ -517,5 +517,13 @@ def save_modes_vtu(
     volume: bool = False,
 ) -> Path:
     """Write all shapes of a mode set on the full wheel (or on the body alone without a sector)."""
-    fields = {f"mode {i + 1}, {f:.6g} Hz": modes.shapes[i] for i, f in enumerate(modes.frequencies)}
-    return save_wheel_vtu(mesh, file, fields, modes.nodal_diameter or 0, volume)
+    count = len(modes.frequencies)
+    return save_wheel_vtu(mesh, file, named_shapes(modes, count), modes.nodal_diameter or 0, volume)
+
+
+def named_shapes(modes: ModeSet, count: int) -> dict[str, np.ndarray]:
+    """The first shapes under the names that they have in files."""
+    return {
+        f"mode {i + 1}, {f:.6g} Hz [kg^-1/2]": modes.shapes[i]
+        for i, f in enumerate(modes.frequencies[:count])
+    }

@@ -15,6 +15,7 @@ mesh is therefore held to what meshes of this size leave open, BETWEEN_MESHES.
 from __future__ import annotations
 
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -63,6 +64,7 @@ FOUR_RANKS = ("plain_matrices",)
 
 def final_numbers(name: str, ranks: int) -> tuple[float, float]:
     """The last number that a demo prints, and the value behind it."""
+    start = time.time()
     command = [sys.executable, "-c", WITH_VALUE, f"demos/{name}.py", VALUES[name]]
     done = run_on_ranks(
         ranks,
@@ -73,9 +75,19 @@ def final_numbers(name: str, ranks: int) -> tuple[float, float]:
     )
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-3000:]
     lines = done.stdout.strip().splitlines()
+    for file in _written(lines):
+        # clocks of file systems are coarser than the system's
+        assert (HERE / file).stat().st_mtime > start - 1.0
     values = [line for line in lines if line.startswith("value:")]
     printed = [line for line in lines if not line.startswith("value:")]
     return float(printed[-1].split(":")[-1]), float(values[-1].split(":")[-1])
+
+
+def _written(lines: list[str]) -> list[str]:
+    """The files that a demo tells, once whatever the ranks."""
+    told = [line.partition(": ")[2] for line in lines if line.startswith("written: ")]
+    assert len(told) <= 1
+    return told[0].split(", ") if told else []
 
 
 @pytest.mark.parametrize("name", PINNED)

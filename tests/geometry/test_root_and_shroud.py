@@ -86,12 +86,12 @@ def test_bearing_flanks_have_their_angle_and_width():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"neck": 0.014}, "root.neck = 0.014 m: expected shank.width"),
-        ({"neck": 0.0161}, "root.neck = 0.0161 m: expected shank.width"),
+        ({"neck": 0.014}, "root.neck = 14 mm: expected shank.width"),
+        ({"neck": 0.0161}, "root.neck = 16.1 mm: expected shank.width"),
         ({"neck": 0.028}, "too thin a post of the disc"),
-        ({"bearing": 0.008}, "root.bearing = 0.008 m is too large"),
-        ({"clearance": 0.0015}, "root.clearance = 0.0015 m is too large"),
-        ({"pitch": 0.03}, "the root is 0.1189 m deep, expected at most 0.048 m"),
+        ({"bearing": 0.008}, "root.bearing = 8 mm is too large"),
+        ({"clearance": 0.0015}, "root.clearance = 1.5 mm is too large"),
+        ({"pitch": 0.03}, "the root is 118.872 mm deep, expected at most 48 mm"),
         ({"taper": 0.5, "lobes": 4}, "the innermost neck is"),
     ],
 )
@@ -158,14 +158,14 @@ def test_left_out_sizes_cover_the_tip_and_reach_the_gap():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"width": 0.07}, "shroud.width = 0.07 m: expected at most 0.06"),
-        ({"width": 0.02}, "shroud.width = 0.02 m: expected at least 0.03.* to cover the tip"),
-        ({"length": 0.02}, "shroud.length = 0.02 m: expected at least 0.03.* to cover the tip"),
-        ({"gap": 0.04}, "shroud.gap = 0.04 m: leaves a block of"),
+        ({"width": 0.07}, "shroud.width = 70 mm: expected at most 61.5"),
+        ({"width": 0.02}, "shroud.width = 20 mm: expected at least 32.1.* to cover the tip"),
+        ({"length": 0.02}, "shroud.length = 20 mm: expected at least 39.2.* to cover the tip"),
+        ({"gap": 0.04}, "shroud.gap = 40 mm: leaves a block of"),
         ({"at": 0.97}, "shroud.at = 0.97: the block comes within its thickness of the tip"),
-        ({"at": 0.5, "length": 0.06}, "shroud.length = 0.06 m: expected at most"),
-        ({"at": 0.5, "width": 0.004}, "shroud.width = 0.004 m: expected at least"),
-        ({"at": 0.3, "thickness": 0.05}, "comes within 0.05 m of the platform"),
+        ({"at": 0.5, "length": 0.06}, "shroud.length = 60 mm: expected at most"),
+        ({"at": 0.5, "width": 0.004}, "shroud.width = 4 mm: expected at least"),
+        ({"at": 0.3, "thickness": 0.05}, "comes within 50 mm of the platform"),
     ],
 )
 def test_impossible_shrouds_name_the_field(changes, said):

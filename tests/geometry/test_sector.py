@@ -7,15 +7,17 @@ from math import cos, pi, sin, tan
 
 import numpy as np
 import pytest
+from matplotlib.path import Path
 from measure import jacobians, volume
 from scipy.integrate import simpson
 
 from bladefem.errors import InputError
-from geometry.parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
+from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from geometry.profile import sector_profile, turn_about_axis
 from geometry.section import POINTS_PER_SIDE, section_outline
 from geometry.section import section_shape as section
 from geometry.sector import wedge_sector
+from geometry.sector_check import check_sector
 from geometry.topology import EDGES, face_normals
 
 PARTS = {
@@ -280,6 +282,14 @@ def test_variants_are_meshed(changes):
     assert set(mesh.pairs) == {"cyclic", "this", "next"}
 
 
+def test_a_thin_straight_part_of_the_damper_gets_shorter_elements():
+    """0.2 mm below the flanks: with seats of six elements, 6.7 mm long, flat cells were left."""
+    size = MeshSize(size=1.4e-2, seat_elements=3, algorithm="delaunay")
+    mesh = build(size, wedge={"base": 2e-4})
+    assert mesh.report["worst quality"] > 0.04
+    assert "notes" not in mesh.report
+
+
 def test_fillet_is_a_quarter_groove_round_the_root():
     """Its nodes lie on the outline moved outwards by the arc; a spline between its points is off it
     by 3.9 %.
@@ -322,12 +332,37 @@ def test_fillet_is_a_grid_of_elements_over_its_arc(asked, over):
         ({"aerofoil": {"stagger": 1.2}}, "aerofoil.stagger"),
         ({"disc": {"sectors": 60}}, "platform|shank"),
         ({"aerofoil": {"fillet": 0.009}}, "aerofoil.fillet|overhangs"),
+        ({"aerofoil": {"chord_root": 0.056}}, "chord_root = 56 mm: .* axially by 498 um"),
+        ({"wedge": {"angle": 81 * DEG}}, "damper.angle = 81 deg is too large.* 80 deg"),
     ],
 )
 def test_impossible_proportions_name_the_field(changes, field):
     with pytest.raises(InputError, match=field) as caught:
         build(**changes)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("chord, clear", [(0.075, True), (0.085, False), (0.1, False)])
+def test_aerofoils_that_run_into_each_other_are_refused(chord, clear):
+    """Nearly circumferential tips, 63 mm apart. Points along the edges of one tip, turned to the next
+    blade, are in its polygon or not.
+    """
+    blade = replace(Aerofoil(), twist=60 * DEG, chord_tip=chord)
+    parts = (blade, *[PARTS[k] for k in ("platform", "shank", "disc", "wedge")])
+    corners = section_outline(blade, sector_profile(*parts[1:]).top, 1.0)
+    ends = np.roll(corners, -1, axis=0)
+    edge = np.vstack(
+        [a + np.linspace(0, 1, 20)[:, None] * (b - a) for a, b in zip(corners, ends, strict=True)]
+    )
+    turned = edge @ turn_about_axis(2 * pi / Disc().sectors).T
+    assert Path(corners[:, 1:]).contains_points(turned[:, 1:]).any() != clear
+    if clear:
+        check_sector(*parts)
+    else:
+        with pytest.raises(
+            InputError, match=f"aerofoil.chord_tip = {1e3 * chord:g} mm: .* next one"
+        ):
+            check_sector(*parts)
 
 
 def test_slope_of_the_platform_at_the_midplane():

@@ -95,3 +95,11 @@ def test_limits_themselves_raise_none():
         "mesh.size=5 mm",
     ]
     assert implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", text)) == []
+
+
+def test_nodal_diameters_of_a_single_blade_are_not_used():
+    given = ["model.nodal_diameters=0, 3"]
+    assert implausible_values(load_scene(ROOT / "scenes" / "plane.toml", given)) == [
+        "model.nodal_diameters = 0, 3 is not used: this scene has a single blade, no wheel"
+    ]
+    assert implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", given)) == []

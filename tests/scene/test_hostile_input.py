@@ -118,7 +118,7 @@ COMMANDS = [
     (["check", "x" * 5000], "File name too long"),
     (["run", str(WEDGE), "-o", ""], "--output '': expected the name of a folder"),
     (["study", str(WEDGE), "--vary", "damper.angle=50, 55 deg", "-o", ""], "--output ''"),
-    (["modes", str(WEDGE), "--campbell", "-5, 100 rpm"], "expected speeds of at least 0 rpm"),
+    (["modes", str(WEDGE), "--campbell", "-5, 100 rpm"], "expected 0 rpm to 954930 rpm"),
     (["modes", str(WEDGE), "--converge", "6 mm, 6 mm, 4 mm"], "a size is given twice"),
     (["look", str(WEDGE.parents[2] / "scenes" / "own_blade.step"), "--view", "x.doc"], "x.doc"),
     (

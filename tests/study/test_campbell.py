@@ -116,7 +116,16 @@ def test_speeds_are_read(text, rpm):
 
 
 @pytest.mark.parametrize(
-    "text", ["", "0, ..., 2000 rpm", "0, 500, ...", "..., 3 rpm", "fast", "0, 3 Hz m"]
+    "text",
+    [
+        "",
+        "0, ..., 2000 rpm",
+        "0, 500, ...",
+        "0, 500, ..., 400 rpm",
+        "..., 3 rpm",
+        "fast",
+        "0, 3 Hz m",
+    ],
 )
 def test_wrong_speeds_are_refused(text):
     with pytest.raises(InputError, match="campbell"):

@@ -207,6 +207,8 @@ def test_words_for_loads_and_damping():
         (read_loads, "tip=2 N", "Pa"),
         (read_damping, "viscous=1", "'viscous' is unknown"),
         (read_damping, "mass=1 kg", "1/s"),
+        (read_damping, "ratio=1 %, ratio=2 %", "ratio is given twice"),
+        (read_damping, "ratio=200 %", "ratio = 2: expected 0 to 0.5"),
     ):
         with pytest.raises(InputError, match=words):
             read(text)

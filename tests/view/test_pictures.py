@@ -289,11 +289,15 @@ def test_travelling_wave_turns(sector, wave, folder):
 
 
 def test_vtu_holds_the_fields(sector, wave, folder):
+    import meshio
     import pyvista
 
-    one = pyvista.read(save_vtu(sector, folder / "one.vtu", {"u": wave.shapes[0]}))
-    assert np.allclose(one["u (imag)"], wave.shapes[0].imag)
+    one = pyvista.read(save_vtu(sector, folder / "one.vtu", {"u [m]": wave.shapes[0]}))
+    assert np.allclose(one["u, imaginary [m]"], wave.shapes[0].imag)
     full = pyvista.read(save_modes_vtu(sector, wave, folder / "full.vtu"))
+    by_meshio = meshio.read(folder / "full.vtu").point_data
+    assert by_meshio.keys() == set(full.point_data.keys())
+    assert f"mode 1, {wave.frequencies[0]:.6g} Hz, real [kg^-1/2]" in by_meshio
     assert full.n_points == len(wheel_skin(sector).points)
     volume = pyvista.read(save_modes_vtu(sector, wave, folder / "volume.vtu", volume=True))
     assert volume.n_cells == 12 * sum(len(c) for c in sector.bodies.values())

@@ -126,7 +126,7 @@ def check_budget(seconds: float) -> None:
     InputError: not a positive finite time.
     """
     if not 0 < seconds < np.inf:
-        raise InputError(f"budget = {seconds:g} s: expected a positive, finite number of seconds")
+        raise InputError(f"--budget {seconds:g}: expected a positive, finite number of seconds")
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import pandas as pd
 
 from geometry.mesh import Mesh
 from geometry.parameters import MeshSize
-from geometry.sizing import MIN_ELEMENTS_ACROSS_SEAT, MIN_ELEMENTS_ALONG_SEAT
+from geometry.sizing import MIN_ELEMENTS_ACROSS_SEAT, seat_length
 
 from ...contact.frictional_seating import normal_part
 from ...contact.seating import solve_seating as seat
@@ -127,7 +127,7 @@ def mesh_variants(
         if across is None and own.contact_size is None and kind_named(scene.kind).has_seat_grid:
             across = MIN_ELEMENTS_ACROSS_SEAT
         if across:
-            along = own.contact_size or scene.damper.length / MIN_ELEMENTS_ALONG_SEAT
+            along = own.contact_size or seat_length(scene.damper)
             halved = replace(own, order=2, seat_elements=2 * across, contact_size=along / 2)
         else:
             halved = replace(own, order=2, contact_size=_seat_size(drawn) / (2 * own.scale))

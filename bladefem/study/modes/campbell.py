@@ -19,7 +19,7 @@ from geometry.mesh import sector_of
 
 from ...data import ModeSet
 from ...errors import InputError
-from ...scene.fields import split_values
+from ...scene.fields import convert_value, field_at, split_values
 from ...scene.units import is_plain, parse
 from ..pipeline.bodies import Bodies, is_wheel
 from ..pipeline.normal_modes import eigensolver
@@ -141,34 +141,31 @@ def read_speeds(text: str) -> list[float]:
     """
     items = split_values(text)
     if not items:
-        raise InputError(f"campbell = {text!r}: expected speeds, such as '0, 2000, 4000 rpm'")
+        raise InputError(f"--campbell {text!r}: expected speeds, such as '0, 2000, 4000 rpm'")
     for item in items:
-        if is_plain(item) and parse(item, "rad/s", "campbell"):
+        if is_plain(item) and parse(item, "rad/s", "--campbell"):
             example = f"{text.strip()} rpm" if is_plain(items[-1]) else "0, 2000, 4000 rpm"
-            raise InputError(f"campbell = {text}: expected a unit, such as '{example}'")
-    numbers = [
-        None if item.startswith("...") else parse(item, "rad/s", "campbell") for item in items
-    ]
+            raise InputError(f"--campbell {text}: expected a unit, such as '{example}'")
+    speed = field_at("operation.speed")._replace(name="--campbell")
+    numbers = [None if item.startswith("...") else convert_value(item, speed) for item in items]
     out: list[float] = []
     for i, number in enumerate(numbers):
         if number is not None:
             out.append(number)
             continue
         end = numbers[i + 1] if i + 1 < len(numbers) else None
-        if len(out) < 2 or end is None or not out[-1] > out[-2]:
+        if len(out) < 2 or end is None or not end > out[-1] > out[-2]:
             raise InputError(
-                f"campbell = {text}: expected two rising speeds before '...' and the last one "
-                "after it"
+                f"--campbell {text}: expected two rising speeds before '...' and a higher one, "
+                "the last, after it"
             )
         step = out[-1] - out[-2]
         if (end - out[-1]) / step > MAX_SPEEDS:
             raise InputError(
-                f"campbell = {text}: {(end - out[-1]) / step:.3g} speeds, expected at "
+                f"--campbell {text}: {(end - out[-1]) / step:.3g} speeds, expected at "
                 f"most {MAX_SPEEDS}"
             )
         out += list(np.arange(out[-1] + step, end - step / 2, step))
-    if min(out, default=0.0) < 0:
-        raise InputError(f"campbell = {text}: expected speeds of at least 0 rpm")
     return out
 
 

@@ -15,7 +15,7 @@ from ...data import ModeSet
 from ...errors import InputError, suggestion
 from ...hbm.model import Damping
 from ...hbm.parallel import share_work
-from ...scene.fields import split_values
+from ...scene.fields import convert_value, field_at, split_values
 from ...scene.units import parse
 from ..pipeline.bodies import Bodies
 from ..pipeline.ports import blade_ports
@@ -138,15 +138,22 @@ def read_damping(text: str) -> Damping:
     s"; they add.
 
     Raises:
-        InputError: another word, another unit, a negative number.
+        InputError: another word, one given twice, another unit, a negative number, a ratio beyond
+            that of operation.damping.
     """
     units = {"ratio": "1", "structural": "1", "mass": "1/s", "stiffness": "s"}
     values = {}
     for item in text.split(","):
         name, _, value = (part.strip() for part in item.partition("="))
         if name not in units:
-            raise InputError(f"damping = {text}: '{name}' is unknown{suggestion(name, units)}")
-        values[name] = parse(value, units[name], f"damping, {name}")
+            raise InputError(f"--damping {text}: '{name}' is unknown{suggestion(name, units)}")
+        if name in values:
+            raise InputError(f"--damping {text}: {name} is given twice, expected each once")
+        values[name] = parse(value, units[name], f"--damping {name}")
+    if "ratio" in values:
+        convert_value(
+            values["ratio"], field_at("operation.damping")._replace(name="--damping ratio")
+        )
     return Damping(**values)
 
 

@@ -221,7 +221,7 @@ def _read_other(folder: Path) -> tuple[Mesh, list[ModeSet]]:
     sets = _read_stage(folder, "survey") or _read_stage(folder, "modes")
     if mesh is None or sets is None:
         raise InputError(
-            f"compare = {folder}: expected the folder of an earlier run of 'bladefem modes'"
+            f"--compare {folder}: expected the folder of an earlier run of 'bladefem modes'"
         )
     return mesh, sets
 
@@ -245,7 +245,7 @@ def refuse_other_kind(folder: Path, own: Mesh, sets: Sequence[ModeSet]) -> None:
         return
     theirs, mine = ("a wheel", "a single blade")[:: 1 if of_wheel else -1]
     raise InputError(
-        f"compare = {folder}: its modes are those of {theirs}, expected the run of {mine}, as in "
+        f"--compare {folder}: its modes are those of {theirs}, expected the run of {mine}, as in "
         "this scene"
     )
 
