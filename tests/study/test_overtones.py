@@ -56,17 +56,21 @@ def marched(omega, periods=60, steps=1000):
 
 
 def test_error_of_one_harmonic_knows_a_mode_that_its_eleventh_meets(family):
-    """Seven harmonics change the height by 0.4 %, fifteen by 5.3 %."""
+    """Seven harmonics change the height by 0.5 %, fifteen by 2.7 %: they split the resonance in two
+    with a valley between, and the search for the judging peak finds the higher one.
+    """
     settings = replace(first_for(family.modes), points=None)
     model = family_member(family, settings).model
-    sweep = [solve(model, omega, 1, 64) for omega in np.linspace(1.0, 1.24, 25)]
+    band = np.linspace(1.0, 1.24, 25)
+    sweep = [solve(model, omega, 1, 64) for omega in band]
     peak = peak_from(family, settings, max(sweep, key=size), settings, 0.05)
     rich = replace(settings, harmonics=31, samples=512)
-    true = peak_from(family, settings, peak.solution, rich, 1e-3)
+    top = max((solve(model, omega, 31, 512) for omega in band), key=size)
+    true = peak_from(family, rich, top, rich, 1e-3)
     assert true.height == pytest.approx(marched(true.omega), rel=2e-3)
     error = peak_errors(family, settings, peak, 0.05).height["harmonics"]
     assert error == pytest.approx(abs(peak.height / true.height - 1), rel=0.1)
-    assert error > 0.05
+    assert error > 0.025
 
 
 def test_large_balances_keep_fewer_overtones(family, monkeypatch):
