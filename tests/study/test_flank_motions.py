@@ -52,7 +52,7 @@ def kept(monkeypatch):
     ends = {float(k): (0.9 * h, h) for k, h in enumerate(HEIGHTS)}
     asked = []
 
-    def band(model, point, counted):
+    def band(model, point, counted, known):
         asked.append(point.omega)
         lowest, highest = ends[point.omega]
         reason = "" if np.isfinite(highest) else "a march takes too many operations"

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from models import bouncing, rebounding
+from numba import njit
 
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.ring_march import PERIODS_AT_ONCE, never_enough
@@ -21,6 +22,7 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import finer_contacts, judged_resonance
 from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline.curve import Curve
+from bladefem.study.pipeline.error_in_time import Marches
 from bladefem.study.pipeline.finer_contacts import FinerMotion, unstable_with_more_points
 from bladefem.study.pipeline.flank_motions import FlankMotions
 from bladefem.study.pipeline.kept_band import kept_band
@@ -31,22 +33,28 @@ from bladefem.time.event_integrator import integrate_periods, state_at_rest
 STEPS = 1000
 
 
-def marched_amplitudes(gap, omega, harmonics, periods=240, kept=60):
-    """Amplitude of each of the last periods, by leapfrog from rest."""
+@njit
+def marched_period(q, v, gap, omega, loss):
+    """Displacements over a period and the state at its end, by leapfrog."""
     dt = 2 * np.pi / omega / STEPS
-    drive = np.cos(2 * np.pi * np.arange(STEPS) / STEPS)
+    seen = np.empty(STEPS)
+    for k in range(STEPS):
+        seen[k] = q
+        drive = np.cos(2 * np.pi * k / STEPS)
+        v += dt * (drive - q - loss * v - 10.0 * max(q - gap, 0.0))
+        q += dt * v
+    return seen, q, v
+
+
+def marched_amplitudes(gap, omega, harmonics, periods=240, kept=60, loss=0.04):
+    """Amplitude of each of the last periods, from rest."""
     q = v = 0.0
     found = []
-    for period in range(periods):
-        seen = np.empty(STEPS)
-        for k in range(STEPS):
-            seen[k] = q
-            v += dt * (drive[k] - q - 0.04 * v - 10.0 * max(q - gap, 0.0))
-            q += dt * v
-        if period >= periods - kept:
-            lines = 2 / STEPS * np.fft.rfft(seen)[1 : harmonics + 1]
-            found.append(np.linalg.norm(lines))
-    return np.array(found)
+    for _ in range(periods):
+        seen, q, v = marched_period(q, v, gap, omega, loss)
+        lines = 2 / STEPS * np.fft.rfft(seen)[1 : harmonics + 1]
+        found.append(np.linalg.norm(lines))
+    return np.array(found[-kept:])
 
 
 def test_band_of_a_doubled_period_is_that_of_a_plain_march():
@@ -60,6 +68,29 @@ def test_band_of_a_doubled_period_is_that_of_a_plain_march():
     assert found.highest == pytest.approx(truth.max(), rel=0.01)
     assert found.highest > 4 * size(point)
     assert "keeps between" in found.sentence or "ends on a motion" in found.sentence
+
+
+def test_the_way_down_from_an_unstable_motion_is_not_what_the_blade_keeps_to():
+    """With half of the damping the band is still narrowing after a hundred periods."""
+    omega, gap, loss = 3.0, 0.1, 0.02
+    model = rebounding(10.0, gap, loss)
+    family = family_of(model)
+    settings = replace(first_for(family.modes), harmonics=15, samples=1024, points=None, chosen=())
+    point = solve(model, omega, 15, 1024)
+    marches = Marches(family)
+    on_its_way = marches.band(settings, point)
+    assert on_its_way.unsettled
+    truth = marched_amplitudes(gap, omega, 15, periods=480, kept=50, loss=loss)
+    assert on_its_way.highest > 1.1 * truth.max()
+    found = judged_resonance._marched(marches, settings, point)
+    assert not found.unsettled and not found.widens
+    assert found.highest == pytest.approx(truth.max(), rel=0.01)
+    assert found.lowest == pytest.approx(truth.min(), rel=0.01)
+    # marched once
+    assert judged_resonance._marched(marches, settings, point) is found
+    # where a higher motion is known it is not marched on
+    short = module.band_by_steps(model, point, known=2 * truth.max())
+    assert short.periods == on_its_way.periods and short.unsettled
 
 
 def test_a_contact_without_friction_lifts_off_in_time():

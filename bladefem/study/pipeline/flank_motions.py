@@ -89,7 +89,9 @@ def flank_motions(
 
     def march(numbers: list[int]) -> None:
         for i in dict.fromkeys(numbers):
-            bands[i] = band_by_steps(model, curve.points[i], MAX_COUNTED)
+            # what is above is no way down: it has settled, or lasts
+            above = max([given, *(band.highest for band in bands.values() if not band.reason)])
+            bands[i] = band_by_steps(model, curve.points[i], MAX_COUNTED, above)
             if bands[i].too_long:
                 return
 

@@ -198,6 +198,8 @@ def _marched(marches: Marches, settings: Settings, point: Solution) -> KeptBand:
     kept = marches.band(settings, point)
     if kept is None or kept.too_long:
         kept = kept_of_family(marches.models, settings, point)
+    elif kept.unsettled:
+        kept = marches.marched_on(settings, point, kept)
     return kept
 
 

@@ -70,6 +70,8 @@ HELD_SHARE = 0.03
 AGREEING_SHARE = 0.02
 # relative change of the ends of a band, from one PERIODS_AT_ONCE to the next, that is none
 SETTLED_BAND = 2e-3
+# of a march, each of PERIODS_AT_ONCE, that tell whether its band stays
+PARTS = 3
 # growth of the width of a band, in two parts of a march, from which it goes on: slow ripples grow
 # by a few per cent a period
 GROWING_RATIO = 1.1
@@ -77,6 +79,8 @@ GROWING_RATIO = 1.1
 NO_WIDTH = 1e-6
 # periods of a march whose band widens, at most, over those that it has otherwise
 LONGER_WHILE_WIDENING = 4
+# the same of one that has not settled and is above what is known
+LONGER_WHILE_UNSETTLED = 2
 # relative width of a band that is one periodic motion
 ONE_MOTION = 2e-3
 
@@ -102,6 +106,9 @@ class KeptBand:
     too_long: bool = False
     # it went on widening to the end of the march
     widens: bool = False
+    # its ends did not stay to the end of the march: a way down from an unstable motion, which may
+    # bounce without a period for hundreds of periods, or a motion that never settles
+    unsettled: bool = False
     # times its own excitation by which the blade was driven before, and the amplitude that it keeps
     # at most without that [m]
     drive: float = 1.0
@@ -254,12 +261,16 @@ def band_by_steps(
     model: ReducedModel,
     point: Solution,
     counted: float = MAX_COUNTED,
+    known: float = np.inf,
 ) -> KeptBand:
     """Band of amplitudes by time stepping: with two tangents, and for travelling waves.
 
     Begun with the fewest instants whose steps are short enough for the bodies on their contacts.
     Marched again with more of them where the blade seems to leave the motion at the start and
     steps were too long, for that or for impacts, and where the forces of a step were not found.
+
+    Args:
+        known: amplitude above which the blade is marched on until its band has settled [m].
     """
     band = before = _unknown_band(point, "nothing was marched")
     left = False
@@ -271,7 +282,7 @@ def band_by_steps(
         usual = instants == INSTANTS_BY_STEPS[0]
         periods = (LEFT_BY_STEPS, KEPT_BY_STEPS) if usual else REFINED_PERIODS
         try:
-            found, resolved = _band_with(model, point, instants, *periods, counted)
+            found, resolved = _band_with(model, point, instants, *periods, counted, known)
         except (InputError, NotSolvedError) as error:
             return _unknown_band(point, str(error))
         before, band = band, found
@@ -328,9 +339,13 @@ def _band_with(
     left: int,
     kept: int,
     counted: float,
+    known: float,
 ) -> tuple[KeptBand, bool]:
     """The band by so many instants a period, and whether steps were short enough for forces that
     are linear in them.
+
+    Args:
+        known: as that of `band_by_steps`.
     """
     enough = partial(_known_enough, point, instants)
     start = state_of_solution(model, point, DISTURBANCE_SHARE)
@@ -339,33 +354,52 @@ def _band_with(
         reason = _too_long(march.operations * SECONDS_PER_OPERATION)
         return replace(_unknown_band(point, reason), too_long=True), march.resolved
     motion, spent = march.motion, march.friction_work
-    usual = LEFT_BY_STEPS + KEPT_BY_STEPS
-    most = min(LONGER_WHILE_WIDENING * usual, (left + kept) * counted / march.operations)
+    affordable = (left + kept) * counted / march.operations
     ended = len(motion) < left + kept
-    widens = not ended and _widens(motion, point)
-    while widens and march.settled and len(motion) + kept <= most:
-        if _grown_too_far(motion, point, instants):
+    while not ended and march.settled and len(motion) + kept <= affordable:
+        periods = _worthwhile_periods(motion, point, known)
+        if len(motion) + kept > periods or _grown_too_far(motion, point, instants):
             break
         march = march_ring(model, march.end, kept, instants)
         motion = np.concatenate([motion, march.motion])
         spent = np.concatenate([spent, march.friction_work])
-        widens = _widens(motion, point)
     if not (march.settled and np.isfinite(motion).all()):
         reason = "the contact forces of a step of the march were not found"
         return _unknown_band(point, reason), march.resolved
-    known = len(motion) - (PERIODS_AT_ONCE if ended else kept)
-    band = _band_of(point, motion[known:], len(motion), float(spent[known:].mean()))
-    return replace(band, widens=widens), march.resolved
+    widens = not ended and _widens(motion, point)
+    unsettled = not _has_settled(motion, point)
+    if unsettled and not widens and np.isfinite(known):
+        # what has no period is not known by a few of them
+        kept = PARTS * PERIODS_AT_ONCE
+    first = len(motion) - (PERIODS_AT_ONCE if ended else kept)
+    band = _band_of(point, motion[first:], len(motion), float(spent[first:].mean()))
+    return replace(band, widens=widens, unsettled=unsettled), march.resolved
+
+
+def _worthwhile_periods(motion: np.ndarray, point: Solution, known: float) -> int:
+    """How long a march is worth to be at most: its band widens, or is above what is known and has
+    not settled; 0 where it is at its end.
+    """
+    usual = LEFT_BY_STEPS + KEPT_BY_STEPS
+    if _widens(motion, point):
+        return LONGER_WHILE_WIDENING * usual
+    above = _ends_of_parts(motion, point).max() > known
+    return LONGER_WHILE_UNSETTLED * usual if above and not _has_settled(motion, point) else 0
 
 
 def _known_enough(point: Solution, instants: int, motion: np.ndarray) -> bool:
-    """A march by steps may end: its last parts keep to one band that they drift to no faster than
-    before and that does not widen, or it has grown so far that it is repeated with more instants.
+    """A march by steps may end: it has settled, or has grown so far that it is repeated with more
+    instants.
     """
-    if _grown_too_far(motion, point, instants):
-        return True
+    return _grown_too_far(motion, point, instants) or _has_settled(motion, point)
+
+
+def _has_settled(motion: np.ndarray, point: Solution) -> bool:
+    """The last parts of a march keep to one band that they drift to no faster than before and that
+    does not widen.
+    """
     ends = _ends_of_parts(motion, point)
-    if len(ends) < 3 or not np.isfinite(ends).all():
+    if len(ends) < PARTS or not np.isfinite(ends).all():
         return False
     before, now = abs(np.diff(ends, axis=0)).max(axis=1)
     return bool(now <= min(before, SETTLED_BAND * ends.max())) and not _widens(motion, point)
@@ -386,12 +420,12 @@ def _widens(motion: np.ndarray, point: Solution) -> bool:
     ends = _ends_of_parts(motion, point)
     widths = np.diff(ends, axis=1).ravel()
     grows = widths[-1] > max(GROWING_RATIO * widths[0], NO_WIDTH * ends.max())
-    return len(ends) == 3 and bool(grows)
+    return len(ends) == PARTS and bool(grows)
 
 
 def _ends_of_parts(motion: np.ndarray, point: Solution) -> np.ndarray:
-    """Lowest and highest amplitude [m] in each of the last parts of a march, three at most."""
-    amplitudes = amplitudes_of_periods(motion[-3 * PERIODS_AT_ONCE :], point.harmonics)
+    """Lowest and highest amplitude [m] in each of the last PARTS of a march at most."""
+    amplitudes = amplitudes_of_periods(motion[-PARTS * PERIODS_AT_ONCE :], point.harmonics)
     parts = amplitudes.reshape(-1, PERIODS_AT_ONCE * amplitudes.shape[-1])
     return np.column_stack([parts.min(axis=1), parts.max(axis=1)])
 
