@@ -25,6 +25,8 @@ from bladefem.scene.tables import Contact
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.layer_change import followed_law, layer_change
 from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.shared_accuracy import unseen_errors
 
 
 @pytest.fixture(scope="module")
@@ -289,3 +291,17 @@ def test_lengths_of_the_elements_are_those_of_the_layer(problem):
     ):
         elements, _ = friction_elements(None, maps, contact, ratio)
         assert np.isinf(decay_lengths(elements, maps, contact)).all()
+
+
+@pytest.mark.parametrize(("decay", "unknown"), [(None, False), (np.inf, False), (DECAY, True)])
+def test_the_law_is_unknown_where_a_march_with_tangents_tells_the_error(decay, unknown):
+    """A balance that is not followed to more harmonics is not followed to the law either: the error
+    of a resonance sought in time did not contain it, and was told as if the layer were linear.
+    """
+    model = sliding_mass(16.0, 30.0j)
+    lengths = None if decay is None else np.array([decay])
+    case = LoadCase(LOAD, model.elements, None, decay=lengths)
+    settings = Settings(2, 7, 128, "rigid", error=np.inf)
+    found = unseen_errors(None, case, family_of(model, [1]), None, settings, None)
+    assert np.isinf(found.layer_law) == unknown
+    assert np.isinf(found.total) == unknown
