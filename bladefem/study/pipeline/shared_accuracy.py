@@ -125,7 +125,7 @@ def unseen_errors(
     """
     # Nothing is gained by parts of an error that is unknown as a whole. A march may tell it later,
     # but with the tangent of the layer: where the balance is not followed to more harmonics it is
-    # not followed to the law either (ground faces, 36 N: 233 um, which no march with the law keeps)
+    # not followed to the law either (ground faces, 36 N: 233 um, which a march with the law leaves)
     if settings.error is not None and not np.isfinite(settings.error):
         stiffens = case.decay is not None and bool(np.isfinite(case.decay).any())
         return UnseenErrors(layer_law=np.inf if stiffens else np.nan)
