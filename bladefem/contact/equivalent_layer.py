@@ -9,6 +9,11 @@ which is exact for one harmonic (equivalent linearisation). The mean closure fol
 force, which equilibrium decides: a layer that stiffens pushes its faces apart as they vibrate. For
 p = F exp(c / s) and a closure that moves by a cos(wt) about its mean, k is 2 I1(x) / (x I0(x)) of
 the tangent, x = a / s, as long as the spring stays closed (I0, I1 modified Bessel functions).
+
+Tangentially the layer is as much stiffer as its pressure is higher at each instant. A node that
+slips mostly while it is hardly pressed and turns while it is pressed hard sees more than the
+stiffness at its mean force: the constant one whose friction, by the same return map in the same
+motion, is closest to that of the law takes its place.
 """
 
 from __future__ import annotations
@@ -30,6 +35,12 @@ HALVINGS = 60
 SMALLEST_TOUCH = 1e-9
 # of the length over which the stiffness grows: less motion than that sees the tangent
 STILL_SHARE = 1e-6
+# tangential stiffnesses that are tried, over that at the mean force, and periods of the motion
+# after which its friction repeats
+TRIED_GROWTHS = np.geomspace(0.2, 5.0, 33)
+FRICTION_PERIODS = 3
+# [N] no force
+TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -56,9 +67,26 @@ class EquivalentSprings:
     stiffness: np.ndarray
     # (n,) [N]
     load: np.ndarray
-    # (n,) tangent of the law at the mean force over that at rest, which the tangential stiffness
-    # follows
+    # (n,) tangent of the law at the mean force over that at rest
     growth: np.ndarray
+    # (n, S) normal force of the law over the period [N], that of the springs, and the tangent of
+    # the law over that at rest
+    force: np.ndarray
+    carried: np.ndarray
+    tangent: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """The layer of each element along its faces, and how it vibrates there."""
+
+    # (n,) tangential stiffness at rest [N/m], friction coefficient
+    stiffness: np.ndarray
+    mu: np.ndarray
+    # (n, tangents) friction force at rest [N]
+    start: np.ndarray
+    # (n, tangents, S) displacement over a period [m]
+    motion: np.ndarray
 
 
 def decay_lengths(
@@ -94,9 +122,11 @@ def equivalent_springs(state: LayerState) -> EquivalentSprings:
     stiffness = np.array(state.stiffness, dtype=float)
     load = np.array(state.rest, dtype=float)
     growth = np.ones(len(load))
+    carried = np.maximum(load[:, None] + stiffness[:, None] * state.motion, 0.0)
+    force, tangents = carried.copy(), np.ones_like(carried)
     chosen = np.flatnonzero(np.isfinite(state.decay) & (state.mean > 0))
     if not len(chosen):
-        return EquivalentSprings(stiffness, load, growth)
+        return EquivalentSprings(stiffness, load, growth, force, carried, tangents)
     decay, mean = state.decay[chosen, None], state.mean[chosen, None]
     tangent, rest = stiffness[chosen, None], load[chosen, None]
     # above zero where the layer of almost no first touch is known to rounding only
@@ -112,7 +142,47 @@ def equivalent_springs(state: LayerState) -> EquivalentSprings:
     stiffness[chosen] = fitted[:, 0]
     load[chosen] = (-fitted * (threshold + moved))[:, 0]
     growth[chosen] = (stiffness_at(law, mean) / tangent)[:, 0]
-    return EquivalentSprings(stiffness, load, growth)
+    force[chosen] = force_of(law, closure + swing)
+    carried[chosen] = fitted * np.maximum(swing - threshold, 0.0)
+    tangents[chosen] = stiffness_at(law, force[chosen]) / tangent
+    return EquivalentSprings(stiffness, load, growth, force, carried, tangents)
+
+
+def tangential_growth(springs: EquivalentSprings, sliding: Sliding) -> np.ndarray:
+    """(n,) tangential stiffness over that at rest with which the friction of the springs is closest
+    to that of the law, whose stiffness follows its pressure at each instant.
+    """
+    growth = TRIED_GROWTHS[:, None] * springs.growth
+    constant = np.broadcast_to(growth[..., None], (*growth.shape, springs.force.shape[1]))
+    left = _friction(springs.carried, constant, sliding)
+    left -= _friction(springs.force, springs.tangent[None], sliding)
+    # a constant part is no vibration
+    left -= left.mean(axis=-1, keepdims=True)
+    best = np.argmin((left**2).sum(axis=(-2, -1)), axis=0)
+    moves = np.ptp(sliding.motion, axis=2).max(axis=1) > 0
+    return np.where(moves, growth[best, np.arange(len(best))], springs.growth)
+
+
+def _friction(normal: np.ndarray, growth: np.ndarray, sliding: Sliding) -> np.ndarray:
+    """(layers, n, tangents, S) friction force [N] over the last of some periods, by a return map.
+
+    Args:
+        normal: (n, S) force [N].
+        growth: (layers, n, S) tangential stiffness over that at rest.
+    """
+    instants = normal.shape[1]
+    out = np.zeros((len(growth), *sliding.motion.shape))
+    force = np.broadcast_to(sliding.start, out.shape[:-1])
+    limit = sliding.mu[:, None] * normal
+    stiffness = sliding.stiffness[:, None] * growth
+    moved = sliding.motion - np.roll(sliding.motion, 1, axis=2)
+    for i in range(FRICTION_PERIODS * instants):
+        k = i % instants
+        force = force + stiffness[..., k, None] * moved[..., k]
+        size = np.maximum(np.linalg.norm(force, axis=-1), TINY)
+        force = force * np.minimum(1.0, limit[:, k] / size)[..., None]
+        out[..., k] = force
+    return out
 
 
 def _mean_closure(law: InterfaceLaw, swing: np.ndarray, mean: np.ndarray) -> np.ndarray:

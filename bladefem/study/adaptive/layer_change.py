@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...contact.equivalent_layer import LayerState, equivalent_springs
+from ...contact.equivalent_layer import LayerState, Sliding, equivalent_springs, tangential_growth
 from ...contact.numerical_stiffness import physical_stiffness
 from ...data import Elements
 from ...friction.fourier import synthesis
@@ -42,7 +42,9 @@ def layer_change(
     where that was not solved.
 
     What the last pass still changed is added. 0 where the layer is linear or its motion too small
-    to tell the two apart.
+    to tell the two apart. Of the tangential stiffness at the mean force, and of that whose friction
+    is closest to the law's at each instant, the one that changes more: where the pressure follows
+    the sliding the second alone sees too little.
 
     Args:
         settings, top: of the resonance, and its highest point.
@@ -55,8 +57,24 @@ def layer_change(
         return 0.0
     # elements are on one seat each, which has one length
     decay = decay[np.unique(member.groups, return_index=True)[1]]
-    model = followed_law(tangent, tangent, top, decay)
-    if np.allclose(model.elements.kn, tangent.elements.kn, rtol=SAME_STIFFNESS, atol=0.0):
+    changes = (_change(tangent, settings, top, decay, instants) for instants in (False, True))
+    return max(changes)
+
+
+def _change(
+    tangent: ReducedModel,
+    settings: Settings,
+    top: Solution,
+    decay: np.ndarray,
+    instants: bool,
+) -> float:
+    """The change with one of the two tangential stiffnesses of ``followed_law``."""
+    model = followed_law(tangent, tangent, top, decay, instants)
+    same = (
+        np.allclose(getattr(model.elements, k), getattr(tangent.elements, k), SAME_STIFFNESS, 0.0)
+        for k in ("kn", "kt")
+    )
+    if all(same):
         return 0.0
     point, height, left = top, size(top), np.inf
     for _ in range(MAX_PASSES):
@@ -67,7 +85,7 @@ def layer_change(
         point, height = peak.solution, peak.height
         if left < PEAK_TOLERANCE:
             break
-        model = followed_law(tangent, model, point, decay)
+        model = followed_law(tangent, model, point, decay, instants)
     return abs(height / size(top) - 1) + left
 
 
@@ -76,6 +94,7 @@ def followed_law(
     model: ReducedModel,
     point: Solution,
     decay: np.ndarray,
+    instants: bool = False,
 ) -> ReducedModel:
     """The model with the springs of the layer's law in the motion of a point.
 
@@ -83,6 +102,8 @@ def followed_law(
         tangent: whose elements have the stiffness at rest.
         model: that the point solves, this one or of an earlier pass.
         decay: (n,) of its elements [m].
+        instants: with the tangential stiffness whose friction is closest to that of a layer that
+            stiffens at each instant; that at the mean force otherwise.
     """
     elements, series = tangent.elements, tangent.series
     layer = physical_stiffness(elements, series)
@@ -97,14 +118,27 @@ def followed_law(
     motion = across + added[:, None] * (force - rest[:, None])
     mean = np.maximum(point.f[:, 0, 0], 0.0)
     found = equivalent_springs(LayerState(decay, layer.kn, layer.n0, motion, mean))
+    growth = found.growth
+    if instants:
+        growth = tangential_growth(found, _sliding(tangent, layer, point, count))
     share = 1.0 - found.stiffness * added
     kn = found.stiffness / share
     load = (found.load - found.stiffness * added * rest) / share
     return replace(
         tangent,
-        elements=replace(elements, kn=kn, kt=_tangential(tangent, layer, found.growth)),
+        elements=replace(elements, kn=kn, kt=_tangential(tangent, layer, growth)),
         closing=(load - elements.n0) / kn,
     )
+
+
+def _sliding(tangent: ReducedModel, layer: Elements, point: Solution, count: int) -> Sliding:
+    """How the layer moves along its faces in the motion of a point, over so many instants."""
+    back = synthesis(point.harmonics, count).T
+    motion = point.w[:, 1:] @ back
+    if tangent.series is not None:
+        # what a split layer leaves to the bodies is sliding of the layer all the same
+        motion = motion + tangent.series[:, 1, None, None] * (point.f[:, 1:] @ back)
+    return Sliding(layer.kt, layer.mu, layer.traction, motion)
 
 
 def _tangential(tangent: ReducedModel, layer: Elements, growth: np.ndarray) -> np.ndarray:

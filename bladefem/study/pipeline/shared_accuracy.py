@@ -123,9 +123,12 @@ def unseen_errors(
     Args:
         settings, top: of the resonance, and its highest point.
     """
-    # nothing is gained by parts of an error that is unknown as a whole
+    # Nothing is gained by parts of an error that is unknown as a whole. A march may tell it later,
+    # but with the tangent of the layer: where the balance is not followed to more harmonics it is
+    # not followed to the law either (ground faces, 36 N: 233 um, which a march with the law leaves)
     if settings.error is not None and not np.isfinite(settings.error):
-        return UnseenErrors()
+        stiffens = case.decay is not None and bool(np.isfinite(case.decay).any())
+        return UnseenErrors(layer_law=np.inf if stiffens else np.nan)
     if settings.softened:
         change = stiff_layer_change(models, settings, top, scene.accuracy)
         layer, shift, height = change.error, change.frequency, change.height
