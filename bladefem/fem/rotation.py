@@ -26,6 +26,7 @@ import numpy as np
 
 from ..errors import InputError, NotSolvedError
 from ..scene.material_table import expands_by_axes
+from ..scene.units import show
 from ..util.newton import Outcome, StepError, iterate_newton
 from . import shape_functions as shape
 from .body import Body, body_properties, cells_of, degrees, sum_matrices
@@ -297,8 +298,8 @@ def _load_steps(
             if halvings > MAX_LOAD_HALVINGS:
                 heated = f" and {done:.0%} of the heat" if has_thermal_strain(con.body) else ""
                 raise NotSolvedError(
-                    f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} "
-                    f"of the speed{heated} {error}"
+                    f"operation.speed = {show(speed, 'rad/s')}: the nonlinear preload was not "
+                    f"found, beyond {np.sqrt(done):.0%} of the speed{heated} {error}"
                 )
             continue
         u = trial
@@ -327,6 +328,11 @@ def state_tangent(body: Body, state: SteadyState) -> PETSc.Mat:
     return linear_tangent(body, state.displacement, state.speed, state.axis)
 
 
+def body_about(body: Body, state: SteadyState) -> Body:
+    """The body at rest with the stiffness that it has about a steady state; mass and nodes stay."""
+    return replace(body, K=state_tangent(body, state), state=state)
+
+
 def body_under_rotation(
     body: Body,
     speed: float,
@@ -349,10 +355,11 @@ def body_under_rotation(
     if speed == 0 and not has_thermal_strain(body):
         return body
     if not linear:
-        return replace(body, K=tangent(body, preload(body, speed, clamp, axis), axis))
+        found = preload(body, speed, clamp, axis)
+        return body_about(body, SteadyState(found.displacement, speed, axis, large=True))
     flex = flexible(in_step(body, clamp))
     u0 = speed**2 * unit_speed_displacement(flex, axis) + thermal_displacement(flex)
-    return replace(body, K=linear_tangent(body, u0, speed, axis))
+    return body_about(body, SteadyState(u0, speed, axis))
 
 
 def _check_speed(speed: float) -> None:

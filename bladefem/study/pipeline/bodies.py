@@ -147,12 +147,12 @@ class Bodies:
         return self._blade_about(self.state_at(speed))
 
     def _blade_about(self, state: SteadyState | None) -> Body:
-        from ...fem.rotation import state_tangent
+        from ...fem.rotation import body_about
 
         if state is None:
             return self.still_blade
         self._release_still()
-        return replace(self.still_blade, K=state_tangent(self.still_blade, state))
+        return body_about(self.still_blade, state)
 
     @cached_property
     def state(self) -> SteadyState | None:
