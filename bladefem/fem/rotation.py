@@ -242,6 +242,7 @@ def preload(
     axis: tuple[float, float, float] = AXIS,
     tolerance: float = 1e-10,
     quadrature: str = "exact",
+    given: np.ndarray | None = None,
 ) -> Preload:
     """The nonlinear static state under a steady rotation and heat, by Newton's method with load
     steps that halve when it fails.
@@ -255,6 +256,8 @@ def preload(
         tolerance: wanted |unbalanced force| over |centrifugal and thermal force|; rounding may
             leave more in slender bodies.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
+        given: (n_points, dim) displacement [m] that the clamp keeps, and that Newton's method
+            starts from elsewhere; zero when left out.
 
     Raises:
         InputError: speed is negative or not finite, no such face.
@@ -262,13 +265,15 @@ def preload(
             the message says where.
     """
     _check_speed(speed)
-    if speed == 0 and not has_thermal_strain(body):
+    if given is None and speed == 0 and not has_thermal_strain(body):
         return Preload(np.zeros((len(body.mesh.points), body.dim)), speed, 0, 0, 0.0)
     forms = _potential_forms(body, axis, quadrature)
     con = in_step(body, clamp)
     load = centrifugal(body, speed, axis) + thermal_force(body, quadrature)
     size = _vector_length(con, restrict_load(con, load.reshape(-1, 1)))
-    u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size)
+    if given is None:
+        given = np.zeros((len(body.mesh.points), body.dim))
+    u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size, given)
     return Preload(u, speed, iterations, steps, misfit / size)
 
 
@@ -278,6 +283,7 @@ def _load_steps(
     forms: Sequence[_Forms],
     speed: float,
     limit: float,
+    given: np.ndarray,
 ) -> tuple[np.ndarray, int, int, float]:
     """The state at a speed, Newton iterations, load steps, and the unbalanced force left [N]."""
     u = np.zeros((len(con.body.mesh.points), con.body.dim))
@@ -290,7 +296,8 @@ def _load_steps(
     while done < 1.0:
         target = min(done + part, 1.0)
         _set_heating(forms, target)
-        trial, used, error = _solve_newton(con, clamp, forms, u, target * speed**2, limit)
+        start = u + (target - done) * given
+        trial, used, error = _solve_newton(con, clamp, forms, start, target * speed**2, limit)
         iterations += used
         if isinstance(error, str):
             halvings = halvings + 1
