@@ -23,6 +23,10 @@ class NotSolvedError(RuntimeError):
     """
 
 
+class IndefiniteError(NotSolvedError):
+    """A stiffness that should be positive definite is not."""
+
+
 def missing_file(path: str | Path) -> str:
     """The tail of an error message for a path that is no file."""
     return "a folder, expected a file" if Path(path).is_dir() else "there is no such file"

@@ -8,7 +8,7 @@ from types import ModuleType
 import numpy as np
 
 from .mesh import Mesh
-from .session import gmsh_session
+from .session import gmsh_path, gmsh_session
 from .topology import GMSH_TYPES, face_word
 
 GMSH_NUMBER = {word: number for number, word in GMSH_TYPES.items()}
@@ -47,7 +47,7 @@ def write_msh(
             _add_group(gmsh, dim, entity, name, word, cells)
         gmsh.option.setNumber("Mesh.MshFileVersion", version)
         gmsh.option.setNumber("Mesh.Binary", int(binary))
-        gmsh.write(str(file))
+        gmsh.write(gmsh_path(file))
 
 
 def _add_group(

@@ -18,7 +18,7 @@ import numpy as np
 
 from bladefem.errors import InputError, missing_file
 
-from .session import gmsh_session
+from .session import gmsh_path, gmsh_session
 from .topology import CORNERS, DIMENSION, EDGES, FAMILY, GMSH_TYPES, NODES
 
 # corner pairs of the edges in the order of VTK, meshio, Abaqus, Ansys and Nastran
@@ -112,7 +112,7 @@ def read_by_gmsh(file: Path) -> RawMesh:
     """.msh (versions 1, 2 and 4, text or binary), .med, .unv: physical groups become names."""
     with gmsh_session() as gmsh:
         gmsh.option.setNumber("Mesh.IgnorePeriodicity", 1)
-        gmsh.merge(str(file))
+        gmsh.merge(gmsh_path(file))
         return from_gmsh_model(gmsh)
 
 

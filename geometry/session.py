@@ -4,8 +4,10 @@ twice the same.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import ModuleType
 
 from bladefem.errors import InputError
@@ -49,6 +51,19 @@ def gmsh_session() -> Iterator[ModuleType]:
         yield gmsh
     finally:
         gmsh.finalize()
+
+
+def gmsh_path(file: str | Path) -> str:
+    """The name of a file for gmsh, which takes UTF-8 whatever the locale: in the locale C a name
+    with umlauts is a text that has no UTF-8.
+
+    Raises:
+        InputError: the file's name is in another encoding.
+    """
+    try:
+        return os.fsencode(file).decode()
+    except UnicodeDecodeError as error:
+        raise InputError(f"'{file}': expected a path in UTF-8, gmsh takes no other one") from error
 
 
 @contextmanager

@@ -29,7 +29,7 @@ from .mesh import Mesh
 from .parameters import MeshSize, Wedge
 from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
-from .session import gmsh_session, gmsh_step
+from .session import gmsh_path, gmsh_session, gmsh_step
 from .step_names import solids_of_volumes, written_solids
 from .step_unit import file_unit
 
@@ -176,7 +176,7 @@ def _import_shapes(
     """Shapes in metres."""
     gmsh.option.setNumber("Geometry.OCCImportLabels", 1)
     gmsh.option.setString("Geometry.OCCTargetUnit", "M")
-    shapes = gmsh.model.occ.importShapes(str(path))
+    shapes = gmsh.model.occ.importShapes(gmsh_path(path))
     if not any(dim == 3 for dim, _ in shapes):
         raise InputError(f"imported.file = '{path}': no solids inside, expected at least one")
     if factor != 1.0:

@@ -131,10 +131,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _replace_unknown_letters() -> None:
-    """Print "?" for letters that the terminal's encoding does not have, as ± and ∞ in Latin 1; the
-    summary of a run would end in a traceback.
+    """Print "?" for letters that the terminal's encoding does not have, as ± and ∞ in Latin 1 or
+    umlauts in ASCII; the summary of a run would end in a traceback.
     """
-    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors == "strict":
+    # Python's own choice in the locales C and POSIX is "surrogateescape", which fails as "strict"
+    if isinstance(sys.stdout, TextIOWrapper) and sys.stdout.errors in ("strict", "surrogateescape"):
         sys.stdout.reconfigure(errors="replace")
 
 

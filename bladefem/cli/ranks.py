@@ -138,6 +138,12 @@ def _error_sentence(error: Exception) -> tuple[int, str]:
         return 2, str(error)
     if isinstance(error, NotSolvedError):
         return 1, f"not solved: {error}"
+    if isinstance(error, UnicodeEncodeError) and error.encoding == sys.getfilesystemencoding():
+        return 2, (
+            f"'{error.object}': the names of files are in {error.encoding.upper()} in this locale, "
+            "which lacks some of these letters; expected a locale with UTF-8, such as "
+            "LC_ALL=C.UTF-8"
+        )
     if isinstance(error, MemoryError):
         return 1, f"not solved: out of memory ({error}); a coarser mesh.size needs less"
     if (

@@ -39,7 +39,14 @@ from ..scene.units import newtons
 from ..util.arrays import RealArray
 from .interface_law import InterfaceLaw, closure_of, compliance_at
 from .patch import initial_gap, port_matrix
-from .seating import ContactProblem, condense_body, held_motions, rigid_and_load, spin_axis
+from .seating import (
+    ContactProblem,
+    condense_blade,
+    condense_body,
+    held_motions,
+    rigid_and_load,
+    spin_axis,
+)
 
 # number of the translation along the engine axis among the rigid motions of a body in space
 AXIAL_TRANSLATION = 2
@@ -134,15 +141,14 @@ def frictional_problem(
     blade: Flexibility,
     damper: Flexibility,
     clearance: float | np.ndarray = 0.0,
+    swell: np.ndarray | None = None,
 ) -> FrictionalProblem:
     """Condense two bodies onto all ports of their patches, as ``seating.contact_problem`` does onto
     the normal ones.
     """
     body = damper.con.body
     pull = centrifugal(body, 1.0, spin_axis(mesh))
-    C, blade_swell = condense_body(
-        blade, port_matrix(patches, mesh), centrifugal(blade.con.body, 1.0, spin_axis(mesh))
-    )
+    C, blade_swell = condense_blade(blade, port_matrix(patches, mesh), mesh, swell)
     C_damper, damper_swell = condense_body(damper, port_matrix(patches, mesh, "damper"), pull)
     rigid, load = rigid_and_load(mesh, patches, body, pull)
     gap = np.concatenate([initial_gap(p, mesh) for p in patches]) + clearance

@@ -93,6 +93,7 @@ def contact_problem(
     damper: Flexibility | Body,
     clearance: float | np.ndarray = 0.0,
     pull: np.ndarray | None = None,
+    swell: np.ndarray | None = None,
 ) -> ContactProblem:
     """Condense two bodies onto the normal ports of their patches.
 
@@ -104,6 +105,8 @@ def contact_problem(
             ``patch.patch_means``); negative for an interference.
         pull: (n_points*dim,) load on the damper [N] instead of its centrifugal load;
             ``solve_seating`` it with ``normal``.
+        swell: (n_points, dim) displacement of the blade for unit rotation [m s^2] instead of the
+            linear one.
 
     Raises:
         InputError: the blade is not in nodal diameter 0, or the clearance does not fit the ports.
@@ -116,11 +119,7 @@ def contact_problem(
     ports = normal_ports(patches, mesh)
     body = damper if isinstance(damper, Body) else damper.con.body
     pull = centrifugal(body, 1.0, spin_axis(mesh)) if pull is None else pull
-    C, blade_swell = condense_body(
-        blade,
-        port_matrix(patches, mesh)[:, ports],
-        centrifugal(blade.con.body, 1.0, spin_axis(mesh)),
-    )
+    C, blade_swell = condense_blade(blade, port_matrix(patches, mesh)[:, ports], mesh, swell)
     damper_swell = np.zeros(len(ports))
     if not isinstance(damper, Body):
         C_damper, damper_swell = condense_body(
@@ -221,6 +220,21 @@ def _fitted(problem: ContactProblem) -> ContactProblem:
     """The problem with faces that fit each other whatever the rotation."""
     none = np.zeros_like(problem.clearance)
     return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
+
+
+def condense_blade(
+    blade: Flexibility,
+    P: sp.spmatrix,
+    mesh: Mesh,
+    swell: np.ndarray | None = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Flexibility (n, n) of the blade at its ports, and their displacement (n,) for unit rotation.
+
+    Args:
+        swell: as in :func:`contact_problem`.
+    """
+    C, moved = condense_body(blade, P, centrifugal(blade.con.body, 1.0, spin_axis(mesh)))
+    return C, moved if swell is None else P.T @ swell.ravel()
 
 
 def condense_body(

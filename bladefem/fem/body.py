@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -41,6 +41,9 @@ from .temperature import (
     material_numbers,
 )
 
+if TYPE_CHECKING:
+    from .rotation import SteadyState
+
 # degrees of quadrature for properties that vary in an element
 EXTRA_DEGREE = 2
 IN_MEMORY = MemoryPlan(0.0)
@@ -70,6 +73,8 @@ class Body:
     comm: MPI.Comm
     # face or node set that a clamp named "clamp" refers to; "" for none
     hold: str = "clamp"
+    # that K is about; None at rest
+    state: SteadyState | None = None
     # [N/m] springs to the ground, in K already
     spring: PETSc.Mat | None = None
     # face or node set, and the letters of the displacements held on it

@@ -30,6 +30,9 @@ bind_h5py()
 _setdlopenflags = sys.setdlopenflags
 # not even during the import: HDF5's symbols would stay global
 sys.setdlopenflags = lambda flags: None
+_arguments = sys.argv
+# dolfinx hands the command line to its log, and fails at file names that are no UTF-8
+sys.argv = _arguments[:1]
 try:
     from .petsc_start import start_petsc
 
@@ -50,6 +53,8 @@ except (ImportError, AttributeError, RuntimeError) as error:
         "expected the numpy that it was compiled with, on Debian 12: pip install "
         "'bladefem[run,debian12]'"
     ) from error
+finally:
+    sys.argv = _arguments
 
 sys.setdlopenflags = _setdlopenflags
 

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, lapack, lu_factor, lu_solve
 
-from ..errors import NotSolvedError
+from ..errors import IndefiniteError, NotSolvedError
 from .compat import MPI, shared_matrix
 from .memory import give_back
 from .mumps import Factorised, factorise_matrix, solve_matrix
@@ -284,11 +284,11 @@ def join_cut_faces(
     try:
         dense = cho_factor(S, lower=True)
     except np.linalg.LinAlgError as error:
-        raise NotSolvedError(floats) from error
+        raise IndefiniteError(floats) from error
     # of a singular matrix rounding leaves a last pivot of either sign
     pivots = dense[0].diagonal().real ** 2
     if (pivots < len(S) * np.finfo(float).eps * S.diagonal().real).any():
-        raise NotSolvedError(floats)
+        raise IndefiniteError(floats)
     return Rim(core, faces, dense, -1)
 
 

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import qr
 
-from ..errors import InputError
-from .body import rigid_modes
+from ..errors import IndefiniteError, InputError
+from ..scene.units import show
+from .body import Body, rigid_modes
 from .compat import PETSc
 from .constraint import Constrained, expand_to_mesh, unknowns
 from .linalg import (
@@ -32,8 +33,13 @@ from .memory import give_back
 
 # of the mean diagonal of K over that of M: squared frequency of a motion that springs do not hold
 UNHELD_FREQUENCY_RATIO = 1e-12
-# the same: squared frequency of a rigid motion that is more than rounding and second-order terms
-HELD_FREQUENCY_RATIO = 1e-10
+# the same: squared frequency of a rigid motion that rounding leaves, some 1e-16, and that
+# second-order terms of thermal strains leave
+ROUNDED_FREQUENCY_RATIO = 1e-14
+THERMAL_FREQUENCY_RATIO = 1e-10
+# of the squared speed: the same by second-order terms of rotation, some 1e-7; what rotation drives
+# or resists has a squared frequency of its order
+TURNING_FREQUENCY_RATIO = 1e-3
 # of the mean diagonal of K times a motion: a force on it that is rounding
 RIGID_FORCE = 1e-10
 # corrections of rigid motions, each of which leaves a hundredth of the error
@@ -66,15 +72,20 @@ def flexible(con: Constrained, prop: float = 1.0, settled: bool = True) -> Flexi
     force is the rigid one and what that deformation adds, a static answer.
 
     Raises:
-        InputError: a loaded body can move rigidly, and the load resists or drives that.
+        InputError: a loaded body can move rigidly, and the load resists or drives that, or the
+            body does not withstand its rotation (settled).
         NotSolvedError: from MUMPS.
     """
     R = rigid_basis(con)
-    on_disk = con.body.plan.on_disk
+    springs = _place_springs(con, R, prop) if R.shape[1] else None
+    try:
+        factor = factorise(con.K, springs=springs, on_disk=con.body.plan.on_disk)
+    except IndefiniteError:
+        if settled:
+            _refuse_buckled(con.body)
+        raise
     if not R.shape[1]:
-        return Flexibility(con, factorise(con.K, on_disk=on_disk), R, R)
-    springs = _place_springs(con, R, prop)
-    factor = factorise(con.K, springs=springs, on_disk=on_disk)
+        return Flexibility(con, factor, R, R)
     flex = Flexibility(con, factor, R, apply_block(con.M, R))
     if not settled:
         return flex
@@ -82,11 +93,26 @@ def flexible(con: Constrained, prop: float = 1.0, settled: bool = True) -> Flexi
         force = apply_block(con.K, flex.R)
         limit = RIGID_FORCE * mean_diagonal(con.K)
         if _size(con, force) <= limit * _size(con, flex.R):
-            return flex
+            break
         R = _orthonormal(con, flex.R - compliance(flex, force))
         flex = Flexibility(con, factor, R, apply_block(con.M, R))
     _check_settled(flex)
     return flex
+
+
+def _refuse_buckled(body: Body) -> None:
+    """Refuse a speed under which a body has no stiffness left in some direction: at rest it has,
+    the preload was found with that.
+    """
+    if body.state is None or not body.state.speed > 0:
+        return
+    kind = "nonlinear" if body.state.large else "linear"
+    other = "" if body.state.large else ', or operation.preload = "nonlinear"'
+    raise InputError(
+        f"operation.speed = {show(body.state.speed, 'rad/s')}: about the preload of this rotation "
+        f'(operation.preload = "{kind}") the blade is not stable, it buckles, or spin softening '
+        f"outweighs its stiffness; expected a lower speed, a stiffer blade or disc{other}"
+    )
 
 
 def discard(flex: Flexibility) -> None:
@@ -103,8 +129,19 @@ def discard(flex: Flexibility) -> None:
 def _check_settled(flex: Flexibility) -> None:
     """Refuse a load that resists or drives a rigid motion."""
     con = flex.con
-    pull = inner_products(con.body.comm, flex.R, apply_block(con.K, flex.R))
-    if abs(pull).max() > HELD_FREQUENCY_RATIO * mean_diagonal(con.K) / mean_diagonal(con.M):
+    body = con.body
+    heated = body.heat is not None and body.heat.strains
+    speed = 0.0 if body.state is None else body.state.speed
+    if not (speed > 0 or heated):
+        return
+    ratio = THERMAL_FREQUENCY_RATIO if heated else ROUNDED_FREQUENCY_RATIO
+    if body.spring is not None:
+        # of soft springs that count as none
+        ratio += UNHELD_FREQUENCY_RATIO
+    limit = ratio * mean_diagonal(con.K) / mean_diagonal(con.M)
+    limit += TURNING_FREQUENCY_RATIO * speed**2
+    pull = inner_products(body.comm, flex.R, apply_block(con.K, flex.R))
+    if abs(pull).max() > limit:
         raise InputError(
             "support: it leaves the body free to turn or slide while rotation or heat loads it "
             "there, so that it has no steady place, expected supports that hold it, or "

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from ..errors import NotSolvedError
+from ..errors import IndefiniteError, NotSolvedError
 from .compat import PETSc, no_error_messages
 
 # columns a solve: MUMPS works on them by matrix products, 256 are no faster
@@ -27,6 +27,8 @@ EXTRA_MEMORY_PERCENTS = (40, 200)
 EXACT_MEMORY_PERCENTS = (5, *EXTRA_MEMORY_PERCENTS)
 # INFOG(1) where the room that MUMPS took by its own estimate ended, of integers or of numbers
 ESTIMATE_EXCEEDED = (-8, -9)
+# where Cholesky met a pivot that is not positive
+NOT_DEFINITE = -40
 # MATOP_LUFACTOR_SYMBOLIC
 SYMBOLIC_FACTORISATION = 25
 # share of non-zero rows below which a right-hand side counts as sparse
@@ -90,13 +92,14 @@ def factorise_matrix(
             break
     code = F.getMumpsInfog(1)
     if failed or code < 0:
-        raise NotSolvedError(_failure_reason(code, F.getMumpsInfog(2), A.size[0]))
+        kind = IndefiniteError if code == NOT_DEFINITE else NotSolvedError
+        raise kind(_failure_reason(code, F.getMumpsInfog(2), A.size[0]))
     # and with it PETSc's hold on A
     pc.destroy()
     negative = F.getMumpsInfog(12)
     # MUMPS goes on in silence
     if definite and negative:
-        raise NotSolvedError(
+        raise IndefiniteError(
             f"the matrix of {A.size[0]} unknowns is not positive definite, MUMPS met {negative} "
             "negative pivots: a part floats, nothing joins it to the rest, or the state has buckled"
         )
@@ -295,7 +298,8 @@ def _failure_reason(
     else:
         what = {
             -10: "the matrix is singular: a part floats, or nothing joins it to the rest",
-            -40: "the matrix is not positive definite: a part floats, or the state has buckled",
+            NOT_DEFINITE: "the matrix is not positive definite: a part floats, or the state has "
+            "buckled",
         }.get(code, "the factorisation failed")
     return f"MUMPS stopped on {size} unknowns: {what} (INFOG(1) = {code}, INFOG(2) = {detail})"
 

@@ -26,6 +26,7 @@ import numpy as np
 
 from ..errors import InputError, NotSolvedError
 from ..scene.material_table import expands_by_axes
+from ..scene.units import show
 from ..util.newton import Outcome, StepError, iterate_newton
 from . import shape_functions as shape
 from .body import Body, body_properties, cells_of, degrees, sum_matrices
@@ -241,6 +242,7 @@ def preload(
     axis: tuple[float, float, float] = AXIS,
     tolerance: float = 1e-10,
     quadrature: str = "exact",
+    given: np.ndarray | None = None,
 ) -> Preload:
     """The nonlinear static state under a steady rotation and heat, by Newton's method with load
     steps that halve when it fails.
@@ -254,6 +256,8 @@ def preload(
         tolerance: wanted |unbalanced force| over |centrifugal and thermal force|; rounding may
             leave more in slender bodies.
         quadrature: "exact" or "ccx", as in :func:`bladefem.fem.body.assemble`.
+        given: (n_points, dim) displacement [m] that the clamp keeps, and that Newton's method
+            starts from elsewhere; zero when left out.
 
     Raises:
         InputError: speed is negative or not finite, no such face.
@@ -261,13 +265,15 @@ def preload(
             the message says where.
     """
     _check_speed(speed)
-    if speed == 0 and not has_thermal_strain(body):
+    if given is None and speed == 0 and not has_thermal_strain(body):
         return Preload(np.zeros((len(body.mesh.points), body.dim)), speed, 0, 0, 0.0)
     forms = _potential_forms(body, axis, quadrature)
     con = in_step(body, clamp)
     load = centrifugal(body, speed, axis) + thermal_force(body, quadrature)
     size = _vector_length(con, restrict_load(con, load.reshape(-1, 1)))
-    u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size)
+    if given is None:
+        given = np.zeros((len(body.mesh.points), body.dim))
+    u, iterations, steps, misfit = _load_steps(con, clamp, forms, speed, tolerance * size, given)
     return Preload(u, speed, iterations, steps, misfit / size)
 
 
@@ -277,6 +283,7 @@ def _load_steps(
     forms: Sequence[_Forms],
     speed: float,
     limit: float,
+    given: np.ndarray,
 ) -> tuple[np.ndarray, int, int, float]:
     """The state at a speed, Newton iterations, load steps, and the unbalanced force left [N]."""
     u = np.zeros((len(con.body.mesh.points), con.body.dim))
@@ -289,7 +296,8 @@ def _load_steps(
     while done < 1.0:
         target = min(done + part, 1.0)
         _set_heating(forms, target)
-        trial, used, error = _solve_newton(con, clamp, forms, u, target * speed**2, limit)
+        start = u + (target - done) * given
+        trial, used, error = _solve_newton(con, clamp, forms, start, target * speed**2, limit)
         iterations += used
         if isinstance(error, str):
             halvings = halvings + 1
@@ -297,8 +305,8 @@ def _load_steps(
             if halvings > MAX_LOAD_HALVINGS:
                 heated = f" and {done:.0%} of the heat" if has_thermal_strain(con.body) else ""
                 raise NotSolvedError(
-                    f"the preload at {speed:.6g} rad/s was not found: beyond {np.sqrt(done):.0%} "
-                    f"of the speed{heated} {error}"
+                    f"operation.speed = {show(speed, 'rad/s')}: the nonlinear preload was not "
+                    f"found, beyond {np.sqrt(done):.0%} of the speed{heated} {error}"
                 )
             continue
         u = trial
@@ -327,6 +335,11 @@ def state_tangent(body: Body, state: SteadyState) -> PETSc.Mat:
     return linear_tangent(body, state.displacement, state.speed, state.axis)
 
 
+def body_about(body: Body, state: SteadyState) -> Body:
+    """The body at rest with the stiffness that it has about a steady state; mass and nodes stay."""
+    return replace(body, K=state_tangent(body, state), state=state)
+
+
 def body_under_rotation(
     body: Body,
     speed: float,
@@ -349,10 +362,11 @@ def body_under_rotation(
     if speed == 0 and not has_thermal_strain(body):
         return body
     if not linear:
-        return replace(body, K=tangent(body, preload(body, speed, clamp, axis), axis))
+        found = preload(body, speed, clamp, axis)
+        return body_about(body, SteadyState(found.displacement, speed, axis, large=True))
     flex = flexible(in_step(body, clamp))
     u0 = speed**2 * unit_speed_displacement(flex, axis) + thermal_displacement(flex)
-    return replace(body, K=linear_tangent(body, u0, speed, axis))
+    return body_about(body, SteadyState(u0, speed, axis))
 
 
 def _check_speed(speed: float) -> None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, lapack
 
-from ..errors import NotSolvedError
+from ..errors import IndefiniteError, NotSolvedError
 from .compat import MPI
 from .subdomains import Cut
 
@@ -123,7 +123,7 @@ def _solve_between(
         try:
             factor, _ = cho_factor(between, lower=True)
         except np.linalg.LinAlgError as error:
-            raise NotSolvedError(
+            raise IndefiniteError(
                 "the sector's stiffness is not positive definite: it has buckled"
             ) from error
         return cho_solve((factor, True), across), factor, 0

@@ -209,8 +209,8 @@ class Operation:
     preload: str = quantity(
         "linear",
         choices=("linear", "nonlinear"),
-        help="state that the modes vibrate about and that static stresses are of: first-order, or "
-        "with large displacements",
+        help="state that the modes vibrate about, and that seats and static stresses are of: "
+        "first-order, or with large displacements",
     )
     coriolis: bool | None = quantity(
         None,

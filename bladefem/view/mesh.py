@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from dataclasses import replace
 from itertools import cycle
@@ -162,7 +163,8 @@ def write_vtu(grid: UnstructuredGrid, file: str | Path) -> Path:
 
     Path(file).parent.mkdir(parents=True, exist_ok=True)
     writer = vtkXMLUnstructuredGridWriter()
-    writer.SetFileName(str(file))
+    # the name as the system has it: VTK would write it in UTF-8 whatever the locale
+    writer.SetFileName(os.fsencode(file))
     writer.SetInputData(grid)
     writer.SetDataModeToAppended()
     writer.EncodeAppendedDataOff()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import signal
 import subprocess
@@ -175,6 +176,39 @@ def test_letters_that_a_terminal_does_not_have_are_no_error(monkeypatch):
     assert main(["check", str(SCENES / "plane.toml"), "--set", "title=± ∞"]) == 0
     sys.stdout.flush()
     assert "± ?" in written.getvalue().decode("latin-1")
+
+
+@pytest.mark.parametrize("command", ["check", "mesh"])
+def test_umlauts_in_a_locale_of_ascii(command, tmp_path):
+    """In title and file name; all commands ended in a traceback, by dolfinx's log, VTK and gmsh."""
+    file = tmp_path / "Fläche.toml"
+    text = (SCENES / "plane.toml").read_text(encoding="utf-8")
+    file.write_text(text.replace('title = "', 'title = "Füße, ', 1), encoding="utf-8")
+    ascii_only = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
+    words = [command, str(file), *(["-o", str(tmp_path / "ü")] if command == "mesh" else [])]
+    done = subprocess.run(
+        [sys.executable, "-m", "bladefem", *words],
+        env={**os.environ, **ascii_only},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr.decode()
+    if command == "mesh":
+        assert {"named_mesh.msh", "mesh.vtu"} <= {made.name for made in (tmp_path / "ü").iterdir()}
+
+
+def test_names_of_files_that_a_locale_lacks(tmp_path):
+    """In a scene they are UTF-8; ASCII has no name for such a file."""
+    file = tmp_path / "scene.toml"
+    file.write_text('kind = "imported"\n[imported]\nfile = "Rad_ü.msh"\n', encoding="utf-8")
+    ascii_only = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "C"}
+    done = subprocess.run(
+        [sys.executable, "-m", "bladefem", "check", str(file)],
+        env={**os.environ, **ascii_only},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 2 and b"expected a locale with UTF-8" in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, transformation
 from bladefem.fem.modes import modes
 from bladefem.scene.tables import Material
+from bladefem.study.modes.effective_mass import effective_masses
 from geometry.mesh import Pair
 
 STEEL = Material()
@@ -39,6 +40,26 @@ def test_sector_equals_full_wheel(cell_type, axis, sense, count):
     whole = modes(constrain(assemble(wheel(mesh)[0], "blade", STEEL)), 64, prove=True).frequencies
     parts = sector_frequencies(mesh, 20)[:64]
     np.testing.assert_allclose(parts, whole, rtol=1e-9)
+
+
+def test_half_wheel_equals_the_whole_one():
+    """Both nodal diameters are standing waves; effective masses are the whole wheel's. The rows of
+    both translations were one, with the mean of both.
+    """
+    mesh = sector(2, (3, 4, 1), bump=0.2)
+    body = assemble(mesh, "blade", STEEL)
+    whole = assemble(wheel(mesh)[0], "blade", STEEL)
+    expected = modes(constrain(whole), 24)
+    np.testing.assert_allclose(sector_frequencies(mesh, 20)[:24], expected.frequencies, rtol=1e-9)
+    found = effective_masses([modes(constrain(body, nodal_diameter=n), 20) for n in (0, 1)], body)
+    straight = effective_masses([expected], whole)
+    for direction in ("x", "y", "z", "rz"):
+        few, rows = (t[t["direction"] == direction] for t in (found, straight))
+        few = few[few["frequency"] < 1.0001 * expected.frequencies[-1]]
+        largest = rows["share"].max()
+        assert few["share"].sum() == pytest.approx(rows["share"].sum(), rel=1e-6)
+        assert few["effective_mass"].sum() == pytest.approx(rows["effective_mass"].sum(), rel=1e-6)
+        assert few["share"].max() == pytest.approx(largest, rel=1e-6)
 
 
 @pytest.mark.parametrize("n", [0, 1, 2, 3])

@@ -73,6 +73,19 @@ def test_flap_of_a_rotating_cantilever(cantilever, eta, linear):
     assert frequency == pytest.approx(WRIGHT[eta], rel=3e-5)
 
 
+@pytest.mark.parametrize("linear", [False, True])
+def test_a_cantilever_along_the_axis_holds_up_to_its_first_frequency(cantilever, linear):
+    """Beyond, spin softening outweighs its stiffness: bad input, with the field that decides; it was
+    "not positive definite" with exit code 1.
+    """
+    along = {"axis": (1, 0, 0), "linear": linear}
+    held = first(body_under_rotation(cantilever, 0.99 * WRIGHT[0] * UNIT, **along))
+    assert held == pytest.approx(WRIGHT[0] * np.sqrt(1 - 0.99**2), rel=1e-3)
+    speed = 1.01 * WRIGHT[0] * UNIT
+    with pytest.raises((InputError, NotSolvedError), match=r"operation\.speed = .* rpm: .*preload"):
+        first(body_under_rotation(cantilever, speed, **along))
+
+
 def test_lead_lag_is_softer_by_the_speed(cantilever):
     """Motion in the plane of rotation: omega^2 = omega_flap^2 - Omega^2, but for the thickness
     (measured 4e-6).

@@ -124,7 +124,7 @@ TOGETHER = [
         "there is no such file",
     ),
     ({"kind": "imported", "imported": {"file": __file__, "axis": [0, 0, 0]}}, "imported.axis"),
-    ({"kind": "imported", "imported": {"file": __file__, "sectors": 2}}, "imported.sectors"),
+    ({"kind": "imported", "imported": {"file": __file__, "sectors": 1}}, "imported.sectors"),
     (
         {
             "kind": "imported",

@@ -102,6 +102,17 @@ def test_no_order_crosses_rigid_motions():
     assert found.crossings.empty
 
 
+@pytest.mark.parametrize("speed", [2.0, 15.0, 300.0])
+def test_rotation_drives_the_translations_of_a_free_wheel(speed):
+    """Across its axis: at rest in space they are circles of the speed's own frequency. Slow wheels
+    were solved, with frequencies of 0 and twice the speed.
+    """
+    free = bodies(count=6, divisions=(1, 1, 1), inner=0.24, bump=0.0)
+    scene = replace(free.scene, support=replace(free.scene.support, clamp=""))
+    with pytest.raises(InputError, match="no steady place"):
+        campbell_tables(Bodies(scene, free.mesh), [0.0, speed], [1], 3)
+
+
 @pytest.mark.parametrize(
     ("text", "rpm"),
     [

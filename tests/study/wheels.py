@@ -34,6 +34,7 @@ def ring(count=6, divisions=(3, 2, 1), inner=0.1, outer=0.25, width=0.03, bump=0
     )
     low, high = number[:, 0].ravel(), number[:, -1].ravel()
     faces = {"clamp": _quads(number[0]), "tip": _quads(number[-1])}
+    faces |= {"cyclic_low": _quads(number[:, 0]), "cyclic_high": _quads(number[:, -1])}
     return Mesh(
         points,
         "hexahedron27",

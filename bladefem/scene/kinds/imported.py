@@ -37,11 +37,8 @@ def conditions(scene: Scene) -> Iterator[str]:
     yield from _seat_conditions(scene)
     if not any(scene.imported.axis):
         yield "imported.axis = 0, 0, 0: expected a direction, not all zero, such as 0, 0, 1"
-    if scene.imported.sectors in (1, 2):
-        yield (
-            f"imported.sectors = {scene.imported.sectors}: expected 0 for a single body, or at "
-            "least 3"
-        )
+    if scene.imported.sectors == 1:
+        yield "imported.sectors = 1: expected 0 for a single body, or at least 2"
     elif scene.imported.sectors:
         yield from known_diameters(scene, scene.imported.sectors)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...scene.tables import Scene
-from ..modes.linear_response import static_offset
+from ..modes.linear_response import steady_state
 from ..pipeline.damped_motion import DampedMotion
 from ..pipeline.run_records import ReducedRun
 from ..pipeline.scene_mesh import build_mesh
@@ -33,7 +33,8 @@ def odd_blade_stress(
     tuned = held_aerofoil(run.scene, run.mesh, foot, families, run.clamped)
     mesh = build_mesh(scene)
     other = held_aerofoil(scene, mesh, foot, families)
-    offset = static_offset(shapes.bodies)
+    state = steady_state(shapes.bodies)
+    offset = state.displacement
     read = shapes.readings.T @ offset.ravel()
     pull = steady_root_forces(tuned, other, run.scene.operation.speed, read[families:])
     ports = wheel_ports(shapes)
@@ -55,5 +56,6 @@ def odd_blade_stress(
         forces[blade][:, ports.names["load"].start],
         motion.harmonics.reshape(H, -1) @ shapes.readings[:, :families],
         offset + fields[H].real,
+        state.large,
     )
     return motion, own_stress(scene, mesh, tuned, other, known)

@@ -64,6 +64,8 @@ class KnownMotion:
     coordinates: ComplexArray
     # (n_points, dim) displacement by rotation and heat [m]
     offset: RealArray
+    # it is that of a nonlinear preload
+    large: bool = False
 
 
 def steady_root_forces(
@@ -116,7 +118,9 @@ def own_stress(
     mean = np.zeros(len(mesh.points))
     if np.any(known.offset):
         offset = own_offset(bodies, known)
-        mean = signed_von_mises(nodal_stress(bodies.still_blade, offset, heated=True))
+        mean = signed_von_mises(
+            nodal_stress(bodies.still_blade, offset, heated=True, large=known.large)
+        )
     return OwnStress(
         found.largest, found.place, found.mesh_error, mesh, found.field, mean, mismatch
     )
@@ -156,13 +160,22 @@ def own_motion(
 
 
 def own_offset(bodies: Bodies, known: KnownMotion) -> RealArray:
-    """(n_points, dim) displacement [m] of the sector by rotation and heat."""
-    from ...fem.cut_sector import cut_sector, static_motion
+    """(n_points, dim) displacement [m] of the sector by rotation and heat, of the kind of the
+    wheel's.
+    """
+    from ...fem.cut_sector import HELD, cut_sector, static_motion
+    from ...fem.rotation import preload
 
     body = bodies.still_blade
     sector = cut_sector(body)
     loads = _steady_loads(body, bodies.scene.operation.speed, bodies.mesh)
     moved = _at_cuts(sector, known.mesh, known.offset[None])
+    if known.large:
+        # from what follows the cut faces alone: the linear answer to the loads may be far off
+        bent = static_motion(sector, moved, np.zeros_like(loads[None]))[0]
+        speed = bodies.scene.operation.speed
+        axis = spin_axis(bodies.mesh)
+        return preload(sector.body, speed, HELD, axis, given=bent).displacement
     return np.asarray(static_motion(sector, moved, loads[None])[0])
 
 

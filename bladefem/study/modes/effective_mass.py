@@ -2,8 +2,9 @@
 
 A translation along the axis and a rotation about it move all sectors alike (nodal diameter 0); a
 translation across the axis is the sum of two waves of nodal diameter 1, e_x = (r + r*) / 2 with r =
-e_x + j e_y, which R turns into e^{-j theta} r. Other nodal diameters carry no rigid motion (Clough
-and Penzien, Dynamics of Structures, sect. 26).
+e_x + j e_y, which R turns into e^{-j theta} r. In half a wheel both translations change their sign
+from sector to sector, so that modes of nodal diameter 1 follow each by itself. Other nodal
+diameters carry no rigid motion (Clough and Penzien, Dynamics of Structures, sect. 26).
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ def _mass_directions(modes: ModeSet, body: Body) -> list[tuple[str, float]]:
     count = float(sector_of(body.mesh).count)
     return {
         0: [("rz", count)] if plane else [("z", count), ("rz", count)],
-        1: [("x, y", count / 2)],
+        1: [("x", count), ("y", count)] if count == 2 else [("x, y", count / 2)],
     }.get(n, [])
 
 

@@ -222,17 +222,9 @@ def steady_state(bodies: Bodies) -> SteadyState:
     """
     from ...fem.rotation import SteadyState
 
-    if bodies.state is not None and stands_on_large_state(bodies):
+    if bodies.state is not None and bodies.on_large_state:
         return bodies.state
     return SteadyState(static_offset(bodies), bodies.scene.operation.speed)
-
-
-def stands_on_large_state(bodies: Bodies) -> bool:
-    """Whether the nonlinear preload is known at the speed; without stiffening it is that of the
-    heat alone.
-    """
-    state = bodies.state
-    return state is not None and state.large and state.speed == bodies.scene.operation.speed
 
 
 def _modal_amplitudes(response: Forced, frequency: float) -> np.ndarray:

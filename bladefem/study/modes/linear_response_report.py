@@ -28,7 +28,6 @@ from .linear_response import (
     linear_response,
     pressure_load,
     probe_response,
-    stands_on_large_state,
     steady_state,
 )
 
@@ -201,7 +200,7 @@ def stress_table(
     # all ranks assemble it, those without a state too
     body = bodies.still_blade
     # of the static state; the others are small motions about it
-    large = stands_on_large_state(bodies)
+    large = bodies.on_large_state
     found = share_work(
         lambda name: _state_stress(body, name, states[name], large), list(states), bodies.comm
     )

@@ -43,11 +43,10 @@ class Bodies:
 
     Vibrations use the stiffness under rotation (stress stiffening, spin softening) and thermal
     stress about the linear preload, or about the nonlinear one where ``operation.preload`` says so.
-    Seating the damper uses the elastic stiffness at rest, under the whole centrifugal load: both
-    are first-order theory, in which displacements grow with the square of the speed, and the
-    stiffness under rotation would count the rotation twice. At the seats, near the root, the
-    difference is small; a leaning aerofoil moves less than first-order theory says, and its
-    stresses are told of the state that the vibrations are about.
+    About a linear preload, seating the damper uses the elastic stiffness at rest, under the whole
+    centrifugal load: both are first-order theory, in which displacements grow with the square of
+    the speed, and the stiffness under rotation would count the rotation twice. About a nonlinear
+    one the blade moves and gives way to contact forces as it does about that state.
     """
 
     scene: Scene
@@ -147,12 +146,12 @@ class Bodies:
         return self._blade_about(self.state_at(speed))
 
     def _blade_about(self, state: SteadyState | None) -> Body:
-        from ...fem.rotation import state_tangent
+        from ...fem.rotation import body_about
 
         if state is None:
             return self.still_blade
         self._release_still()
-        return replace(self.still_blade, K=state_tangent(self.still_blade, state))
+        return body_about(self.still_blade, state)
 
     @cached_property
     def state(self) -> SteadyState | None:
@@ -171,6 +170,42 @@ class Bodies:
             return SteadyState(found.displacement, speed, axis, large=True)
         u0 = speed**2 * self.swell + self.thermal_displacement
         return SteadyState(u0, speed, axis)
+
+    @property
+    def on_large_state(self) -> bool:
+        """Whether the blade stands on the nonlinear preload at the operating speed; without
+        stiffening that is the one of the heat alone.
+        """
+        state = self.state
+        return state is not None and state.large and state.speed == self.scene.operation.speed
+
+    @cached_property
+    def warm_displacement(self) -> np.ndarray:
+        """(n_points, dim) displacement of the blade at rest by its temperatures [m], of the kind of
+        its preload.
+        """
+        if not self.on_large_state:
+            return self.thermal_displacement
+        warm = self.state_at(0.0)
+        return np.zeros_like(self.swell) if warm is None else warm.displacement
+
+    @cached_property
+    def seat_swell(self) -> np.ndarray | None:
+        """(n_points, dim) displacement of the blade from rest to the operating speed over the
+        square of this [m s^2], as seats feel it; None: the linear `swell`.
+
+        At speeds between, as friction passes them, the nonlinear one is taken straight over the
+        square of the speed.
+        """
+        speed = self.scene.operation.speed
+        if self.state is None or not self.on_large_state or not speed > 0:
+            return None
+        return np.asarray((self.state.displacement - self.warm_displacement) / speed**2)
+
+    @property
+    def seated(self) -> Flexibility:
+        """The blade as it gives way to the damper's steady forces, the same on all blades."""
+        return self.factorised(0) if self.on_large_state else self.still
 
     @cached_property
     def swell(self) -> np.ndarray:

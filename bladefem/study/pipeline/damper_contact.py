@@ -55,7 +55,9 @@ def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     from ...contact.seating import contact_problem
 
     gap = seat_clearance(bodies, patches) + thermal_gap(bodies, patches)
-    problem = contact_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    problem = contact_problem(
+        bodies.mesh, patches, bodies.seated, bodies.damper, gap, swell=bodies.seat_swell
+    )
     return hold_axially(problem) if bodies.scene.damper.axial == "held" else problem
 
 
@@ -70,7 +72,7 @@ def thermal_gap(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
     blade, damper = (
         port_matrix(patches, mesh, side)[:, ports].T @ moved.ravel()
         for side, moved in (
-            ("blade", bodies.thermal_displacement),
+            ("blade", bodies.warm_displacement),
             ("damper", thermal_displacement(bodies.damper)),
         )
     )

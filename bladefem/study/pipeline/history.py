@@ -76,7 +76,9 @@ def condense_friction(bodies: Bodies, patches: Sequence[Patch]) -> FrictionalPro
     close the seats, and leave no tangential traction.
     """
     gap = seat_clearance(bodies, list(patches)) + thermal_gap(bodies, list(patches))
-    problem = frictional_problem(bodies.mesh, patches, bodies.still, bodies.damper, gap)
+    problem = frictional_problem(
+        bodies.mesh, patches, bodies.seated, bodies.damper, gap, bodies.seat_swell
+    )
     return hold_axially(problem) if bodies.scene.damper.axial == "held" else problem
 
 
