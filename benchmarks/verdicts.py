@@ -19,7 +19,7 @@ from branch_models import Case, march, random_case, state_of
 from bladefem import balance as bf
 from bladefem.hbm.next_frequency import first_look
 from bladefem.hbm.stability import UNKNOWN, stability_verdict
-from bladefem.study.pipeline.stability import CONFIRMING, RicherModel, stability_of
+from bladefem.study.stability.verdicts import CONFIRMING, RicherModel, stability_of
 
 # points of a model: its highest maxima, and others spread over the paths
 MAXIMA = 2

@@ -73,14 +73,14 @@ from bladefem.study.pipeline.case_models import (
     softer_body,
 )
 from bladefem.study.pipeline.damper_contact import contact_patches
-from bladefem.study.pipeline.error_in_time import Marches
-from bladefem.study.pipeline.judged_resonance import judged_resonance
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.normal_modes import excited_modes, find_modes, harmonic_diameters
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.seated_loads import seat_every_load
-from bladefem.study.pipeline.stability import model_in_time
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
+from bladefem.study.stability.error_in_time import Marches
+from bladefem.study.stability.judged_resonance import judged_resonance
+from bladefem.study.stability.verdicts import model_in_time
 
 ROOT = Path(__file__).parents[1]
 FIGURES = ROOT / "docs" / "figures"

@@ -78,6 +78,7 @@ MAPPED = (
     "bladefem/study/mistuning",
     "bladefem/study/modes",
     "bladefem/study/pipeline",
+    "bladefem/study/stability",
     "bladefem/view",
     "bladefem/wheel",
 )

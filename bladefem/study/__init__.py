@@ -2,7 +2,8 @@
 
 Packages, each with a map of its modules:
 
-- ``pipeline``: a run stage by stage: mesh, modes, contact, reduced model, responses, stability
+- ``pipeline``: a run stage by stage: mesh, modes, contact, reduced model, responses
+- ``stability``: which motion the blade keeps to, by verdicts and by marches in time
 - ``adaptive``: harmonics, samples, modes and contact points by estimated errors
 - ``modes``: surveys, Campbell tables, mesh convergence, linear responses
 - ``mistuning``: wheels whose blades differ

@@ -18,7 +18,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
-from bladefem.study.pipeline.stability import in_one_body
+from bladefem.study.stability.verdicts import in_one_body
 from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
 from verification.paper.blades import judge, optimum, peak
 from verification.paper.plane_row import paper_model, row_of_blades, whole_model

@@ -20,7 +20,7 @@ from bladefem.study.adaptive.family import Family, Member, family_of
 from bladefem.study.adaptive.peak_errors import PeakErrors
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline.error_in_time import Marches
+from bladefem.study.stability.error_in_time import Marches
 
 ACCURACY = 0.05
 

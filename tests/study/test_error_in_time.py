@@ -14,7 +14,7 @@ from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.choice import Checked
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline.error_in_time import Marches, carried_motion, error_in_time
+from bladefem.study.stability.error_in_time import Marches, carried_motion, error_in_time
 
 OMEGA = 0.9
 # of the excitation of `bouncing`: three harmonics are 3.1 % off there

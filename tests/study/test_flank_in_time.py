@@ -19,11 +19,11 @@ from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.choice import Checked
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline import error_in_time
-from bladefem.study.pipeline.error_in_time import Marches
-from bladefem.study.pipeline.flank_motions import flank_motions
-from bladefem.study.pipeline.kept_band import band_by_steps, kept_band
-from bladefem.study.pipeline.stability import in_one_body, stability_of
+from bladefem.study.stability import error_in_time
+from bladefem.study.stability.error_in_time import Marches
+from bladefem.study.stability.flank_motions import flank_motions
+from bladefem.study.stability.kept_band import band_by_steps, kept_band
+from bladefem.study.stability.verdicts import in_one_body, stability_of
 from verification.paper.plane_row import row_of_blades, whole_model
 
 HARMONICS = 15

@@ -14,14 +14,14 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline import flank_motions as module
-from bladefem.study.pipeline import judged_resonance
 from bladefem.study.pipeline.curve import Curve
-from bladefem.study.pipeline.error_in_time import Marches
-from bladefem.study.pipeline.flank_motions import FlankMotions, flank_motions
-from bladefem.study.pipeline.kept_band import KeptBand
-from bladefem.study.pipeline.stability import Stability
 from bladefem.study.pipeline.stability_remarks import unmarched_sentence, unstable_sentence
+from bladefem.study.stability import flank_motions as module
+from bladefem.study.stability import judged_resonance
+from bladefem.study.stability.error_in_time import Marches
+from bladefem.study.stability.flank_motions import FlankMotions, flank_motions
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.verdicts import Stability
 
 HEIGHTS = (0.95, 0.96, 0.97, 0.98, 1.0, 0.95, 0.6)
 VERDICTS = (UNSTABLE,) * 4 + (STABLE, UNSTABLE, UNSTABLE)

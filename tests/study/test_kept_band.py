@@ -19,15 +19,15 @@ from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
 from bladefem.hbm.time_model import time_system
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline import finer_contacts, judged_resonance
-from bladefem.study.pipeline import kept_band as module
 from bladefem.study.pipeline.curve import Curve
-from bladefem.study.pipeline.error_in_time import Marches
-from bladefem.study.pipeline.finer_contacts import FinerMotion, unstable_with_more_points
-from bladefem.study.pipeline.flank_motions import FlankMotions
-from bladefem.study.pipeline.kept_band import kept_band
-from bladefem.study.pipeline.stability import Stability, in_one_body
 from bladefem.study.pipeline.stability_remarks import doubtful_sentence
+from bladefem.study.stability import finer_contacts, judged_resonance
+from bladefem.study.stability import kept_band as module
+from bladefem.study.stability.error_in_time import Marches
+from bladefem.study.stability.finer_contacts import FinerMotion, unstable_with_more_points
+from bladefem.study.stability.flank_motions import FlankMotions
+from bladefem.study.stability.kept_band import kept_band
+from bladefem.study.stability.verdicts import Stability, in_one_body
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
 
 STEPS = 1000
@@ -114,7 +114,7 @@ def test_a_stable_motion_is_kept():
 
 
 def test_what_cannot_be_marched_says_why(monkeypatch):
-    monkeypatch.setattr("bladefem.study.pipeline.kept_band.MAX_STEPS", 10.0)
+    monkeypatch.setattr("bladefem.study.stability.kept_band.MAX_STEPS", 10.0)
     model = rebounding(10.0, 0.1, 0.04)
     found = kept_band(model, solve(model, 3.0, 3, 128))
     assert "is not known: a march takes" in found.sentence

@@ -17,9 +17,9 @@ from bladefem.report.response_points import points_of
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
-from bladefem.study.pipeline import resonance_in_time as module
-from bladefem.study.pipeline.kept_band import KeptBand
-from bladefem.study.pipeline.resonance_in_time import ResonanceInTime, resonance_in_time
+from bladefem.study.stability import resonance_in_time as module
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from bladefem.view.response import FOLLOWED, MARCHED
 
 BAND = (249.0, 431.0)

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.response_remarks import (
     beyond_tolerance,
     lower_studied_remarks,
     resonance_warnings,
     stiff_layer_sentence,
 )
+from bladefem.study.stability.kept_band import KeptBand
 
 
 def curve(

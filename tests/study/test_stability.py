@@ -21,18 +21,18 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.assemble_model import LoadCase
-from bladefem.study.pipeline.kept_band import KeptBand
 from bladefem.study.pipeline.loads import curve_of
-from bladefem.study.pipeline.stability import (
-    MODES_IN_TIME,
-    in_one_body,
-    settings_in_time,
-    stability_of,
-)
 from bladefem.study.pipeline.stability_remarks import (
     ripple_sentence,
     stability_sentence,
     unstable_sentence,
+)
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.verdicts import (
+    MODES_IN_TIME,
+    in_one_body,
+    settings_in_time,
+    stability_of,
 )
 from bladefem.view.response import draw_responses
 

@@ -15,11 +15,11 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
-from bladefem.study.pipeline import strong_drive as module
-from bladefem.study.pipeline.error_in_time import Marches
-from bladefem.study.pipeline.kept_band import band_by_steps
 from bladefem.study.pipeline.stability_remarks import undriven_sentence
-from bladefem.study.pipeline.strong_drive import (
+from bladefem.study.stability import strong_drive as module
+from bladefem.study.stability.error_in_time import Marches
+from bladefem.study.stability.kept_band import band_by_steps
+from bladefem.study.stability.strong_drive import (
     STRONG_DRIVE,
     StrongDrives,
     after_strong_drive,

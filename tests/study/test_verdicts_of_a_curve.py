@@ -15,17 +15,17 @@ from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.choice import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline import stability
-from bladefem.study.pipeline.highest_stable import highest_lasting, next_to_judge
-from bladefem.study.pipeline.kept_band import KeptBand, kept_band
 from bladefem.study.pipeline.response_remarks import search_sentence
-from bladefem.study.pipeline.stability import RicherModel, judged_above, model_in_time, stability_of
 from bladefem.study.pipeline.stability_remarks import (
     Disturbances,
     judged_disturbances,
     stability_sentence,
     unjudged_sentence,
 )
+from bladefem.study.stability import verdicts as stability
+from bladefem.study.stability.highest_stable import highest_lasting, next_to_judge
+from bladefem.study.stability.kept_band import KeptBand, kept_band
+from bladefem.study.stability.verdicts import RicherModel, judged_above, model_in_time, stability_of
 
 
 def test_a_wave_of_one_harmonic_is_judged_on_the_bodies_with_which_it_repeats():

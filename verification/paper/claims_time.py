@@ -18,7 +18,7 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import stability_verdict
 from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
-from bladefem.study.pipeline.stability import in_one_body, judged_motion
+from bladefem.study.stability.verdicts import in_one_body, judged_motion
 from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics
 from bladefem.time.system import System
 from verification.paper.blades import judge, peak

@@ -23,10 +23,10 @@ from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted_settings, scene_line
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
-from ..pipeline.error_in_time import Marches
-from ..pipeline.judged_resonance import judged_resonance
 from ..pipeline.pipeline import run
 from ..pipeline.reduced_sector import Reduced
+from ..stability.error_in_time import Marches
+from ..stability.judged_resonance import judged_resonance
 from .chart import Chart, check_budget, method_chart
 from .meshes import mesh_table, mesh_variants
 

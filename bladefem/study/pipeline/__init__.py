@@ -1,5 +1,5 @@
 """From a scene to forced responses, stage by stage. Begin with ``pipeline``, then
-``response_stage``, ``loads`` and ``judged_resonance``.
+``response_stage`` and ``loads``.
 
 - the run: ``pipeline`` order of the stages, ``stage_runner`` computes or reads one,
   ``stage_inputs`` what each depends on, ``run_records`` what they leave, ``preflight`` and
@@ -13,12 +13,7 @@
 - responses: ``response_stage`` the stage, ``loads`` a curve a load, ``curve`` its record,
   ``best_load`` the search, ``resonance_list`` all maxima, ``linear_limits``, ``load_interval``,
   ``shared_accuracy`` one accuracy for all errors, ``body_mesh`` the error by the mesh
-- which motion the blade keeps: ``judged_resonance`` decides; ``stability`` verdicts on a curve,
-  ``highest_stable`` its highest lasting motion, ``finer_contacts`` and ``other_diameters`` verdicts
-  with more contact points and in other nodal diameters
-- the same by marches in time: ``kept_band`` from an unstable motion, ``flank_motions`` beside a
-  resonance, ``strong_drive`` after a strong excitation, ``error_in_time`` the error of a balance,
-  ``resonance_in_time`` where balances fail
+- verdicts in the other nodal diameters: ``other_diameters``
 - at the resonance: ``contact_cycle`` stick and slip, ``damped_motion`` motion and stress of all
   nodes, ``utilisation`` of the endurance
 - flutter: ``flow`` damping of each wave, ``flutter`` limit cycles

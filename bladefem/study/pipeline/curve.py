@@ -10,9 +10,9 @@ from ...hbm.solution import Solution, moving_contacts, size
 from ...scene.units import newtons
 from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ..adaptive.settings import Settings
-from .kept_band import KeptBand
+from ..stability.kept_band import KeptBand
+from ..stability.resonance_in_time import ResonanceInTime
 from .load_interval import LoadInterval
-from .resonance_in_time import ResonanceInTime
 
 # of how far a march with fewer contact points leads from a balance: what it may have too much. On
 # the shipped wedge with ground faces, 1100 N, 536 um with 16 points a seat, they keep 517 um, eight

@@ -20,14 +20,14 @@ from ..adaptive.choice import Checked, checked_points, estimated_errors
 from ..adaptive.family import Family, family_member
 from ..adaptive.resonance_curve import too_large_to_follow
 from ..adaptive.settings import Settings
+from ..stability.error_in_time import Marches
+from ..stability.judged_resonance import judged_in_time, judged_resonance
+from ..stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from .assemble_model import LoadCase
 from .best_load import BestLoad, holding_load, studied_load
 from .body_mesh import SofterBody
 from .curve import Curve
-from .error_in_time import Marches
-from .judged_resonance import judged_in_time, judged_resonance
 from .load_interval import LoadInterval, load_interval
-from .resonance_in_time import ResonanceInTime, resonance_in_time
 from .shared_accuracy import curve_with_room
 
 Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"

@@ -27,7 +27,7 @@ from ...hbm.stability import (
 )
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
-from .stability import JUDGED_OPTIONS, judged_motion, model_in_time, settings_in_time
+from ..stability.verdicts import JUDGED_OPTIONS, judged_motion, model_in_time, settings_in_time
 from .stability_remarks import Disturbances
 
 # growth from which on more instants are taken not to make a motion stable

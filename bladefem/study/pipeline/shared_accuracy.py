@@ -19,9 +19,9 @@ from ..adaptive.layer_change import layer_change
 from ..adaptive.resonance_curve import resonance_curve
 from ..adaptive.settings import Settings, restarted_settings
 from ..adaptive.stiff_layer import stiff_layer_change
+from ..stability.error_in_time import Marches
 from .assemble_model import LoadCase
 from .body_mesh import SofterBody, softened_change
-from .error_in_time import Marches
 from .liftoff import naming_the_load
 
 # of the accuracy: less is not left to a balance, since what else is wrong then is what counts. A

@@ -15,7 +15,7 @@ from ...hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
 from ...scene.units import newtons
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
-from .stability import model_in_time
+from ..stability.verdicts import model_in_time
 
 if TYPE_CHECKING:
     from .curve import Curve

@@ -31,7 +31,7 @@ from ..adaptive.choice import Checked
 from ..adaptive.resonance_choice import LIFTING_POINTS
 from .error_in_time import Marches, carried_motion
 from .kept_band import KeptBand, amplitudes_of_periods
-from .stability import model_in_time, settings_in_time
+from .verdicts import model_in_time, settings_in_time
 
 # Figures behind these limits: docs/verification.md, "Limits of marches and balances".
 # excitation over its own, and periods of it: weaker, stronger or longer drives lead to the higher

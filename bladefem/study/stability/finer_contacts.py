@@ -15,7 +15,7 @@ from ...hbm.stability import STABLE, UNIQUE, UNSTABLE, Verdict, stability_verdic
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution, richer_settings
 from ..adaptive.settings import Settings
-from .stability import (
+from .verdicts import (
     CURVE_OPERATIONS,
     JUDGED_HARMONICS,
     JUDGED_OPTIONS,

@@ -19,7 +19,7 @@ from ..adaptive.check_points import heights_of
 from ..adaptive.choice import Checked
 from .error_in_time import Marches
 from .kept_band import KeptBand, band_by_steps
-from .stability import Stability, model_in_time, settings_in_time
+from .verdicts import Stability, model_in_time, settings_in_time
 
 # share of the resonance amplitude from which an unstable motion is marched from
 NEARLY_AS_HIGH = 0.9

@@ -31,7 +31,7 @@ from ...util.durations import core_time
 from ..adaptive.family import Family
 from ..adaptive.indicators import moved_solution
 from ..adaptive.settings import Settings
-from .stability import JUDGED_OPTIONS, in_one_body, model_in_time, settings_in_time
+from .verdicts import JUDGED_OPTIONS, in_one_body, model_in_time, settings_in_time
 
 # disturbance of the unstable motion at the start, relative
 DISTURBANCE_SHARE = 1e-3

@@ -2,7 +2,7 @@
 
 Where contacts lift off, balances with more harmonics are often not solved, or end on another motion
 of several: their difference says little of the one that is given. A march in time has no harmonics
-left out, and begins at the very motion that is judged (`bladefem.study.pipeline.kept_band`).
+left out, and begins at the very motion that is judged (`bladefem.study.stability.kept_band`).
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from ..adaptive.choice_in_time import COVERED_IN_TIME, MarchedBand
 from ..adaptive.family import Family, Member, carried_displacements, family_member
 from ..adaptive.settings import Settings
 from .kept_band import KeptBand, affordable_march, band_by_steps, exact_band
-from .stability import model_in_time, settings_in_time
+from .verdicts import model_in_time, settings_in_time
 
 # relative, of an error that was summed twice
 ROUNDING = 1e-9

@@ -37,7 +37,7 @@ from ..adaptive.resonance_choice import LIFTING_POINTS
 from ..adaptive.settings import Settings
 from .error_in_time import carried_motion
 from .kept_band import amplitudes_of_periods
-from .stability import model_in_time, settings_in_time
+from .verdicts import model_in_time, settings_in_time
 
 # Figures behind these limits: docs/verification.md, "Limits of marches and balances".
 # excitation over its own for these periods, before the blade comes down to what it keeps: from

@@ -20,8 +20,8 @@ from .finer_contacts import FinerMotion, unstable_with_more_points
 from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
 from .kept_band import KeptBand, kept_of_family, scaled_band
-from .stability import Stability, judged_above, model_in_time, richer_models, stability_of
 from .strong_drive import strong_drives
+from .verdicts import Stability, judged_above, model_in_time, richer_models, stability_of
 
 # with which a verdict on a motion whose contacts lift off is believed
 ENOUGH_HARMONICS = 15
