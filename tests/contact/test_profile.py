@@ -89,7 +89,8 @@ def bodies():
     return lambda *given: SimpleNamespace(
         scene=bladefem.load_scene("scenes/wedge.toml", ["contact.bedded=false", STIFF, *given]),
         mesh=mesh,
-        still=still,
+        seated=still,
+        seat_swell=None,
         # at reference temperature
         still_blade=SimpleNamespace(heat=None),
         damper=damper,

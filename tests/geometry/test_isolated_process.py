@@ -41,7 +41,7 @@ def test_the_mesh_is_the_one_of_this_process():
 
 
 def test_a_refusal_keeps_its_words():
-    with pytest.raises(InputError, match=r"punch\.radius = 0\.015 m: expected at most") as caught:
+    with pytest.raises(InputError, match=r"punch\.radius = 15 mm: expected at most") as caught:
         build_isolated(SimpleNamespace(**vars(SCENE) | {"punch": Punch(radius=0.015)}))
     assert "\n" not in str(caught.value)
 
