@@ -44,6 +44,9 @@ JUMP_WIDTH = 1e-4
 JUMP_RISE_SHARE = 0.75
 # of the frequency: where a search begins instead when its first point is not solved
 RETRY_RATIOS = (1.005, 1.01, 1.02, 0.99)
+# the same first, of a search that only judges another peak, which has a solution nearby: on the
+# shipped wedge under 73 N 23 harmonics were found from 15 in 1 s of CPU, from 1.005 on in 11 s
+NEARBY_RATIOS = (1.001, 0.999)
 
 
 @dataclass(frozen=True)
@@ -265,11 +268,13 @@ def _solved_beside(
     start: Solution,
     options: Options,
 ) -> Solution | None:
-    """The first converged point at RETRY_RATIOS times the frequency, without fallbacks."""
+    """The first converged point at RETRY_RATIOS times the frequency, without fallbacks, or nearer
+    where the search has none.
+    """
     simply = replace(options, fallbacks=False)
+    ratios = RETRY_RATIOS if options.fallbacks else (*NEARBY_RATIOS, *RETRY_RATIOS)
     tries = (
-        solve(model, omega * ratio, H, samples, start=start, options=simply)
-        for ratio in RETRY_RATIOS
+        solve(model, omega * ratio, H, samples, start=start, options=simply) for ratio in ratios
     )
     return next((other for other in tries if other.converged), None)
 

@@ -252,7 +252,7 @@ def _judging_peak(
 ) -> Peak:
     """The peak of the model that judges, by way of one with fewer harmonics where there is one: on
     the shipped wedge under 150 N fifteen are reached from one in 0.4 s by seven, in 7 s without;
-    under 73 N 31 from 15 in 12 s by 23, in 24 s without.
+    under 73 N 31 from 15 in 3 s by 23, in 24 s without.
 
     Raises:
         NotSolvedError: a point was not solved, or no maximum was closed in.
