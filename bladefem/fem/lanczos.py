@@ -92,11 +92,8 @@ def lowest_eigenpairs(
         k = min(count + guard, len(theta))
         rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
-        if not len(rest) and k < count:
-            raise InputError(
-                f"{count} elastic modes were asked of a body that has {k}: expected fewer modes, "
-                "or a mesh with more degrees of freedom"
-            )
+        if not len(rest):
+            _require_modes(count, k)
         if (k >= count and error < tolerance) or not len(rest):
             # of no more use where memory is at its peak
             del block, Mblock
@@ -113,6 +110,15 @@ def lowest_eigenpairs(
         f"the modes did not converge in {MAX_STEPS} steps (error {error:.1e}, "
         f"expected {tolerance:.1e})"
     )
+
+
+def _require_modes(count: int, there: int) -> None:
+    """The body has as many elastic modes as were asked for."""
+    if there < count:
+        raise InputError(
+            f"{count} elastic modes were asked of a body that has {there}: expected fewer modes, "
+            "or a mesh with more degrees of freedom"
+        )
 
 
 def orthonormal(

@@ -7,8 +7,8 @@ closed. One Newton step alone would overshoot where they lift off (docs/stabilit
 
 Modes are doubled and samples taken four times; 1 and 3 harmonics are compared with 7 and 15, since
 fewer miss internal resonances (F20; at a peak, `peak_errors` compares 1 with 15), from 7 on with
-twice as many; contact points with the finest
-ones, because a number half as large again can be blind (F19).
+twice as many; contact points with the finest ones, because a number half as large again can be
+blind (F19).
 
 Where all contacts stick, friction is linear: harmonics and samples are exact and need no look. A
 point, or a richer model of it, that was not solved gives no indicator: its error is unknown
@@ -147,6 +147,11 @@ def _poorer(
     return name in ("harmonics", "modes") and getattr(other, name) < getattr(settings, name)
 
 
+def judging_harmonics(harmonics: int) -> int:
+    """What so many harmonics are compared with: fewer miss internal resonances."""
+    return 4 * harmonics + 3 if harmonics < 7 else 2 * harmonics + 1
+
+
 def richer_settings(
     family: Family,
     settings: Settings,
@@ -157,7 +162,7 @@ def richer_settings(
     """
     H = settings.harmonics
     if name == "harmonics":
-        more = min(4 * H + 3 if H < 7 else 2 * H + 1, family.harmonics)
+        more = min(judging_harmonics(H), family.harmonics)
         # as with the modes
         if more <= H:
             return replace(settings, harmonics=max(lowest_harmonics(family, settings), H // 2))

@@ -28,7 +28,7 @@ from .family import (
     lowest_harmonics,
     same_equations,
 )
-from .indicators import richer_settings
+from .indicators import judging_harmonics, richer_settings
 from .settings import DIRECTIONS, Settings
 
 # of the accuracy: to which a peak is found, and one that only estimates an error
@@ -258,7 +258,7 @@ def _judging_peak(
         NotSolvedError: a point was not solved, or no maximum was closed in.
     """
     many = own.harmonics >= MANY_HARMONICS
-    more = _half_as_many_again(own) if many else _next_harmonics(own)
+    more = _half_as_many_again(own) if many else judging_harmonics(own.harmonics)
     if more < judge.harmonics:
         between = replace(own, harmonics=more, samples=judge.samples)
         try:
@@ -267,11 +267,6 @@ def _judging_peak(
         except NotSolvedError:
             pass
     return peak_from(family, own, base.solution, judge, accuracy, fallbacks=False)
-
-
-def _next_harmonics(settings: Settings) -> int:
-    """What few harmonics are judged by, but for OVERTONES."""
-    return 4 * settings.harmonics + 3
 
 
 def _half_as_many_again(settings: Settings) -> int:
@@ -363,8 +358,8 @@ def _nearer_judge(
     contact lifts off and OVERTONES are not more, or where that is no fewer.
     """
     own = settings.harmonics
-    if _next_harmonics(settings) < OVERTONES:
-        more = _next_harmonics(settings)
+    if judging_harmonics(own) < OVERTONES:
+        more = judging_harmonics(own)
     elif lifts_off(point):
         more = 2 * own + 1 if own < MANY_HARMONICS else _half_as_many_again(settings)
     else:

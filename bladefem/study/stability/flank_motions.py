@@ -67,8 +67,7 @@ def flank_motions(
     """
     heights = heights_of(curve.points)
     high = (marks.verdict == UNSTABLE) & (heights >= NEARLY_AS_HIGH * given)
-    unstable = np.flatnonzero(high)
-    places = [int(i) for i in unstable if curve.points[i] is not known]
+    places = [int(i) for i in np.flatnonzero(high) if curve.points[i] is not known]
     if not places:
         return FlankMotions()
     try:
@@ -82,8 +81,8 @@ def flank_motions(
         places[0],
         places[-1],
     ]
-    if len(places) < len(unstable):
-        at = next(k for k, i in enumerate(unstable) if curve.points[i] is known)
+    if len(places) < np.count_nonzero(high):
+        at = next(k for k, i in enumerate(np.flatnonzero(high)) if curve.points[i] is known)
         first += places[max(0, at - 1) : at + 1]
     bands: dict[int, KeptBand] = {}
 
