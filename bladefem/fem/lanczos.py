@@ -92,9 +92,8 @@ def lowest_eigenpairs(
         k = min(count + guard, len(theta))
         rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
-        if not len(rest):
-            _require_modes(count, k)
         if (k >= count and error < tolerance) or not len(rest):
+            _require_modes(count, k)
             # of no more use where memory is at its peak
             del block, Mblock
             space.MV.clear()
