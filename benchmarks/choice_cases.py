@@ -41,8 +41,8 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.precompile import compile_kernels
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
-from bladefem.study.adaptive.choice import choose_settings
 from bladefem.study.adaptive.family import Family, family_member, family_of
+from bladefem.study.adaptive.point_choice import choose_settings
 from bladefem.study.adaptive.settings import Settings, first_for
 
 TRUTH, RICH = (31, 4096), (15, 1024)

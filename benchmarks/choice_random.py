@@ -60,7 +60,7 @@ from bladefem.errors import NotSolvedError
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.precompile import compile_kernels
 from bladefem.study.adaptive.check_points import peak_of
-from bladefem.study.adaptive.choice import Checked
+from bladefem.study.adaptive.checked_curve import CheckedCurve
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.resonance_curve import MAXIMUM_SHARE, resonance_curve
 from bladefem.study.adaptive.settings import first_for
@@ -100,7 +100,9 @@ def timed(compute: Callable[[bf.ReducedModel], Result], seed: int) -> tuple[Resu
     return result, min(spent)
 
 
-def chosen_curve(model: bf.ReducedModel, band: tuple[float, float], accuracy: float) -> Checked:
+def chosen_curve(
+    model: bf.ReducedModel, band: tuple[float, float], accuracy: float
+) -> CheckedCurve:
     """The automatic choice for the highest resonance of a band [rad/s], and its curve."""
     nodes = np.arange(len(model.elements.kt))
     family = Family(lambda _: Member(model, nodes), len(model.sides[0].omega))

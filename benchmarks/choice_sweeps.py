@@ -68,7 +68,7 @@ from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import response
 from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.choice import covered_band
+from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.family import Family, family_member, family_of
 from bladefem.study.adaptive.frequency_list import adapt_frequency_list
 from bladefem.study.adaptive.settings import Settings, first_for, restarted_settings

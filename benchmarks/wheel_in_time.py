@@ -25,7 +25,7 @@ from scipy.linalg import expm
 
 from bladefem.hbm.solver.newton import Options
 from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.choice import solver_options
+from bladefem.study.adaptive.band_sweep import solver_options
 from bladefem.study.mistuning.blade_material import deviation_pattern
 from bladefem.study.mistuning.pattern_response import PatternResponse
 from bladefem.study.mistuning.stage import with_whole_wheel

@@ -58,7 +58,8 @@ from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.scene.tables import Mistuning, Scene
 from bladefem.scene.toml import load_scene
-from bladefem.study.adaptive.choice import Checked, covered_band, default_band, solver_options
+from bladefem.study.adaptive.band_sweep import covered_band, default_band, solver_options
+from bladefem.study.adaptive.checked_curve import CheckedCurve
 from bladefem.study.adaptive.family import Family, family_member
 from bladefem.study.adaptive.indicators import moved_solution
 from bladefem.study.adaptive.settings import Settings, restarted_settings, scene_line
@@ -248,7 +249,7 @@ def by_settings(settings: Settings, known: Prepared, k: int) -> Answer:
     scene, family = known.scene, known.families[k]
     model = family_member(family, settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, scene.accuracy)
-    found = judged_resonance(Marches(family), Checked(settings, points, {}), scene)
+    found = judged_resonance(Marches(family), CheckedCurve(settings, points, {}), scene)
     top = found.point
     return Answer(found.amplitude, top.frequency, asking(model, settings, top))
 

@@ -36,7 +36,7 @@ from ..hbm.sensitivity import sensitivities
 from ..scene.tables import Contact, Scene
 from ..scene.validate_contact import friction_of_seats
 from ..util.communicator import Communicator
-from .adaptive.choice import solver_options
+from .adaptive.band_sweep import solver_options
 from .adaptive.family import Family, Member, family_member, joined_elements
 from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase

@@ -6,7 +6,7 @@ import pytest
 from bladefem.hbm import linear_resonances
 from bladefem.hbm.linear_resonances import free_resonances, stuck_partners, stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
-from bladefem.study.adaptive.choice import default_band
+from bladefem.study.adaptive.band_sweep import default_band
 
 HZ = 2 * np.pi
 

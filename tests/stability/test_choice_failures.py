@@ -26,17 +26,14 @@ from bladefem.hbm.solver.residual import Balance
 from bladefem.hbm.sweep import response, sweep
 from bladefem.study.adaptive import check_points as watched
 from bladefem.study.adaptive import indicators
+from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.check_points import peak_of
-from bladefem.study.adaptive.choice import (
-    Checked,
-    adapted_settings,
-    choose_settings,
-    covered_band,
-    estimated_errors,
-)
+from bladefem.study.adaptive.checked_curve import CheckedCurve, estimated_errors
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.frequency_list import adapt_frequency_list
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
+from bladefem.study.adaptive.point_choice import choose_settings
+from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import DIRECTIONS, Settings, first_for
 from bladefem.study.influences import WIDE_STEP
 
@@ -136,7 +133,7 @@ def test_F22_an_indicator_beside_the_peak():
     assert found.total <= 0.01  # told 0.1 %
     top = peak_of(covered_band(family_member(family, there).model, there, band, 1, 0.02))
     assert off(model, top) > 0.02
-    curve = adapted_settings(family, first, band, 1, 0.02)
+    curve = resonance_curve(family, first, band, 1, 0.02)
     assert off(model, peak_of(curve.points)) < 0.01
     assert curve.settings.error <= 0.01
     assert curve.settings.harmonics > there.harmonics
@@ -198,7 +195,9 @@ def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
 def test_F24_the_curve_says_where_nothing_is_known():
     point = solve(reference_model(load=3.0, points=4), HZ * 1300, 1, 64)
     points = [replace(point, omega=HZ * f, converged=f != 1200) for f in (1100, 1200, 1300, 1400)]
-    told = estimated_errors(Checked(first_for(10), points, {HZ * 1300: 0.01, HZ * 1400: np.inf}))
+    told = estimated_errors(
+        CheckedCurve(first_for(10), points, {HZ * 1300: 0.01, HZ * 1400: np.inf})
+    )
     np.testing.assert_array_equal(told, [0.01, np.inf, 0.01, np.inf])
 
 
@@ -211,7 +210,7 @@ def test_F25_a_sweep_that_follows_one_of_two_peaks():
     circular = (HZ * band[0], HZ * band[1])
     coarse = max(sweep(model, circular, 7, 256, peak=1e-3, curve=0.1), key=size)
     assert size(coarse) < 0.8 * size(dense)
-    curve = adapted_settings(family_of(model), first_for(2), band, 1, 0.02)
+    curve = resonance_curve(family_of(model), first_for(2), band, 1, 0.02)
     assert size(peak_of(curve.points)) == pytest.approx(size(dense), rel=0.01)
     assert peak_of(curve.points).frequency == pytest.approx(dense.frequency, rel=1e-3)
 

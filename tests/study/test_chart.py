@@ -197,7 +197,6 @@ def test_a_flat_top_is_told_apart_from_the_vertex_that_errors_compare(made, monk
         marks=SimpleNamespace(verdict=np.full(len(made.curve.points), "stable")),
     )
     monkeypatch.setattr("bladefem.study.chart.scene.judged_resonance", lambda *_: judged)
-    monkeypatch.setattr("bladefem.study.chart.scene.Marches", lambda models: None)
     said = _judged_sentence(None, None, made.curve)
     top = max((p for p in made.curve.points if p.converged), key=size)
     assert said.startswith("the highest point solved with the automatic choice, ")

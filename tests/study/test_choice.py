@@ -18,12 +18,7 @@ from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.check_points import peak_of
-from bladefem.study.adaptive.choice import (
-    adapted_settings,
-    checked_points,
-    choose_settings,
-    estimated_errors,
-)
+from bladefem.study.adaptive.checked_curve import checked_points, estimated_errors
 from bladefem.study.adaptive.family import (
     carried_displacements,
     coarsened_elements,
@@ -31,6 +26,8 @@ from bladefem.study.adaptive.family import (
     family_of,
 )
 from bladefem.study.adaptive.indicators import indicate_errors, richer_settings
+from bladefem.study.adaptive.point_choice import choose_settings
+from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import Settings, enriched_settings, first_for
 from bladefem.study.pipeline import case_models, shared_accuracy
 from bladefem.study.pipeline.assemble_model import LoadCase
@@ -68,13 +65,14 @@ def test_accepted_settings_keep_the_accuracy(kt, mass, phase, points, load, shar
 
 def test_a_curve_tells_its_error_at_every_point():
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
-    curve = adapted_settings(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
-    told, top = estimated_errors(curve), size(peak_of(curve.points))
-    true = [
-        abs(p.probe[1, 0] / solve(model, p.omega, 31, 2048).probe[1, 0] - 1) * size(p) / top
-        for p in curve.points
-    ]
-    assert max(true) < 0.02  # at every point, of the peak: measured 0.19 %
+    curve = resonance_curve(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
+    told = estimated_errors(curve)
+    true = np.array(
+        [abs(size(p) / size(solve(model, p.omega, 31, 2048)) - 1) for p in curve.points]
+    )
+    # measured 1.9 times the true error at its largest, 2.1 % on a flank, and 0.26 % at the peak
+    assert (told > true / 2)[true > 0.2 * 0.02].all()
+    assert true[curve.points.index(peak_of(curve.points))] < 0.01
     assert len(told) == len(curve.points) and np.isfinite(told).all()
     assert 3 <= checked_points(curve).sum() <= 8
     assert curve.settings.error <= 0.01

@@ -11,7 +11,7 @@ from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.reduction.matrices import port_model_from_matrices
-from bladefem.study.adaptive.choice import Checked
+from bladefem.study.adaptive.checked_curve import CheckedCurve
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.stability.error_in_time import Marches, carried_motion, error_in_time
@@ -48,7 +48,7 @@ def test_a_march_tells_what_harmonics_leave_out():
     top = solve(model, OMEGA, 3, 64)
     truth = abs(size(top) / size(solve(model, OMEGA, 31, 512)) - 1)
     assert top.states["lift"] == 1
-    curve = Checked(settings_of(0.412), [], {}, parts=PARTS)
+    curve = CheckedCurve(settings_of(0.412), [], {}, parts=PARTS)
     marches = Marches(family)
     found = error_in_time(marches, curve, top, 0.05)
     assert found.error == pytest.approx(0.012 + truth, abs=2e-3)
@@ -66,7 +66,7 @@ def test_an_error_that_balances_tell_as_well_is_left(error):
     family = Family(lambda s: Member(model, np.arange(1)), 3)
     top = solve(model, OMEGA, 3, 64)
     parts = PARTS | {"points": 0.02}
-    curve = Checked(settings_of(error), [], {}, parts=parts)
+    curve = CheckedCurve(settings_of(error), [], {}, parts=parts)
     assert error_in_time(Marches(family), curve, top, 0.012) is None
 
 
@@ -80,8 +80,8 @@ def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points(nodes, cou
     moved = carried_motion(family, coarse, top, replace(coarse, points=2))
     assert size(moved) == pytest.approx(size(top), rel=1e-6)
     assert moved.f.shape[0] == 2 and not moved.converged
-    found = error_in_time(Marches(family), Checked(coarse, [], {}), top, 0.05)
+    found = error_in_time(Marches(family), CheckedCurve(coarse, [], {}), top, 0.05)
     assert found.band.points == 2
     assert found.error == pytest.approx(counted * truth, abs=counted * 2e-3)
     every = replace(coarse, points=nodes)
-    assert error_in_time(Marches(family), Checked(every, [], {}), moved, 0.05) is None
+    assert error_in_time(Marches(family), CheckedCurve(every, [], {}), moved, 0.05) is None

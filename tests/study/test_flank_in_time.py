@@ -16,7 +16,7 @@ from bladefem.hbm.stability import STABLE, UNSTABLE
 from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
-from bladefem.study.adaptive.choice import Checked
+from bladefem.study.adaptive.checked_curve import CheckedCurve
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.stability import error_in_time
@@ -107,7 +107,7 @@ def test_the_blade_keeps_far_more_beside_the_resonance_than_at_it(model, points,
     family = family_of(model)
     settings = settings_of(family)
     top = max(points, key=size)
-    curve = Checked(settings, [points[0], top], {})
+    curve = CheckedCurve(settings, [points[0], top], {})
     marks = stability_of(model, curve.points)
     assert list(marks.verdict) == [UNSTABLE, STABLE]
     found = flank_motions(Marches(family), curve, marks, size(top))

@@ -12,7 +12,7 @@ from bladefem.hbm.model import Damping
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, Verdict, stability_verdict
 from bladefem.hbm.sweep import response
-from bladefem.study.adaptive.choice import covered_band
+from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.response_remarks import search_sentence

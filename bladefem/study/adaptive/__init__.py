@@ -3,9 +3,10 @@
 - what is chosen: ``settings``; from which models: ``family``
 - errors: ``indicators`` of a point, ``peak_errors`` of a resonance, ``contact_mesh`` of the contact
   mesh, ``layer_change`` of a layer that stiffens with pressure, ``changed_peak`` of another model
-- choices: ``resonance_choice`` at a peak and ``resonance_curve`` of a whole curve, as runs use
-  them; ``choice`` at a point, ``frequency_list`` along given frequencies, ``check_points`` which
-  points are looked at
+- curves: ``band_sweep`` with given settings, ``checked_curve`` with errors at some of its points,
+  ``check_points`` which of them are looked at
+- choices: ``resonance_choice`` at a peak and ``resonance_curve`` of a whole curve, as runs and
+  charts use them; ``point_choice`` at one frequency, ``frequency_list`` along given ones
 - special cases: ``branch_choice`` peaks on folds, ``choice_in_time`` and ``stiff_layer`` where
   contacts lift off, ``cheaper_settings`` poorer settings that serve as well
 """

@@ -17,10 +17,12 @@ from ...hbm.solution import Solution, size
 from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
 from ...hbm.sweep import response
+from .band_sweep import solver_options
 from .check_points import heights_of, left_out_motion, points_to_check
-from .choice import KEPT_DIRECTIONS, Checked, likely_settings, next_settings, solver_options
+from .checked_curve import CheckedCurve
 from .family import Family, carried_displacements, family_member, with_excited_harmonics
 from .indicators import Indicators, indicate_errors, judged_orders, total_error
+from .point_choice import KEPT_DIRECTIONS, likely_settings, next_settings
 from .settings import Settings, enriched_settings
 
 # of richer settings, each round one point
@@ -67,7 +69,7 @@ def adapt_frequency_list(
     omegas: Sequence[float],
     settings: Settings,
     accuracy: float,
-) -> Checked:
+) -> CheckedCurve:
     """Response at ascending circular frequencies [rad/s], everywhere within the accuracy of its
     highest point.
 
@@ -108,7 +110,7 @@ def adapt_frequency_list(
             if found.errors[name] <= accuracy / 20
         }
     top, *_ = _estimated_points(curve)
-    return Checked(
+    return CheckedCurve(
         replace(curve.used[top], error=curve.errors[points[top].omega]), points, curve.errors
     )
 

@@ -20,7 +20,7 @@ from ...errors import NotSolvedError
 from ...hbm.full_stick import sticks_safely
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution, lifts_off
-from .choice import solver_options
+from .band_sweep import solver_options
 from .family import (
     Family,
     carried_displacements,

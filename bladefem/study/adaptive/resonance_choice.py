@@ -13,7 +13,6 @@ from ...errors import NotSolvedError
 from ...hbm.full_stick import sticks_safely
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution, lifts_off, mostly_lifts_off
-from .choice import LIKELY_SETTINGS, likely_settings
 from .family import (
     Family,
     family_member,
@@ -27,6 +26,7 @@ from .peak_errors import (
     peak_from,
     too_large,
 )
+from .point_choice import LIKELY_SETTINGS, likely_settings
 from .settings import DIRECTIONS, Settings, enriched_settings
 
 # enrichments of one peak before giving up

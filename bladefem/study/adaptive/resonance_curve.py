@@ -12,6 +12,7 @@ from ...hbm.band_path import USUAL_LIMITS, PathLimits
 from ...hbm.peak import Peak
 from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, size
 from ...hbm.sweep import MAX_PATH_UNKNOWNS
+from .band_sweep import covered_band, solver_options
 from .branch_choice import peak_error
 from .cheaper_settings import cheaper_settings
 from .check_points import (
@@ -23,7 +24,7 @@ from .check_points import (
     left_out_motion,
     peak_of,
 )
-from .choice import Checked, covered_band, solver_options
+from .checked_curve import CheckedCurve
 from .choice_in_time import March, choose_in_time, marched_widely
 from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
@@ -60,7 +61,8 @@ def resonance_curve(
     mode: int,
     accuracy: float,
     march: March | None = None,
-) -> Checked:
+    fixed: tuple[str, ...] = (),
+) -> CheckedCurve:
     """A swept curve with settings that hold the height of its peak to half the accuracy.
 
     A rough sweep finds the peak, the settings are chosen there, and the curve is swept with them.
@@ -74,6 +76,7 @@ def resonance_curve(
         band: [Hz]; round the resonances when None.
         march: what the blade keeps to after a motion, by which harmonics are chosen where most
             contacts lift off; richer balances tell them when None.
+        fixed: names that may not be changed here although they are not the user's.
 
     Raises:
         NotSolvedError: no point converged.
@@ -84,10 +87,12 @@ def resonance_curve(
     swept = settings, 1.0
     notes: list[str] = []
     for number in range(MAX_SWEEPS):
-        used, peak, errors = _chosen(family, used, top, accuracy, number == 0, march)
+        used, peak, errors = _chosen(family, used, top, accuracy, number == 0, fixed, march)
         in_time = marched_widely(march, used, top) if errors is None else errors.in_time
         if number == 0 and not in_time and same_settings(used, settings):
-            used, peak, errors = _with_missed(family, used, points, top, accuracy, peak, errors)
+            used, peak, errors = _with_missed(
+                family, used, points, top, accuracy, fixed, peak, errors
+            )
         if swept[1] != accuracy or not same_settings(swept[0], used):
             finer = _with_fewer_folds(used, peak) if number == 0 else None
             limits = USUAL_LIMITS if finer is None else PathLimits(MANY_FOLDS, MANY_POINTS)
@@ -102,7 +107,7 @@ def resonance_curve(
         top = _resonance(family, used, points)
         if used.error is not None and used.error > FAR_BEYOND * accuracy:
             # the flanks of a peak that is far from right need no look of their own
-            return Checked(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
+            return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
         found = _checked_flanks(family, used, points, top, errors)
         # what harmonics leave out a march has told
@@ -112,7 +117,7 @@ def resonance_curve(
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
         used = missed or used
-    return Checked(used, points, found, tuple(notes), _parts(errors))
+    return CheckedCurve(used, points, found, tuple(notes), _parts(errors))
 
 
 def _rough_curve(
@@ -219,6 +224,7 @@ def _with_missed(
     points: Sequence[Solution],
     top: Solution,
     accuracy: float,
+    fixed: tuple[str, ...],
     peak: Peak | None,
     errors: PeakErrors | None,
 ) -> tuple[Settings, Peak | None, PeakErrors | None]:
@@ -232,7 +238,7 @@ def _with_missed(
     richer = _harmonics_missed(settings, points, top, significant, accuracy)
     if richer is None:
         return settings, peak, errors
-    return _chosen(family, richer, top, accuracy, lower=False)
+    return _chosen(family, richer, top, accuracy, lower=False, fixed=fixed)
 
 
 def _resonance(family: Family, settings: Settings, points: Sequence[Solution]) -> Solution:
@@ -290,6 +296,7 @@ def _chosen(
     top: Solution,
     accuracy: float,
     lower: bool,
+    fixed: tuple[str, ...],
     march: March | None = None,
 ) -> tuple[Settings, Peak | None, PeakErrors | None]:
     """Settings that hold at the peak next to a point; the same with an unknown error where that
@@ -297,14 +304,15 @@ def _chosen(
 
     Args:
         lower: they may become poorer where not all is needed.
+        fixed: names that may not be changed.
     """
     try:
         peak = peak_from(family, settings, top, settings, accuracy)
         if march is not None and marched_widely(march, settings, peak.solution):
-            choice = choose_in_time(family, settings, peak, accuracy, march, fixed=("modes",))
+            choice = choose_in_time(family, settings, peak, accuracy, march, fixed)
             if choice is not None:
                 return choice
-        enough = choose_at_peak(family, settings, peak, accuracy, fixed=("modes",))
+        enough = choose_at_peak(family, settings, peak, accuracy, fixed)
         return cheaper_settings(family, *enough, accuracy) if lower else enough
     except NotSolvedError:
         return replace(settings, error=np.inf), None, None

@@ -18,7 +18,7 @@ from ...hbm.model import ReducedModel, in_series
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution, mostly_lifts_off
 from ...reduction.assemble import change_each
-from .choice import solver_options
+from .band_sweep import solver_options
 from .family import Family, family_member
 from .peak_errors import peak_from
 from .resonance_choice import LIFTING_POINTS

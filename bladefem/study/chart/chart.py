@@ -20,8 +20,11 @@ from ...errors import InputError, NotSolvedError
 from ...hbm.model import ReducedModel
 from ...hbm.solution import size
 from ...util.percent import percent
-from ..adaptive.choice import Checked, adapted_settings, covered_band
+from ..adaptive.band_sweep import covered_band
+from ..adaptive.checked_curve import CheckedCurve
+from ..adaptive.choice_in_time import March
 from ..adaptive.family import Family, family_member
+from ..adaptive.resonance_curve import resonance_curve
 from ..adaptive.settings import DAMPER_MODELS, Settings
 from .cpu_clock import Clock, running_clock
 from .methods import chart_methods, obstacle_in_time, sampled_balance, tangential_model
@@ -65,7 +68,7 @@ class Chart:
     # all with the settings of the automatic choice; time is that of everything
     meshes: pd.DataFrame | None = None
     # of the automatic choice
-    curve: Checked | None = None
+    curve: CheckedCurve | None = None
 
 
 def method_chart(
@@ -76,6 +79,8 @@ def method_chart(
     budget: float = 120.0,
     band: tuple[float, float] | None = None,
     poorer: Mapping[str, Family] | None = None,
+    march: March | None = None,
+    fixed: tuple[str, ...] = (),
 ) -> Chart:
     """The chart of one load case.
 
@@ -90,6 +95,8 @@ def method_chart(
         band: [Hz] where the resonance is sought.
         poorer: names of other families that are compared with the first one by their richest
             member.
+        march: what the blade keeps to after a motion; the automatic choice asks it as in a run.
+        fixed: settings that the automatic choice does not change.
 
     Raises:
         InputError: the budget is no time.
@@ -98,13 +105,12 @@ def method_chart(
     check_budget(budget)
     with running_clock() as clock:
         begun = clock.now()
-        curve = adapted_settings(family, settings, band, mode, accuracy)
+        curve = resonance_curve(family, settings, band, mode, accuracy, march, fixed)
         chosen = curve.settings
         found = clock.now()
         remarks = [
             f"automatic choice: {chosen.sentence()}, found in {found - begun:.2g} s; it keeps the "
-            "accuracy of amplitude and phase at each frequency, where bladefem run keeps that of "
-            "the resonance amplitude alone and may take fewer harmonics"
+            "accuracy of the resonance amplitude, not that of each phase"
         ]
         omegas = chart_frequencies([(p.omega, size(p)) for p in curve.points if p.converged])
         course = _Course(family, chosen, omegas, found + budget, clock, remarks)

@@ -27,8 +27,8 @@ from ...scene.tables import Scene
 from ...scene.validate import refuse_given_mesh
 from ...util.communicator import Communicator
 from ...util.percent import percent
+from ..adaptive.band_sweep import covered_band
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import covered_band
 from ..adaptive.family import family_member
 from ..adaptive.settings import Settings
 from ..pipeline.bodies import Bodies

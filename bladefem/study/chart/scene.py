@@ -18,7 +18,7 @@ from ...scene.units import newtons
 from ...util.communicator import Communicator
 from ...util.message import warning
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import Checked
+from ..adaptive.checked_curve import CheckedCurve
 from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted_settings, scene_line
 from ..pipeline.bodies import Bodies
@@ -68,10 +68,12 @@ def scene_chart(
     def family(known: Reduced) -> Family:
         return family_of_case(scene, done.mesh, known, patches, case)
 
+    models = family(reduced)
+    marches = Marches(models)
     made = on_root(
         comm,
         lambda: method_chart(
-            family(reduced),
+            models,
             restarted_settings(settings),
             scene.excitation.mode,
             scene.accuracy,
@@ -81,12 +83,15 @@ def scene_chart(
                 name: family(fewer)
                 for name, fewer in _fewer_diameters(reduced, scene.excitation.engine_order)
             },
+            marches if scene.study.stability else None,
+            # chosen with the reduction, as in a run
+            fixed=("modes",),
         ),
     )
     made.remarks.insert(0, f"normal load {newtons(case.load)} on each seat")
     if scene.study.stability and made.curve is not None:
-        curve, models = made.curve, family(reduced)
-        made.remarks.append(on_root(comm, lambda: _judged_sentence(scene, models, curve)))
+        curve = made.curve
+        made.remarks.append(on_root(comm, lambda: _judged_sentence(scene, marches, curve)))
     made.remarks.append(f"take this, at the beginning of the scene: {scene_line(made.settings)}")
     if sizes is None:
         return made
@@ -96,12 +101,12 @@ def scene_chart(
     )
 
 
-def _judged_sentence(scene: Scene, models: Family, curve: Checked) -> str:
+def _judged_sentence(scene: Scene, marches: Marches, curve: CheckedCurve) -> str:
     """Whether the blade keeps to the resonance of the automatic choice, in time: all that a chart
     compares are balances.
     """
     top = peak_of(curve.points)
-    judged = judged_resonance(Marches(models), curve, scene)
+    judged = judged_resonance(marches, curve, scene)
     balance = f"{1e6 * size(top):.4g} um at {top.frequency:.5g} Hz"
     # what the tables compare lies off the curve where its top is flat: 0.5 % above it for the
     # shipped plane blades at 20 N

@@ -22,7 +22,7 @@ from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
 from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification, scatter_statistics, unknown_statistics
 from ...wheel.walking import with_free_means
-from ..adaptive.choice import solver_options
+from ..adaptive.band_sweep import solver_options
 from ..pipeline.curve import Curve
 from ..pipeline.stage_runner import Folder
 from .engine_orders import own_harmonic

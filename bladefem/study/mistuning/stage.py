@@ -24,7 +24,7 @@ from ...wheel.statistics import (
     joined_loads,
 )
 from ...wheel.walking import with_free_means
-from ..adaptive.choice import solver_options
+from ..adaptive.band_sweep import solver_options
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import load_cases

@@ -25,7 +25,7 @@ from ...hbm.peak_levels import Variation
 from ...hbm.solution import Solution
 from ...scene.tables import Scene
 from ...scene.validate_contact import friction_of_seats
-from ..adaptive.choice import default_band, solver_options
+from ..adaptive.band_sweep import default_band, solver_options
 from ..adaptive.family import Family, family_member, joined_elements, with_excited_harmonics
 from ..adaptive.peak_errors import too_large
 from ..adaptive.resonance_choice import choose_at_peak

@@ -21,9 +21,9 @@ from ...reduction.other_diameters import has_rigid_motion, spanned_models
 from ...reduction.truncate import truncate_modes
 from ...scene.aerodynamics import has_flow
 from ...scene.tables import Scene
+from ..adaptive.band_sweep import covered_band
 from ..adaptive.cheaper_settings import cheaper_settings
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import covered_band
 from ..adaptive.family import Family, Member, family_member, shared_harmonics
 from ..adaptive.peak_errors import peak_from
 from ..adaptive.resonance_choice import LARGEST_BALANCE, choose_at_peak

@@ -16,7 +16,7 @@ from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import Checked, checked_points, estimated_errors
+from ..adaptive.checked_curve import CheckedCurve, checked_points, estimated_errors
 from ..adaptive.family import Family, family_member
 from ..adaptive.resonance_curve import too_large_to_follow
 from ..adaptive.settings import Settings
@@ -209,7 +209,7 @@ def curve_of(
 
 
 def _interval_of(
-    scene: Scene, model: ReducedModel, curve: Checked, top: Solution
+    scene: Scene, model: ReducedModel, curve: CheckedCurve, top: Solution
 ) -> LoadInterval | None:
     """The amplitudes over all admissible friction forces, where the scene asks for them."""
     if not scene.study.interval:
@@ -217,7 +217,7 @@ def _interval_of(
     return load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
 
 
-def _sought_in_time(scene: Scene, models: Family, curve: Checked) -> ResonanceInTime | None:
+def _sought_in_time(scene: Scene, models: Family, curve: CheckedCurve) -> ResonanceInTime | None:
     """The resonance by marches, where most contacts lift off and balances do not tell it to the
     accuracy.
     """

@@ -12,7 +12,7 @@ from ...errors import NotSolvedError
 from ...hbm.solution import Solution, mostly_lifts_off
 from ...scene.tables import Scene
 from ..adaptive.check_points import peak_of
-from ..adaptive.choice import Checked
+from ..adaptive.checked_curve import CheckedCurve
 from ..adaptive.contact_mesh import halved_change
 from ..adaptive.family import Family, family_member
 from ..adaptive.layer_change import layer_change
@@ -59,7 +59,7 @@ def curve_with_room(
     softer: SofterBody | None,
     settings: Settings,
     marches: Marches,
-) -> tuple[Checked, UnseenErrors, float]:
+) -> tuple[CheckedCurve, UnseenErrors, float]:
     """The curve of a load case, what balances do not show of its error, and the accuracy that this
     leaves to them.
 
@@ -75,11 +75,14 @@ def curve_with_room(
         NotSolvedError: no point converged.
     """
 
-    def solved(accuracy: float) -> tuple[Checked, UnseenErrors]:
+    def solved(accuracy: float) -> tuple[CheckedCurve, UnseenErrors]:
         march = marches if scene.study.stability else None
         start = restarted_settings(settings)
         mode = scene.excitation.mode
-        curve = resonance_curve(models, start, scene.study.band, mode, accuracy, march)
+        # the modes were chosen with the reduction
+        curve = resonance_curve(
+            models, start, scene.study.band, mode, accuracy, march, fixed=("modes",)
+        )
         # at a maximum: from a point beside it other models find the maximum
         top = peak_of(curve.points)
         return curve, unseen_errors(scene, case, models, softer, curve.settings, top)

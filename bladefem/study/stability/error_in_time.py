@@ -17,7 +17,7 @@ from ...hbm.solve import as_solution
 from ...hbm.solver.fallback import Attempt
 from ...hbm.solver.newton import Newton
 from ...hbm.solver.residual import Balance, evaluate_balance
-from ..adaptive.choice import Checked
+from ..adaptive.checked_curve import CheckedCurve
 from ..adaptive.choice_in_time import COVERED_IN_TIME, MarchedBand
 from ..adaptive.family import Family, Member, carried_displacements, family_member
 from ..adaptive.settings import Settings
@@ -97,7 +97,7 @@ class ErrorInTime:
 
 def error_in_time(
     marches: Marches,
-    curve: Checked,
+    curve: CheckedCurve,
     top: Solution,
     accuracy: float,
 ) -> ErrorInTime | None:

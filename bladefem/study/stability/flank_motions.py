@@ -16,7 +16,7 @@ from ...hbm.solution import Solution
 from ...hbm.stability import UNSTABLE
 from ...util.arrays import RealArray
 from ..adaptive.check_points import heights_of
-from ..adaptive.choice import Checked
+from ..adaptive.checked_curve import CheckedCurve
 from .error_in_time import Marches
 from .kept_band import KeptBand, band_by_steps
 from .verdicts import Stability, model_in_time, settings_in_time
@@ -51,7 +51,7 @@ class FlankMotions:
 
 def flank_motions(
     marches: Marches,
-    curve: Checked,
+    curve: CheckedCurve,
     marks: Stability,
     given: float,
     known: Solution | None = None,

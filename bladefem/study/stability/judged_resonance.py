@@ -13,7 +13,7 @@ from ...hbm.stability import UNIQUE, UNSTABLE, Verdict
 from ...scene.tables import Scene
 from ...util.arrays import RealArray
 from ..adaptive.check_points import heights_of
-from ..adaptive.choice import Checked, estimated_errors
+from ..adaptive.checked_curve import CheckedCurve, estimated_errors
 from ..adaptive.settings import Settings
 from .error_in_time import Marches, error_in_time
 from .finer_contacts import FinerMotion, unstable_with_more_points
@@ -52,7 +52,7 @@ class JudgedResonance:
             return self.march.highest
         return size(self.point)
 
-    def unstable_peak(self, curve: Checked) -> Solution | None:
+    def unstable_peak(self, curve: CheckedCurve) -> Solution | None:
         """The highest point of the curve where it is unstable."""
         place = int(heights_of(curve.points).argmax())
         unstable = self.marks.verdict[place] == UNSTABLE and self.march is not None
@@ -60,7 +60,7 @@ class JudgedResonance:
 
 
 def judged_resonance(
-    marches: Marches, curve: Checked, scene: Scene, sought: bool = False
+    marches: Marches, curve: CheckedCurve, scene: Scene, sought: bool = False
 ) -> JudgedResonance:
     """Judge a curve, and march from its highest point where that is unstable, be it with more
     contact points than the curve has, from unstable motions beside the resonance, and from strong
@@ -101,7 +101,7 @@ def judged_resonance(
 
 def _with_flanks(
     marches: Marches,
-    curve: Checked,
+    curve: CheckedCurve,
     judged: JudgedResonance,
     highest: Solution,
     accuracy: float,
@@ -127,7 +127,7 @@ def _with_flanks(
 
 
 def _at_the_highest(
-    marches: Marches, curve: Checked, scene: Scene, marks: Stability, place: int
+    marches: Marches, curve: CheckedCurve, scene: Scene, marks: Stability, place: int
 ) -> JudgedResonance:
     """What the blade does at the highest point, or at the highest that lasts.
 
@@ -229,9 +229,9 @@ def _contradicts(kept: KeptBand, top: Solution, accuracy: float) -> bool:
 def judged_in_time(
     scene: Scene,
     marches: Marches,
-    curve: Checked,
+    curve: CheckedCurve,
     top: Solution,
-) -> tuple[Checked, RealArray, KeptBand | None]:
+) -> tuple[CheckedCurve, RealArray, KeptBand | None]:
     """The curve with the error of its resonance by a march where that tells it, the estimated error
     of each point, and the march.
     """

@@ -27,7 +27,7 @@ from ...hbm.ring_march import (
 )
 from ...hbm.solution import Solution, lifts_off
 from ..adaptive.check_points import heights_of
-from ..adaptive.choice import Checked
+from ..adaptive.checked_curve import CheckedCurve
 from ..adaptive.resonance_choice import LIFTING_POINTS
 from .error_in_time import Marches, carried_motion
 from .kept_band import KeptBand, amplitudes_of_periods
@@ -89,7 +89,7 @@ class KeptMotion:
 
 def strong_drives(
     marches: Marches,
-    curve: Checked,
+    curve: CheckedCurve,
     given: float,
 ) -> StrongDrives:
     """The highest motion that strong drives near the top of a curve lead to, where contacts lift
