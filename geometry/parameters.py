@@ -296,8 +296,8 @@ class MeshSize:
     )
     order: int = quantity(2, "1", 1, 2, "order of the elements; 1 is only for comparison")
     algorithm: str = quantity(
-        "hxt",
-        choices=("hxt", "delaunay"),
+        "delaunay",
+        choices=("delaunay", "hxt"),
         help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells",
     )
     scale: float = quantity(

@@ -9,5 +9,5 @@ from geometry.sector import wedge_sector
 @pytest.fixture(scope="session")
 def coarse_sector():
     """Default wedge sector with large elements, about 6000 nodes."""
-    size = MeshSize(size=7e-3, algorithm="delaunay")
+    size = MeshSize(size=7e-3)
     return wedge_sector(Aerofoil(), Platform(), Shank(), Disc(), Wedge(), size)

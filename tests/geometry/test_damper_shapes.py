@@ -20,7 +20,7 @@ from geometry.sector_check import check_sector
 from geometry.sector_names import clearing_shift
 
 PARTS = (Aerofoil(), Platform(), Shank(), Disc())
-COARSE = MeshSize(size=0.012, algorithm="delaunay")
+COARSE = MeshSize(size=0.012)
 
 
 def outline_area(corners: np.ndarray) -> float:

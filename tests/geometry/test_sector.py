@@ -29,7 +29,7 @@ PARTS = {
 }
 # shapes, not how volumes are filled: gmsh's Delaunay takes a fifth of the time of HXT here, for
 # cells as good
-COARSE = MeshSize(size=7e-3, algorithm="delaunay")
+COARSE = MeshSize(size=7e-3)
 # where cells are what is tested
 BY_DEFAULT = MeshSize(size=7e-3)
 
@@ -284,7 +284,7 @@ def test_variants_are_meshed(changes):
 
 def test_a_thin_straight_part_of_the_damper_gets_shorter_elements():
     """0.2 mm below the flanks: with seats of six elements, 6.7 mm long, flat cells were left."""
-    size = MeshSize(size=1.4e-2, seat_elements=3, algorithm="delaunay")
+    size = MeshSize(size=1.4e-2, seat_elements=3)
     mesh = build(size, wedge={"base": 2e-4})
     assert mesh.report["worst quality"] > 0.04
     assert "notes" not in mesh.report

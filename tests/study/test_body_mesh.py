@@ -109,10 +109,12 @@ def test_a_softened_peak_that_is_not_solved(monkeypatch, lifting):
     assert found == (pytest.approx(0.99**-2 - 1, rel=0.05) if lifting else np.inf)
 
 
-@pytest.mark.parametrize(("lifting", "expected"), [(0, 0.24), (8, 0.034)])
-def test_a_change_that_ends_on_another_motion_is_not_the_mesh(monkeypatch, lifting, expected):
+@pytest.mark.parametrize("lifting", [0, 8])
+def test_a_change_that_ends_on_another_motion_is_not_the_mesh(monkeypatch, lifting):
     """1.7 % by half of the softening and 24 % by all of it: where contacts lift off, many motions
-    exist at one frequency; where none does, the jump is that of the resonance itself.
+    exist at one frequency, and a flat top has several maxima. The shipped wedge under 73 N has them
+    from 382 to 387 Hz; all of the error led from one to another, 7.4 % lower, half of it changes
+    the resonance by 0.7 %.
     """
     model = reference_model(load=3.0, points=4, modes=20)
     family = family_of(model)
@@ -126,4 +128,4 @@ def test_a_change_that_ends_on_another_motion_is_not_the_mesh(monkeypatch, lifti
         lambda model, settings, top, omega, *_: SimpleNamespace(height=heights[omega]),
     )
     found = softened_change(softer, family, None, Settings(20, 1, 0, "mass"), top, 1)
-    assert found == pytest.approx(expected, rel=1e-9)
+    assert found == pytest.approx(0.034, rel=1e-9)
