@@ -6,6 +6,7 @@ import numpy as np
 from scipy import linalg
 
 from ..data import RigidBody
+from .linear.woodbury import bodies_of
 from .model import ReducedModel
 
 # circular frequencies below this share of the highest are those of rigid modes
@@ -119,6 +120,23 @@ def _stuck_modes(model: ReducedModel, h: int) -> tuple[np.ndarray, np.ndarray]:
         omega, waves = _gyroscopic_modes(omega, shapes.conj().T @ coupling @ shapes)
         shapes = shapes @ waves
     return omega / h, shapes
+
+
+def stuck_motion(model: ReducedModel, shapes: np.ndarray, h: int = 1) -> np.ndarray:
+    """(nodes, directions, k) displacements of the contact springs in stuck modes (n, k) [m], the
+    residual flexibilities in series.
+    """
+    blades, *dampers = bodies_of(model, h)
+    rows = [blades.shapes[min(h, len(blades.shapes) - 1), blades.contact]]
+    flexibility = blades.residual[min(h, len(blades.residual) - 1), blades.contact, blades.contact]
+    for damper in dampers:
+        own = min(h, len(damper.shapes) - 1)
+        rows.append(-damper.shapes[own, damper.contact])
+        flexibility = flexibility + damper.residual[own, damper.contact, damper.contact]
+    moved = np.hstack(rows) @ shapes
+    springs = model.springs.ravel()
+    held = np.linalg.solve(np.eye(len(moved)) + flexibility * springs, moved)
+    return np.asarray(held.reshape(*model.springs.shape, -1))
 
 
 def _joined_coupling(viscous: list[np.ndarray | None], sizes: list[int]) -> np.ndarray:

@@ -92,21 +92,24 @@ def damper_spin_messages(result: SolvedRun) -> list[str]:
     least = CORIOLIS_SHARE * result.scene.accuracy
     share = (
         f"Coriolis forces of the damper move the resonance of mode {mode} in full stick by "
-        f"{percent(spin.coriolis)} of its frequency"
+        f"{percent(spin.coriolis)} of its frequency, and change its amplitude with friction by "
+        f"some {percent(spin.amplitude)}"
     )
     if result.reduced.damper.damping is not None:
         said: list[str] = [method(f"{share}; responses have them.")]
-    elif spin.coriolis <= least:
+    elif max(spin.coriolis, spin.amplitude) <= least:
         said = [method(f"{share}; they are left out of the responses.")]
     else:
         said = [
             warning(f"{share}, and are left out of the responses by operation.coriolis = false.")
         ]
-    if spin.softening > least:
+    if max(spin.softening, spin.softening_amplitude) > least:
         said.append(
             warning(
                 f"spin softening of the damper, which responses leave out, lowers the resonance of "
-                f"mode {mode} in full stick by some {percent(spin.softening)} of its frequency."
+                f"mode {mode} in full stick by some {percent(spin.softening)} of its frequency, "
+                f"and changes its amplitude with friction by some "
+                f"{percent(spin.softening_amplitude)}."
             )
         )
     return said

@@ -1,5 +1,11 @@
-"""Coriolis forces of the damper in responses: counted where they move the mode studied, with all
-contacts sticking, by more than a share of the accuracy asked for, or where the scene says so.
+"""Coriolis forces of the damper in responses: counted where they change frequency or amplitude of
+the mode studied by more than a share of the accuracy asked for, or where the scene says so.
+
+Both are told by the mode with all contacts sticking. With w the tangential motion of the contacts
+for one unit a of the blade's, friction does most against the excitation where k_t |w| a is some two
+times its limit; its work is then in proportion to k_t |w|^2 a^2, that of the excitation to a: the
+amplitude goes with 1 / |w|^2. It is some 25 times as sensitive as the frequency, as little of the
+mode's energy is in the damper.
 
 How far they reach depends on the contact: a damper on soft seats moves with both platforms, a
 bonded one keeps them from moving.
@@ -15,7 +21,7 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...data import Patch
-from ...hbm.linear_resonances import stuck_modes, stuck_partners, stuck_resonances
+from ...hbm.linear_resonances import stuck_modes, stuck_motion, stuck_partners
 from ...hbm.model import ReducedModel
 from ...scene.tables import Scene
 from .assemble_model import LoadCase, joint_model
@@ -37,7 +43,9 @@ def with_damper_coriolis(
         return reduced
     spin = damper_spin(scene, mesh, reduced, patches, case)
     reduced = replace(reduced, damper_spin=spin)
-    return _turning(reduced) if counts_coriolis(scene, spin.coriolis) else reduced
+    return (
+        _turning(reduced) if counts_coriolis(scene, max(spin.coriolis, spin.amplitude)) else reduced
+    )
 
 
 def damper_spin(
@@ -61,10 +69,29 @@ def damper_spin(
     )
     partners = stuck_partners(still)
     if not len(partners):
-        return DamperSpin(0.0, 0.0)
+        return DamperSpin(0.0, 0.0, 0.0, 0.0)
     omega = partners[min(scene.excitation.mode, len(partners)) - 1]
-    shift = float(np.min(np.abs(stuck_resonances(turning) / omega - 1)))
-    return DamperSpin(shift, _softening(still, turning, omega))
+    before, _, rubbing = _stuck_mode(still, omega)
+    after, _, rubbing_after = _stuck_mode(turning, omega)
+    coriolis = abs(after / before - 1)
+    amplitude = 2 * abs(rubbing_after / rubbing - 1) if rubbing > 0 else 0.0
+    softening = _softening(still, turning, omega)
+    # both push the damper across the axis: in proportion
+    ratio = softening / coriolis if coriolis > 0 else 0.0
+    return DamperSpin(coriolis, amplitude, softening, ratio * amplitude)
+
+
+def _stuck_mode(model: ReducedModel, omega: float) -> tuple[float, np.ndarray, float]:
+    """Circular frequency [rad/s] and shape (n,) of the stuck mode next to a frequency, and root of
+    its tangential contact energy.
+    """
+    found, shapes = stuck_modes(model)
+    nearest = int(np.argmin(np.abs(found - omega)))
+    shape = shapes[:, nearest]
+    tangents = model.elements.tangents
+    moved = stuck_motion(model, shape[:, None])[:, -tangents:, 0]
+    energy = np.sum(model.springs[:, -tangents:] * np.abs(moved) ** 2)
+    return float(found[nearest]), shape, float(np.sqrt(energy))
 
 
 def _turning(reduced: Reduced) -> Reduced:
@@ -81,6 +108,6 @@ def _softening(still: ReducedModel, turning: ReducedModel, omega: float) -> floa
     assert isinstance(turning.damper, tuple)
     coupling = turning.damper[0].damping
     assert coupling is not None
-    found, shapes = stuck_modes(still)
-    damper = shapes[len(still.side(1).omega) :, int(np.argmin(np.abs(found - omega)))]
+    _, shape, _ = _stuck_mode(still, omega)
+    damper = shape[len(still.side(1).omega) :]
     return float(np.linalg.norm(coupling @ damper) ** 2 / 8 / omega**2)

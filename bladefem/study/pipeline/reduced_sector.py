@@ -26,13 +26,17 @@ DAMPER_MODES = 16
 @dataclass(frozen=True)
 class DamperSpin:
     """What the rotation of the frame does to the resonance of the mode studied through the damper,
-    all contacts sticking, as shares of its frequency [1].
+    all contacts sticking [1].
     """
 
-    # by Coriolis forces, up or down
+    # share of its frequency by which Coriolis forces move it, up or down
     coriolis: float
-    # by spin softening, down; responses leave it out
+    # share by which they change the amplitude of a response with friction, up or down, roughly
+    amplitude: float
+    # shares by which spin softening lowers the frequency and changes the amplitude, roughly;
+    # responses leave it out
     softening: float
+    softening_amplitude: float
 
 
 @dataclass(frozen=True)
