@@ -228,3 +228,6 @@ class RigidBody:
     B: RealArray
     # (d,) static load [N, N m]
     load: RealArray = field(default_factory=lambda: np.zeros(0))
+    # (d, d) skew-symmetric matrix of gyroscopic and Coriolis forces [N s/m, N s, N m s]; None
+    # without
+    gyroscopic: RealArray | None = None

@@ -22,11 +22,11 @@ from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import to_complex, to_real
-from .linear.bodies import Stack
+from .linear.bodies import Stack, gyroscopic_part
 from .linear.condensation import condense
 from .linear.contact_flexibility import flexibility_of_mean
 from .linear.woodbury import bodies_of
-from .model import ReducedModel
+from .model import SKEW_ROUNDING_SHARE, ReducedModel
 from .solver.residual import contact_forces
 
 # rounds in which frequency and damping are found where Coriolis forces couple the modes, and their
@@ -53,8 +53,9 @@ class ModeFrame:
     # (m, m) and (m,) of the mean
     A0: np.ndarray
     stuck0: np.ndarray
-    # (S, k, k) Coriolis forces of the blade's modes [1/s]; None without
+    # (S, k, k) Coriolis forces of the blade's modes and of the damper's [1/s]; None without
     coriolis: np.ndarray | None = None
+    damper_coriolis: np.ndarray | None = None
     # on the way to a motion (`mode_detour`): of the contacts' alternating forces that act, and the
     # damping ratio that all modes but this one in harmonic 1 have
     share: float = 1.0
@@ -103,8 +104,7 @@ def mode_frame(
     samples: int,
 ) -> ModeFrame:
     bodies = bodies_of(model, H)
-    if any(body.coupled is not None for body in bodies[1:]):
-        raise InputError("damping that couples modes: expected modal damping of a damper")
+    theirs = _lossless_coupling(bodies[1]) if len(bodies) > 1 else None
     if model.circulatory:
         raise InputError("unsymmetric stiffness: expected a symmetric one for nonlinear modes")
     # any frequency tells the mean; the mode's own is a resonance
@@ -112,8 +112,24 @@ def mode_frame(
     shape = model.blades(H).shapes[_of(model.blades(H), 1)][model.blades(H).contact][:, mode]
     mean = flexibility_of_mean(still.condensed.flex)
     # what has a loss is damping, and left out
-    coriolis = coriolis_part(bodies[0])
-    return ModeFrame(model, mode, H, samples, bodies, shape, mean, still.stuck[0].real, coriolis)
+    ours = coriolis_part(bodies[0])
+    stuck0 = still.stuck[0].real
+    return ModeFrame(model, mode, H, samples, bodies, shape, mean, stuck0, ours, theirs)
+
+
+def _lossless_coupling(damper: Stack) -> np.ndarray | None:
+    """`coriolis_part` of a damper.
+
+    Raises:
+        InputError: damping couples its modes.
+    """
+    found = coriolis_part(damper)
+    if damper.coupled is None:
+        return None
+    loss = damper.coupled if found is None else damper.coupled - found
+    if abs(loss).max() > SKEW_ROUNDING_SHARE * abs(damper.coupled).max():
+        raise InputError("damping that couples modes: expected modal damping of a damper")
+    return found
 
 
 def _unloaded(model: ReducedModel) -> ReducedModel:
@@ -157,10 +173,11 @@ def _inverse(frame: ModeFrame, i: int, h: int, omega: float, zeta: float) -> np.
     if i == 0 and h == 1:
         kept[frame.mode] = False
     found = np.zeros((len(Z), len(Z)), dtype=complex)
-    if i > 0 or frame.coriolis is None:
+    coriolis = frame.damper_coriolis if i else frame.coriolis
+    if coriolis is None:
         found[kept, kept] = 1 / Z[kept]
         return found
-    full = np.diag(Z) + 1j * w * frame.coriolis[_of(body, h)]
+    full = np.diag(Z) + 1j * w * coriolis[_of(body, h)]
     some = np.ix_(kept, kept)
     found[some] = np.linalg.inv(full[some])
     return found
@@ -208,7 +225,7 @@ def coriolis_part(blades: Stack) -> np.ndarray | None:
     """(S, k, k) what couples the modes without a loss [1/s]; None without."""
     if blades.coupled is None:
         return None
-    found = (blades.coupled - blades.coupled.conj().swapaxes(1, 2)) / 2
+    found = gyroscopic_part(blades.coupled)
     return found if found.any() else None
 
 

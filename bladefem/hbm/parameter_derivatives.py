@@ -16,14 +16,17 @@ import numpy as np
 from ..data import RigidBody
 from ..errors import InputError
 from .linear.bodies import (
+    Damping,
     Stack,
     damping_rate,
+    gyroscopic_part,
     impedance_rate,
     modal_amplitudes,
     port_motion,
 )
 from .linear.condensation import Linear
 from .linear.contact_flexibility import flexibility_product
+from .linear.woodbury import bodies_of
 from .model import ReducedModel
 from .parameters import check_parameter, layer_share, vary
 from .policy import uses_coulomb_kernels
@@ -203,35 +206,37 @@ def _damper_rate(
     """(H+1, m) derivative of the damper's contact displacements under constant forces."""
     if name == "mass" and model.damper is None:
         raise InputError("mass: expected a model with a damper")
-    if name == "force":
+    if name == "force" or model.damper is None:
         return np.zeros_like(force)
     omega = linear.omega
     w = omega * np.arange(len(force))
-    if isinstance(model.damper, RigidBody):
-        B = model.damper.B[model.rows]
-        moved = np.zeros_like(force)
-        moved[1:] = (
-            -(B @ np.linalg.solve(model.damper.mass, B.T @ force[1:].T)).T / w[1:, None] ** 2
-        )
-        return moved * {"omega": -2 / omega, "mass": -1.0, "damping": 0.0}[name]
-    damper = model.elastic_damper(len(force) - 1)
-    if damper is None:
-        return np.zeros_like(force)
+    damper = bodies_of(model, len(force) - 1)[1]
     ports = np.zeros((len(force), damper.shapes.shape[1]), dtype=complex)
     ports[:, damper.contact] = force
     first = model.blades(len(force) - 1).omega.shape[1]
     flexible = linear.modal_part(first, first + damper.omega.shape[1])
     modal = modal_amplitudes(damper, flexible, ports)
     if name == "mass":
-        # with the mass: omega^2 m, half of 2 zeta sqrt(k m), and alpha m
-        own = model.damper_damping
-        push = (
-            -(w[:, None] ** 2) + 1j * w[:, None] * (own.ratio * damper.omega + own.mass)
-        ) * modal
+        push = _inertia_rate(model, damper, w, modal)
         rate = _pushed_modes(flexible, push)
     else:
         rate = _modal_rate(damper, flexible, omega, modal, name)
     return port_motion(damper, rate, np.zeros_like(ports), damper.contact)
+
+
+def _inertia_rate(
+    model: ReducedModel, damper: Stack, w: np.ndarray, modal: np.ndarray
+) -> np.ndarray:
+    """(H+1, k) derivative of the damper's modal impedances with the logarithm of its mass, times
+    modal amplitudes: omega^2 m, half of 2 zeta sqrt(k m), alpha m and gyroscopic forces.
+    """
+    # a rigid damper has no damping of its own
+    law = Damping() if isinstance(model.damper, RigidBody) else model.damper_damping
+    w = w[:, None]
+    push = (-(w**2) + 1j * w * (law.ratio * damper.omega + law.mass)) * modal
+    if damper.coupled is None:
+        return push
+    return push + 1j * w * (gyroscopic_part(damper.coupled) @ modal[:, :, None])[:, :, 0]
 
 
 def _pushed_modes(flexible: np.ndarray, push: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..data import Elements, PortModel, RigidBody
 from ..errors import InputError, suggestion
+from .linear.bodies import gyroscopic_part
 from .model import Damping, ReducedModel
 
 
@@ -54,16 +55,27 @@ def _scale_mass(model: ReducedModel, factor: float) -> ReducedModel:
     if model.damper is None:
         raise InputError("mass: expected a model with a damper")
     if isinstance(model.damper, RigidBody):
-        return replace(model, damper=replace(model.damper, mass=factor * model.damper.mass))
-    return replace(model, damper=tuple(_scale_density(body, factor) for body in model.damper))
+        return replace(model, damper=scale_inertia(model.damper, factor))
+    return replace(model, damper=tuple(scale_density(body, factor) for body in model.damper))
 
 
-def _scale_density(body: PortModel, factor: float) -> PortModel:
-    """The elastic body with another density: modes keep their form, and the viscous matrix its
-    values.
+def scale_inertia(body: RigidBody, factor: float) -> RigidBody:
+    """The rigid body with another density."""
+    gyroscopic = None if body.gyroscopic is None else factor * body.gyroscopic
+    return replace(body, mass=factor * body.mass, gyroscopic=gyroscopic)
+
+
+def scale_density(body: PortModel, factor: float) -> PortModel:
+    """The elastic body with another density: modes keep their form, the viscous matrix its values,
+    and gyroscopic forces go with the mass.
     """
     root = float(np.sqrt(factor))
-    damping = None if body.damping is None else body.damping / factor
+    damping = body.damping
+    if damping is not None and damping.ndim == 2:
+        own = gyroscopic_part(damping)
+        damping = own + (damping - own) / factor
+    elif damping is not None:
+        damping = damping / factor
     circulatory = None if body.circulatory is None else body.circulatory / factor
     return replace(
         body,
@@ -88,7 +100,7 @@ def _scale_damping(model: ReducedModel, factor: float) -> ReducedModel:
         if body.damping is None or body.damping.ndim == 1:
             return body if body.damping is None else replace(body, damping=factor * body.damping)
         # Coriolis forces are no damping
-        loss = (body.damping + body.damping.conj().T) / 2
+        loss = body.damping - gyroscopic_part(body.damping)
         return replace(body, damping=body.damping + (factor - 1) * loss)
 
     ours, theirs = (

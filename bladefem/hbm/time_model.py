@@ -120,7 +120,7 @@ def _bodies_in_time(model: ReducedModel) -> list[Stack]:
     damper = model.elastic_damper(0)
     bodies = [model.blades(0)] + ([] if damper is None else [damper])
     if isinstance(model.damper, RigidBody):
-        bodies.append(rigid_stack(model.damper.mass, model.damper.B[model.rows]))
+        bodies.append(rigid_stack(model.damper, model.rows))
     for body in bodies:
         if (
             abs(body.residual[0] * max(model.springs.max(), 1e-300)).max(initial=0.0)

@@ -198,6 +198,15 @@ def _check_rigid(damper: RigidBody, dofs: int) -> None:
     )
     if not symmetric or np.linalg.eigvalsh(damper.mass)[0] <= 0:
         raise InputError("damper.mass: expected a symmetric positive definite matrix")
+    if damper.gyroscopic is None:
+        return
+    turning = np.asarray(damper.gyroscopic)
+    skew = turning.shape == damper.mass.shape and np.isfinite(turning).all()
+    if not skew or not np.allclose(turning, -turning.T, atol=1e-9 * abs(turning).max()):
+        raise InputError(
+            f"damper.gyroscopic of shape {turning.shape}: expected a skew-symmetric matrix of "
+            f"shape {damper.mass.shape}"
+        )
 
 
 def _check_ratio(

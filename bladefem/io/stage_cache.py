@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 # Raised when the meaning or the layout of stored stages changes: older files are then computed
 # again.
-STAGE_FORMAT = 9
+STAGE_FORMAT = 10
 Result = TypeVar("Result")
 
 

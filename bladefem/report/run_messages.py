@@ -36,6 +36,7 @@ def run_messages(result: SolvedRun, cycles: list[ContactCycle]) -> list[str]:
         method(MESH_ERROR_NOTE),
         _static_contact(result),
         *coriolis_messages(result),
+        *damper_spin_messages(result),
         method(_states(result)),
         method(linear_sentence(cycles)),
         *beyond_stick(result),
@@ -80,6 +81,38 @@ def coriolis_messages(result: SolvedRun) -> list[str]:
             "has both waves."
         )
     ]
+
+
+def damper_spin_messages(result: SolvedRun) -> list[str]:
+    """What the rotation does to resonances through the damper, and whether responses have it."""
+    spin = result.reduced.damper_spin
+    if spin is None or not spin.coriolis > 0:
+        return []
+    mode = result.scene.excitation.mode
+    least = CORIOLIS_SHARE * result.scene.accuracy
+    share = (
+        f"Coriolis forces of the damper move the resonance of mode {mode} in full stick by "
+        f"{percent(spin.coriolis)} of its frequency, and change its amplitude with friction by "
+        f"some {percent(spin.amplitude)}"
+    )
+    if result.reduced.damper.damping is not None:
+        said: list[str] = [method(f"{share}; responses have them.")]
+    elif max(spin.coriolis, spin.amplitude) <= least:
+        said = [method(f"{share}; they are left out of the responses.")]
+    else:
+        said = [
+            warning(f"{share}, and are left out of the responses by operation.coriolis = false.")
+        ]
+    if max(spin.softening, spin.softening_amplitude) > least:
+        said.append(
+            warning(
+                f"spin softening of the damper, which responses leave out, lowers the resonance of "
+                f"mode {mode} in full stick by some {percent(spin.softening)} of its frequency, "
+                f"and changes its amplitude with friction by some "
+                f"{percent(spin.softening_amplitude)}."
+            )
+        )
+    return said
 
 
 def _states(result: SolvedRun) -> str:

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..data import PortModel, RigidBody
 from ..errors import NotSolvedError
-from ..hbm.linear.bodies import Damping
+from ..hbm.linear.bodies import Damping, gyroscopic_part, rigid_modes
 from ..hbm.linear.woodbury import frequency_independent_parts
 from ..util.arrays import ComplexArray, RealArray, RealOrComplex
 from .model import Wheel
@@ -123,6 +123,17 @@ def damper_modes(wheel: Wheel) -> int:
     return len(damper.mass) if isinstance(damper, RigidBody) else len(damper.omega)
 
 
+def damper_gyroscopic(wheel: Wheel) -> np.ndarray:
+    """(k, k) what gyroscopic forces couple the damper's modes of mass 1 by [1/s]."""
+    damper = wheel.damper
+    found = None
+    if isinstance(damper, RigidBody):
+        _, found = rigid_modes(damper, wheel.rows)
+    elif damper is not None and damper.damping is not None and damper.damping.ndim == 2:
+        found = gyroscopic_part(damper.damping)
+    return np.zeros((damper_modes(wheel),) * 2) if found is None else found
+
+
 def _residual_and_modes(
     wheel: Wheel,
     diameters: list[PortModel],
@@ -135,8 +146,7 @@ def _residual_and_modes(
     other: RealOrComplex
     flexibility: RealOrComplex
     if isinstance(damper, RigidBody):
-        half = np.linalg.cholesky(damper.mass)
-        other = np.linalg.solve(half, damper.B[wheel.rows].T).T
+        other, _ = rigid_modes(damper, wheel.rows)
         flexibility = np.zeros((len(contact), len(contact)))
     elif damper is not None:
         rows = np.arange(len(damper.residual))[damper.ports["contact"]][wheel.rows]
@@ -179,7 +189,8 @@ def _modal_terms(
     damper = wheel.damper
     extra: tuple[np.ndarray, np.ndarray | None]
     if isinstance(damper, RigidBody):
-        extra = (np.zeros(len(damper.mass)), None)
+        _, coupled = rigid_modes(damper, wheel.rows)
+        extra = (np.zeros(len(damper.mass)), coupled)
     elif damper is not None:
         extra = (damper.omega, damper.damping)
     else:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..data import PortModel, RigidBody
 from ..errors import InputError
+from ..hbm.linear.bodies import modal_flexibility, receptance_block, rigid_stack, stack_bodies
 from ..reduction.assemble import folded_diameter
 from ..util.arrays import ComplexArray, RealArray, RealOrComplex
 from .model import Wheel
@@ -178,17 +179,15 @@ def _contact_flexibility(
     rows = np.arange(len(body.residual))[body.ports["contact"]][wheel.rows]
     G = _other_modes(wheel, body, rows, left_out, omega, mirrored)
     damper = wheel.damper
-    if isinstance(damper, RigidBody):
-        B = damper.B[wheel.rows]
-        return G - B @ np.linalg.solve(damper.mass, B.T) / omega**2
-    if damper is not None:
-        own = np.arange(len(damper.residual))[damper.ports["contact"]][wheel.rows]
-        law = wheel.damper_damping.viscous(damper.omega)
-        loss = wheel.damper_damping.structural
-        Z = damper.omega**2 * (1 + 1j * loss) - omega**2 + 1j * omega * law
-        shapes = damper.shapes[own]
-        return G + (shapes / Z) @ shapes.conj().T + damper.residual[np.ix_(own, own)]
-    return G
+    if damper is None:
+        return G
+    other = (
+        rigid_stack(damper, wheel.rows)
+        if isinstance(damper, RigidBody)
+        else stack_bodies((damper,), wheel.damper_damping, wheel.rows)
+    )
+    flexible = modal_flexibility(other, np.array([omega]))
+    return G + receptance_block(other, flexible, other.contact, other.contact)[0]
 
 
 def _other_modes(

@@ -16,6 +16,7 @@ from scipy import linalg
 from ..errors import NotSolvedError
 from .by_diameter import (
     DiameterParts,
+    damper_gyroscopic,
     diameter_parts,
     modal_flexibility,
     modal_impedance,
@@ -109,8 +110,9 @@ def wheel_flexibility(
                 _reading_matrix(parts, T, h, deviating) if h > 0 or wheel.coupled else None
                 for h in range(harmonics + 1)
             ]
-        sizes = parts.blade.stop - parts.blade.start, deviating.stop - parts.damper.start
-        E = np.array([pattern.change(h * omega, *sizes) for h in range(harmonics + 1)])
+        readings = parts.blade.stop - parts.blade.start
+        damper = damper_gyroscopic(wheel) if dampers else np.zeros((0, 0))
+        E = np.array([pattern.change(h * omega, readings, damper) for h in range(harmonics + 1)])
         # one blade of another shape has many readings, the others none or few
         active = E.any(axis=(0, 3)).ravel()
         factors = tuple(

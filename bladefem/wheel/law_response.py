@@ -105,7 +105,7 @@ def pattern_deviations(
     for own, own_mass, pattern in zip(found, mass, patterns, strict=True):
         if pattern.tuned:
             continue
-        change = pattern.change(family.at, len(y), 0)
+        change = pattern.change(family.at, len(y), np.zeros((0, 0)))
         # (1 + D A)^-1 D y: the forces of the deviation
         forces = np.linalg.solve(
             np.eye(len(y)) + change @ family.reading_flexibility, change @ y[:, None]

@@ -5,7 +5,7 @@ neighbours, the forces on all blades, and what differs from blade to blade.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..friction.law_table import select_elements
 from ..hbm.linear.bodies import Damping
 from ..hbm.linear.mean_motion import REGULARISATION
+from ..hbm.parameters import scale_density, scale_inertia
 from ..reduction.assemble import pair_model
 from ..util.arrays import RealArray, RealOrComplex
 from ..util.communicator import Communicator
@@ -58,25 +59,28 @@ class Pattern:
         self,
         w: float,
         readings: int,
-        damper: int,
+        damper: np.ndarray,
     ) -> np.ndarray:
         """(N, q + k, q + k) dynamic stiffness of the deviations at circular frequency w, on the
         readings of the blades and on the modes of the dampers, whose mass is 1.
 
         Args:
             readings: q, of a blade.
-            damper: k, modes of a damper; 0 where none deviates.
+            damper: (k, k) gyroscopic coupling of the modes of a damper [1/s]; k = 0 where none
+                deviates.
         """
         given = (self.stiffness, self.mass, self.damper_mass)
         count = next(len(x) for x in given if x is not None)
-        total = np.zeros((count, readings + damper, readings + damper))
+        modes = len(damper)
+        kind = complex if damper.any() else float
+        total = np.zeros((count, readings + modes, readings + modes), kind)
         if self.stiffness is not None:
             total[:, :readings, :readings] += self.stiffness
         if self.mass is not None:
             total[:, :readings, :readings] -= w**2 * self.mass
-        if damper and self.damper_mass is not None:
-            own = np.arange(readings, readings + damper)
-            total[:, own, own] = -(w**2) * self.damper_mass[:, None]
+        if modes and self.damper_mass is not None:
+            own = -(w**2) * np.eye(modes) + (1j * w * damper if damper.any() else 0.0)
+            total[:, readings:, readings:] = self.damper_mass[:, None, None] * own
         return total
 
 
@@ -316,14 +320,8 @@ def heavier_damper(
     if damper is None:
         return None
     if isinstance(damper, RigidBody):
-        return replace(damper, mass=factor * damper.mass)
-    # modes of mass 1 again
-    return replace(
-        damper,
-        omega=damper.omega / np.sqrt(factor),
-        shapes=damper.shapes / np.sqrt(factor),
-        damping=None if damper.damping is None else damper.damping / factor,
-    )
+        return scale_inertia(damper, factor)
+    return scale_density(damper, factor)
 
 
 def _spread(

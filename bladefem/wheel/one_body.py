@@ -79,7 +79,10 @@ def _all_dampers(wheel: Wheel, pattern: Pattern) -> RigidBody | tuple[PortModel,
         factors = factors + pattern.damper_mass
     if isinstance(wheel.damper, RigidBody):
         mass = np.asarray(np.kron(np.diag(factors), wheel.damper.mass), float)
-        return RigidBody(mass, np.asarray(np.kron(np.eye(wheel.count), wheel.damper.B), float))
+        B = np.asarray(np.kron(np.eye(wheel.count), wheel.damper.B), float)
+        turning = wheel.damper.gyroscopic
+        gyroscopic = None if turning is None else np.asarray(np.kron(np.diag(factors), turning))
+        return RigidBody(mass, B, gyroscopic=gyroscopic)
     dampers = [heavier_damper(wheel.damper, factor) for factor in factors]
     bodies = tuple(one for one in dampers if isinstance(one, PortModel))
     return (join_bodies(bodies),) if bodies else None

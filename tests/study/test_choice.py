@@ -220,6 +220,7 @@ def test_a_light_load_alone_is_no_end_where_richer_models_of_it_are_not_solved(m
         "harmonic_diameters": lambda *args: (9,),
         "is_wheel": lambda mesh: True,
         "with_coriolis": lambda scene, reduced: reduced,
+        "with_damper_coriolis": lambda scene, mesh, reduced, *others: reduced,
         "family_of_case": lambda *args: None,
         "family_member": lambda *args: SimpleNamespace(model=None),
         "naming_the_load": lambda *args: nullcontext(),

@@ -1,6 +1,8 @@
 """Small wheels of plain matrices that the tests share: as sectors by nodal diameters, and as one
 dense ring."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from bladefem.data import Elements, RigidBody
@@ -22,6 +24,9 @@ PROBE = np.array([[0.0, 1.0, 0.0]])
 # the readings that deviate: both directions of the blade
 BLADE = np.eye(3)[:2]
 RIGID = RigidBody(np.diag([0.3, 0.4]), np.array([[0.9, 0.1], [-0.2, 0.8], [0.7, -0.3], [0.2, 0.9]]))
+# gyroscopic forces of a damper's two motions
+SKEW = np.array([[0.0, -0.25], [0.25, 0.0]])
+TURNING = replace(RIGID, gyroscopic=SKEW)
 DAMPING = Damping(ratio=0.02)
 PORTS = {"contact": FACES, "blade": BLADE, "load": LOAD, "probe": PROBE}
 
@@ -86,11 +91,21 @@ def dense_ring(own, damper, excitation, damping=DAMPING, C=None, dK=None, dM=Non
     }
     body = port_model_from_matrices(M, K, ports, C=C)
     if isinstance(damper, RigidBody):
-        damper = RigidBody(np.kron(np.eye(N), damper.mass), np.kron(np.eye(N), damper.B))
+        damper = rigid_dampers(damper, np.ones(N))
     elif damper is not None:
         damper = (join_bodies((damper,) * N),)
     whole = {h: amplitudes[:, 0] for h, amplitudes in excitation.items()}
     return ReducedModel((body,), tiled(own), whole, damping, damper)
+
+
+def rigid_dampers(damper, factors):
+    """All dampers as one rigid body, their densities times factors."""
+    turning = damper.gyroscopic
+    return RigidBody(
+        np.kron(np.diag(factors), damper.mass),
+        np.kron(np.eye(N), damper.B),
+        gyroscopic=None if turning is None else np.kron(np.diag(factors), turning),
+    )
 
 
 def tiled(e):
@@ -100,11 +115,12 @@ def tiled(e):
     )
 
 
-def elastic_damper():
+def elastic_damper(C=None, density=1.0):
     """A floating damper of two masses with all its modes."""
     K = np.array([[1.5, -1.5], [-1.5, 1.5]])
     return port_model_from_matrices(
-        np.diag([0.3, 0.2]),
+        density * np.diag([0.3, 0.2]),
         K,
         {"contact": np.array([[1.0, 0.1], [-0.3, 0.9], [0.8, 0.3], [0.2, -1.0]])},
+        C=C,
     )

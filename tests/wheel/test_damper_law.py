@@ -207,8 +207,17 @@ def inclined_wheel():
     return replace(wheel, sectors=sectors, elements=element)
 
 
+ONE_MOTION = RigidBody(np.array([[0.05]]), np.array([[0.5], [0.5]]))
+# two motions that Coriolis forces couple
+WHIRLING = RigidBody(
+    0.05 * np.eye(2),
+    np.array([[0.5, 0.1], [0.5, -0.3]]),
+    gyroscopic=np.array([[0.0, -60.0], [60.0, 0.0]]),
+)
+
+
 @pytest.mark.parametrize("damping", [Damping(ratio=1e-3), Damping(ratio=1e-4, structural=2e-3)])
-@pytest.mark.parametrize("damper", [None, RigidBody(np.array([[0.05]]), np.array([[0.5], [0.5]]))])
+@pytest.mark.parametrize("damper", [None, ONE_MOTION, WHIRLING], ids=["none", "rigid", "whirling"])
 def test_harmonics_are_those_of_the_tuned_wheel(damping, damper):
     """Contacts that lift off: from the balance of all sectors, what is left over in the damper's is
     the family's motion in the first harmonic and nothing in the others.

@@ -8,15 +8,17 @@ import numpy as np
 import pytest
 from rings import (
     RIGID,
+    SKEW,
+    TURNING,
     N,
     dense_ring,
     elastic_damper,
     elements,
     forces,
+    rigid_dampers,
     ring_wheel,
     tiled,
 )
-from scipy import linalg
 
 from bladefem.data import RigidBody
 from bladefem.errors import InputError
@@ -44,10 +46,15 @@ def dense_with(damper, factors, loads, start=None):
     C = np.kron(np.eye(N), 0.05 * np.diag([1.0, 1.0, 2.0]))
     dense = dense_ring(OWN, None, forces({1: 0.9}), UNDAMPED, C)
     if isinstance(damper, RigidBody):
-        mass = linalg.block_diag(*(f * damper.mass for f in factors))
-        bodies = RigidBody(mass, np.kron(np.eye(N), damper.B))
+        bodies = rigid_dampers(damper, factors)
     else:
-        bodies = (join_bodies(tuple(heavier_damper(damper, f) for f in factors)),)
+        bodies = (
+            join_bodies(
+                tuple(
+                    elastic_damper(None if damper.damping is None else f * SKEW, f) for f in factors
+                )
+            ),
+        )
     e = tiled(OWN)
     heavier = replace(e, n0=np.repeat(loads, 2) * e.n0)
     return replace(dense, damper=bodies, elements=heavier, start=start)
@@ -57,7 +64,11 @@ def wheel_of(damper):
     return ring_wheel(OWN, damper, forces({1: 0.9}), Damping(mass=0.05))
 
 
-@pytest.mark.parametrize("damper", [RIGID, elastic_damper()], ids=["rigid", "elastic"])
+@pytest.mark.parametrize(
+    "damper",
+    [RIGID, elastic_damper(), TURNING, elastic_damper(SKEW)],
+    ids=["rigid", "elastic", "turning rigid", "turning elastic"],
+)
 def test_heavier_damper_is_the_one_given_explicitly(damper):
     """Inertia and load of one damper half as high again, of another one lower."""
     wheel = wheel_of(damper)

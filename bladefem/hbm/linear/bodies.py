@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...data import PortModel
+from ...data import PortModel, RigidBody
 from ...errors import InputError, NotSolvedError
 from ...util.arrays import RealArray, RealOrComplex
 
@@ -142,13 +142,32 @@ def stack_bodies(
     )
 
 
-def rigid_stack(mass: np.ndarray, B: np.ndarray) -> Stack:
-    """A rigid body with contact displacements B q (m, r) by modes of frequency zero."""
-    shapes = np.linalg.solve(np.linalg.cholesky(mass), B.T).T[None]
-    none = np.zeros((1, shapes.shape[2]))
-    m = shapes.shape[1]
+def rigid_modes(body: RigidBody, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Shapes (m, r) of the modes of mass 1 and frequency zero that a rigid body is, at some rows of
+    its contacts, and what gyroscopic forces couple them by (r, r) [1/s]; None without.
+    """
+    half = np.linalg.cholesky(body.mass)
+    shapes = np.linalg.solve(half, body.B[rows].T).T
+    if body.gyroscopic is None:
+        return shapes, None
+    return shapes, np.linalg.solve(half, np.linalg.solve(half, body.gyroscopic).T).T
+
+
+def rigid_stack(body: RigidBody, rows: np.ndarray) -> Stack:
+    """A rigid body by modes of frequency zero; `rows` of its contacts enter the balance."""
+    shapes, coupled = rigid_modes(body, rows)
+    m, r = shapes.shape
+    none = np.zeros((1, r))
     return Stack(
-        none, none, none, None, shapes, np.zeros((1, m, m)), slice(0, m), slice(m, m), slice(m, m)
+        none,
+        none,
+        none,
+        None if coupled is None else coupled[None],
+        shapes[None],
+        np.zeros((1, m, m)),
+        slice(0, m),
+        slice(m, m),
+        slice(m, m),
     )
 
 
@@ -250,14 +269,21 @@ def damping_rate(
     w: np.ndarray,
     modal: np.ndarray,
 ) -> np.ndarray:
-    """(k, m) the damping's part of the modal impedances, times modal amplitudes (k, m)."""
+    """(k, m) the damping's part of the modal impedances, times modal amplitudes (k, m).
+
+    Gyroscopic and Coriolis forces, which are no damping, have none.
+    """
     w = w[:, None]
     rate = 1j * (w * stack.viscous + np.sign(w) * stack.hysteretic) * modal
-    return (
-        rate
-        if stack.coupled is None
-        else rate + 1j * w * (stack.coupled @ modal[:, :, None])[:, :, 0]
-    )
+    if stack.coupled is None:
+        return rate
+    loss = stack.coupled - gyroscopic_part(stack.coupled)
+    return rate + 1j * w * (loss @ modal[:, :, None])[:, :, 0]
+
+
+def gyroscopic_part(coupled: np.ndarray) -> np.ndarray:
+    """(..., m, m) the part of a viscous matrix that does no work: skew-Hermitian."""
+    return (coupled - coupled.conj().swapaxes(-1, -2)) / 2
 
 
 def port_receptance(

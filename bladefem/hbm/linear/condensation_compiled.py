@@ -16,6 +16,11 @@ from ..solver.newton_compiled import Condensed, motion_scale
 from .array_copy import copy_matrix, copy_vector
 from .contact_flexibility import by_harmonic, form_matrices
 
+# condition number of the coupled modes without contact from which a resonance without damping is
+# hit: a free damper has one at twice the speed of the frame. Of the contacts' flexibility three
+# digits are left
+RESONANCE_CONDITION = 1e13
+
 
 @njit(**KERNEL)
 def linear_part(omega, bodies, springs, H):
@@ -181,7 +186,22 @@ def _coupled_flexibilities(omega, Z, D, coupled):
             continue
         system = _stuck_impedances(h * omega, Z[h], out[h], coupled, h)
         copy_matrix(np.linalg.solve(system, _identity(M)), out[h])
+        if _lost_digits(system, out[h]) > RESONANCE_CONDITION:
+            raise ZeroDivisionError("a resonance without damping")
     return out
+
+
+@njit(**INNER_KERNEL)
+def _lost_digits(system, inverse):
+    """Skeel's condition number of a system (M, M), which does not depend on how rows are scaled."""
+    most = 0.0
+    rows = np.abs(system).sum(axis=1)
+    for i in range(system.shape[0]):
+        total = 0.0
+        for k in range(system.shape[0]):
+            total += abs(inverse[i, k]) * rows[k]
+        most = max(most, total)
+    return most
 
 
 @njit(**INNER_KERNEL)

@@ -26,7 +26,7 @@ def bodies_of(model: ReducedModel, harmonics: int) -> tuple[Stack, ...]:
     blades = model.blades(harmonics)
     if isinstance(model.damper, RigidBody):
         body = model.damper
-        return blades, model.once("rigid stack", lambda: rigid_stack(body.mass, body.B[model.rows]))
+        return blades, model.once("rigid stack", lambda: rigid_stack(body, model.rows))
     damper = model.elastic_damper(harmonics)
     return (blades,) if damper is None else (blades, damper)
 

@@ -35,6 +35,7 @@ from ..pipeline.bodies import Bodies
 from ..pipeline.case_models import EXACT_HARMONICS, family_of_case, load_cases
 from ..pipeline.coriolis import with_coriolis
 from ..pipeline.damper_contact import contact_patches, on_layer, seat_damper
+from ..pipeline.damper_coriolis import with_damper_coriolis
 from ..pipeline.history import FRICTIONLESS, condense_friction, seat_by_history
 from ..pipeline.normal_modes import harmonic_diameters
 from ..pipeline.reduced_sector import reduce_sector
@@ -180,6 +181,7 @@ def _resonance(
     case = load_cases(scene, mesh, Seating(problem, {load: maps}))[0]
     diameters = harmonic_diameters(scene, mesh, EXACT_HARMONICS)
     reduced = with_coriolis(scene, reduce_sector(bodies, patches, diameters, settings.modes))
+    reduced = with_damper_coriolis(scene, mesh, reduced, patches, case)
     model = family_member(family_of_case(scene, mesh, reduced, patches, case), settings).model
     points = covered_band(model, settings, scene.study.band, scene.excitation.mode, SEARCH_ACCURACY)
     top = peak_of(points)

@@ -23,6 +23,7 @@ from ..adaptive.settings import Settings
 from ..pipeline.assemble_model import LoadCase, joint_model
 from ..pipeline.bodies import Bodies
 from ..pipeline.coriolis import with_coriolis
+from ..pipeline.damper_coriolis import with_damper_coriolis
 from ..pipeline.flow import scene_flow, wheel_influence
 from ..pipeline.joined_contacts import joined_member
 from ..pipeline.reduced_sector import Reduced, reduce_sector, with_damper_mass
@@ -114,7 +115,9 @@ def whole_wheel(
     throughout walk, each by a step of its own, which takes a further solution at each point and
     moves the vibration little. A peak is searched again with free ones (`wheel.local_peak`).
     """
-    reduced = with_coriolis(scene, with_damper_mass(sector.reduced, case.mass))
+    reduced = with_coriolis(scene, sector.reduced)
+    reduced = with_damper_coriolis(scene, mesh, reduced, patches, case)
+    reduced = with_damper_mass(reduced, case.mass)
     count = reduced.sectors
     bodies = {d: truncate_modes(reduced.sector[d], settings.modes) for d in range(count // 2 + 1)}
     sides = tuple(

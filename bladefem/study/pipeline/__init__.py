@@ -5,7 +5,7 @@
   ``stage_inputs`` what each depends on, ``run_records`` what they leave, ``preflight`` and
   ``validate_mesh`` what is refused before
 - bodies: ``scene_mesh``, ``bodies`` finite elements, ``normal_modes``, ``ports``,
-  ``reduced_sector``, ``coriolis``
+  ``reduced_sector``, ``coriolis``, ``damper_coriolis``
 - the damper on its seats: ``damper_contact`` the contact problem, ``seated_loads`` the stage,
   ``history`` with friction, ``state_check`` the paper's table of states, ``liftoff`` light loads
 - models: ``assemble_model`` one load case, ``case_models`` its family from poor to rich,

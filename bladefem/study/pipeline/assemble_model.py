@@ -133,7 +133,9 @@ def rigid_damper(reduced: Reduced) -> RigidBody:
     rigid = reduced.damper.omega == 0
     # a floating body moves alike in every sector: its shapes are real
     shapes = np.real(reduced.damper.shapes[reduced.damper.ports["contact"]][:, rigid])
-    return RigidBody(np.eye(int(rigid.sum())), shapes)
+    coupling = reduced.damper.damping
+    gyroscopic = None if coupling is None else np.real(coupling[np.ix_(rigid, rigid)])
+    return RigidBody(np.eye(int(rigid.sum())), shapes, gyroscopic=gyroscopic)
 
 
 def mass_damper(

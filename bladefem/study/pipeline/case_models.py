@@ -34,6 +34,7 @@ from .bodies import Bodies, is_wheel
 from .body_mesh import ModeErrors, SofterBody, frequency_ratio, softened_sector
 from .changed_cases import seated_case
 from .coriolis import with_coriolis
+from .damper_coriolis import with_damper_coriolis
 from .joined_contacts import joined_member
 from .liftoff import naming_the_load
 from .normal_modes import harmonic_diameters
@@ -202,7 +203,8 @@ def reduced_sector(
             key = stage_key("reduction", scene, np.array(diameters), count, spanned)
             reduce = partial(reduce_sector, bodies, patches, diameters, count, spanned=spanned)
             # each on its own: where modes are added both serve the next run
-            made[count] = with_coriolis(scene, keep(f"reduction_{count}_modes", key, reduce))
+            blade = with_coriolis(scene, keep(f"reduction_{count}_modes", key, reduce))
+            made[count] = with_damper_coriolis(scene, bodies.mesh, blade, patches, case)
         return made[count]
 
     if not start.chosen:

@@ -205,8 +205,11 @@ def damper_motion(
     moved = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
     for h in range(1, solution.harmonics + 1):
         on_damper = damper.B.T @ (case.selection @ forces[h].ravel())
-        acceleration = np.linalg.solve(damper.mass, on_damper)
-        moved[h - 1, inside] = unit @ (-acceleration / (h * solution.omega) ** 2)
+        w = h * solution.omega
+        impedance = -(w**2) * damper.mass
+        if damper.gyroscopic is not None:
+            impedance = impedance + 1j * w * damper.gyroscopic
+        moved[h - 1, inside] = unit @ np.linalg.solve(impedance, on_damper)
     return moved
 
 

@@ -227,7 +227,11 @@ def _flutter_sector(
         stage_key("reduction", run.scene, "flutter", np.array(wanted), modes),
         lambda: reduce_sector(bodies, patches, wanted, modes),
     )
-    return with_coriolis(run.scene, sector)
+    sector = with_coriolis(run.scene, sector)
+    # as the response has it
+    if run.reduced.damper.damping is None:
+        return sector
+    return replace(sector, damper=replace(sector.damper, damping=sector.damper_coriolis))
 
 
 def _by_scale(

@@ -11,6 +11,7 @@ import numpy as np
 from geometry.mesh import sector_of
 
 from ...data import Patch, PortModel, SectorSpan
+from ...hbm.parameters import scale_density
 from ...io.stage_cache import on_root
 from ...util.arrays import RealOrComplex
 from ...util.communicator import Communicator
@@ -20,6 +21,22 @@ from .ports import Ports, blade_ports, damper_ports
 
 # of the elastic damper, its six rigid ones included
 DAMPER_MODES = 16
+
+
+@dataclass(frozen=True)
+class DamperSpin:
+    """What the rotation of the frame does to the resonance of the mode studied through the damper,
+    all contacts sticking [1].
+    """
+
+    # share of its frequency by which Coriolis forces move it, up or down
+    coriolis: float
+    # share by which they change the amplitude of a response with friction, up or down, roughly
+    amplitude: float
+    # shares by which spin softening lowers the frequency and changes the amplitude, roughly;
+    # responses leave it out
+    softening: float
+    softening_amplitude: float
 
 
 @dataclass(frozen=True)
@@ -37,8 +54,12 @@ class Reduced:
     # of the damper [kg]
     mass: float
     # nodal diameter to (m, m) Coriolis forces as damping of the modes [1/s], where there are some:
-    # `coriolis.with_coriolis` puts them in
+    # `coriolis.with_coriolis` puts them in, those of the damper `damper_coriolis`
     coriolis: dict[int, RealOrComplex] = field(default_factory=dict)
+    # (k, k) the same of the damper's modes; None where there are none
+    damper_coriolis: np.ndarray | None = None
+    # what the rotation does through the damper; None where it was not asked for
+    damper_spin: DamperSpin | None = None
     # what their modes span, for the other nodal diameters; None where nobody asked, or where ranks
     # share the diameters out
     span: SectorSpan | None = None
@@ -46,14 +67,11 @@ class Reduced:
 
 def with_damper_mass(reduced: Reduced, mass: float | None) -> Reduced:
     """The reduced sector with a damper of another density: its mass [kg] scales, its flexibility
-    stays.
+    stays; Coriolis forces of modes of mass 1 do not depend on it.
     """
     if mass is None:
         return reduced
-    root = (mass / reduced.mass) ** 0.5
-    damper = replace(
-        reduced.damper, omega=reduced.damper.omega / root, shapes=reduced.damper.shapes / root
-    )
+    damper = scale_density(reduced.damper, mass / reduced.mass)
     return replace(reduced, damper=damper, mass=mass)
 
 
@@ -105,12 +123,13 @@ def reduce_sector(
     first = len(patches[0].area) * mesh.dimension
     return Reduced(
         {n: replace(body, damping=None) for n, body in sector.items()},
-        floating,
+        replace(floating, damping=None),
         slice(first, first + len(patches[1].area) * mesh.dimension),
         sector_of(mesh).count if is_wheel(mesh) else 0,
         damper_mass,
         {n: body.damping for n, body in sector.items() if body.damping is not None},
-        span,
+        damper_coriolis=floating.damping,
+        span=span,
     )
 
 
@@ -121,7 +140,15 @@ def _reduced_damper(bodies: Bodies, ports: Ports) -> tuple[PortModel, float]:
 
     flex = bodies.damper
     solver = eigensolver(bodies.scene)
-    model = port_model(flex.con, ports.matrix, ports.names, DAMPER_MODES, flex=flex, solver=solver)
+    model = port_model(
+        flex.con,
+        ports.matrix,
+        ports.names,
+        DAMPER_MODES,
+        flex=flex,
+        solver=solver,
+        spin=rotation_of(bodies),
+    )
     return model, body_mass(flex.con.body)
 
 
