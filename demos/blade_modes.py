@@ -23,7 +23,9 @@ from bladefem.study.modes.comparison import family_table
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"
-scene = bladefem.load_scene(scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else [])
+scene = bladefem.load_scene(
+    scenes / "wedge.toml", ["mesh.size=10 mm", "mesh.scale=1.5"] if coarse else []
+)
 comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 

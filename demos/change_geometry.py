@@ -17,7 +17,7 @@ coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"
 base = bladefem.load_scene(
     scenes / "wedge.toml",
-    ["mesh.size=10 mm"] if coarse else ["mesh.size=6 mm"],
+    ["mesh.size=10 mm", "mesh.scale=1.5"] if coarse else ["mesh.size=6 mm"],
 )
 comm = MPI.COMM_WORLD
 frequencies = {}

@@ -24,7 +24,9 @@ from bladefem.study.pipeline.damper_contact import contact_patches
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"
-scene = bladefem.load_scene(scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else [])
+scene = bladefem.load_scene(
+    scenes / "wedge.toml", ["mesh.size=10 mm", "mesh.scale=1.5"] if coarse else []
+)
 comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 problem = bladefem.seat_damper(bladefem.Bodies(scene, mesh, comm), contact_patches(mesh))

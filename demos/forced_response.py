@@ -23,6 +23,7 @@ coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"
 small = [
     "mesh.size=10 mm",
+    "mesh.scale=1.5",
     "contact.points=6",
     "study.loads=90 N, 200 N",
     "study.own_load=false",

@@ -22,7 +22,9 @@ import bladefem
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"
-scene = bladefem.load_scene(scenes / "wedge.toml", ["mesh.size=10 mm"] if coarse else [])
+scene = bladefem.load_scene(
+    scenes / "wedge.toml", ["mesh.size=10 mm", "mesh.scale=1.5"] if coarse else []
+)
 comm = MPI.COMM_WORLD
 mesh = bladefem.build_mesh(scene, comm)
 bodies = bladefem.Bodies(scene, mesh, comm)

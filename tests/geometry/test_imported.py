@@ -470,7 +470,7 @@ def test_a_nastran_deck_of_blade_and_damper_runs_to_the_report(tmp_path, capsys)
     for the ten digits of a node.
     """
     mesh = wedge_sector(
-        Aerofoil(fillet=0.0), Platform(), Shank(), Disc(), Wedge(), MeshSize(size=20e-3)
+        Aerofoil(fillet=0.0), Platform(), Shank(), Disc(), Wedge(), MeshSize(size=20e-3, scale=1.5)
     )
     write_msh(mesh, tmp_path / "a.msh")
     properties = write_bdf(mesh, tmp_path / "a.bdf")

@@ -16,7 +16,9 @@ from bladefem.study.pipeline.validate_mesh import found_patches
 
 def test_a_response_has_the_modes_that_it_excites():
     """Whatever nodal diameters the tables are asked for: engine order 9 excites 0, 9 and 18."""
-    wedge = load_scene("scenes/wedge.toml", ["mesh.size=24 mm", "aerofoil.fillet=0 mm"])
+    wedge = load_scene(
+        "scenes/wedge.toml", ["mesh.size=24 mm", "mesh.scale=1.5", "aerofoil.fillet=0 mm"]
+    )
     mesh = build_mesh(wedge)
     for given, wanted in (([0, 1, 6], [0, 1, 6, 9, 18]), ([0, 3, 9, 18], None), (None, None)):
         listed = vary(wedge, "model.nodal_diameters", given)
@@ -25,7 +27,13 @@ def test_a_response_has_the_modes_that_it_excites():
 
 def test_listed_diameters_change_no_stress_and_no_error_of_a_response():
     """Those of the excited diameter, 9, whatever the mode tables list."""
-    settings = ["mesh.size=24 mm", "aerofoil.fillet=0 mm", "study.loads=80 N", "model.modes=6"]
+    settings = [
+        "mesh.size=24 mm",
+        "mesh.scale=1.5",
+        "aerofoil.fillet=0 mm",
+        "study.loads=80 N",
+        "model.modes=6",
+    ]
     settings += ["study.own_load=false", "study.stability=false", "model.harmonics=1"]
     settings += ["model.samples=64", "model.damper=rigid", "contact.points=2"]
     plain, listed = (
@@ -39,7 +47,9 @@ def test_listed_diameters_change_no_stress_and_no_error_of_a_response():
 
 def test_the_reduction_takes_the_modes_that_are_solved_already():
     """The port models of kept modes are those of modes solved again."""
-    scene = load_scene("scenes/wedge.toml", ["mesh.size=24 mm", "aerofoil.fillet=0 mm"])
+    scene = load_scene(
+        "scenes/wedge.toml", ["mesh.size=24 mm", "mesh.scale=1.5", "aerofoil.fillet=0 mm"]
+    )
     mesh = build_mesh(scene)
     patches = found_patches(scene, mesh, excited=True)
     again = Bodies(scene, mesh)

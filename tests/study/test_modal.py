@@ -197,7 +197,7 @@ def test_wheel_modes_are_called_after_the_clamped_aerofoil():
     """The disc shifts and mixes the modes; beyond the lowest the clamped aerofoil is much closer
     than a beam is.
     """
-    scene = load_scene("scenes/wedge.toml", ["mesh.size=24 mm"])
+    scene = load_scene("scenes/wedge.toml", ["mesh.size=24 mm", "mesh.scale=1.5"])
     whole = Bodies(scene, build_mesh(scene))
     held = clamped_blade(whole)
     modes = find_modes(whole, [6], 8)[0]

@@ -9,6 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 MPI_VARIABLES = ("OMPI_", "PMIX_", "PRTE_", "ORTE_", "PMI_")
+# Tests run beside others, one on each core: ranks that wait leave theirs to them. Two ranks that draw
+# a mesh and find its modes took 22 s of CPU without it, 9 s with it.
+WAITING = {"OMPI_MCA_mpi_yield_when_idle": "1"}
 USER_SETTINGS = ("OMPI_ALLOW", "OMPI_MCA_mpi_yield", "OMPI_MCA_btl")
 
 
@@ -57,7 +60,7 @@ def run_on_ranks(
         stderr=subprocess.PIPE,
         text=True,
         cwd=cwd,
-        env={**clean_environment(), **(variables or {})},
+        env={**clean_environment(), **WAITING, **(variables or {})},
         start_new_session=True,
     ) as process:
         try:

@@ -31,7 +31,7 @@ def test_a_program_that_hangs_is_ended_with_its_ranks(tmp_path):
     ranks = 2
     command = [sys.executable, "-c", HANGING, str(tmp_path)]
     with pytest.raises(subprocess.TimeoutExpired) as ended:
-        run_on_ranks(ranks, command, timeout=15.0)
+        run_on_ranks(ranks, command, timeout=8.0)
     assert str(ended.value.stdout).count("waiting") == ranks
     started = [int(file.name) for file in tmp_path.iterdir()]
     assert len(started) == ranks
