@@ -115,9 +115,9 @@ class ResonanceInTime:
         law = " with the law of the layer" if self.by_law else ""
         return (
             f"most contacts lift off, and balances do not tell the resonance; it was sought by "
-            f"marching in time{law}, with {self.points} contact points a seat, at {self.frequencies} "
-            f"frequencies for {self.periods} periods: at {self.frequency:.5g} Hz the blade keeps "
-            f"between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um"
+            f"marching in time{law}, with {self.points} contact points a seat, at "
+            f"{self.frequencies} frequencies for {self.periods} periods: at {self.frequency:.5g} "
+            f"Hz the blade keeps between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um"
         )
 
 
