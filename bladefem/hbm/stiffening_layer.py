@@ -18,12 +18,19 @@ from numba import njit
 from ..errors import InputError
 from ..friction.simd.node_steps import KN, KT
 from ..util.numba_options import INNER_KERNEL, KERNEL
+from .linear.array_copy import copy_vector
 from .model import ReducedModel
 from .ring_contacts import in_places, places_of_nodes
 from .step_forces import add_parabola, largest_force, note_forces, settled_forces
 
-# most times that tangents are taken in a step
-TANGENTS = 40
+# most times that tangents are taken in a step, and from which one on half of the way to the next is
+# gone
+TANGENTS = 60
+DAMPED_FROM = 12
+# where forces on tangents are not found: those at so much of the forces, and times the change that
+# counts as none
+SOFTER = 0.3
+LOOSER = 2.0
 # over the largest force: what a force may miss of the law, and change that counts as none of forces
 # on the tangents
 OFF_THE_LAW = 1e-4
@@ -96,7 +103,8 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
     tangent_at = np.maximum(f[:, 0], 0.0)
     loads = load0.copy(), load1.copy()
     found = False
-    for _ in range(TANGENTS):
+    settled = SETTLED
+    for turn in range(TANGENTS):
         for b in range(len(w)):
             _take_tangents(
                 layer,
@@ -109,11 +117,18 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
             )
         work[0] += TANGENT_OPERATIONS * tangent_at.size
         before = start[0], start[1], loads[0]
-        if not settled_forces(c, contacts, kept, w, f, before, loads[1], SETTLED * largest, work):
-            break
+        if not settled_forces(c, contacts, kept, w, f, before, loads[1], settled * largest, work):
+            # springs too stiff for their forces to be found: softer ones, and less exactly
+            copy_vector(start[0].reshape(f.size), f.reshape(f.size))
+            tangent_at *= SOFTER
+            settled = min(settled * LOOSER, OFF_THE_LAW)
+            continue
+        # an impact raises all forces far above those before
+        largest = max(largest, largest_force(contacts, f))
         off = 0.0
+        share = 1.0 if turn < DAMPED_FROM else 0.5
         for b in range(len(w)):
-            off = max(off, _off_the_law(layer, w[b], f[b, 0], tangent_at[b]))
+            off = max(off, _off_the_law(layer, w[b], f[b, 0], share, tangent_at[b]))
         if off <= OFF_THE_LAW * largest:
             found = True
             break
@@ -150,9 +165,9 @@ def _take_tangents(layer, at, f_before, w_before, table, load0, load1):
 
 
 @njit(**INNER_KERNEL)
-def _off_the_law(layer, w, f, at):
+def _off_the_law(layer, w, f, share, at):
     """How far the forces (width,) on the tangents are from the law at most [N]; the next tangents
-    are to be taken at forces ``at`` (width,), changed.
+    are to be taken at forces ``at`` (width,), changed by a share of the way there.
     """
     most = 0.0
     for i in range(len(f)):
@@ -164,5 +179,5 @@ def _off_the_law(layer, w, f, at):
             exponent = min(closure / layer.decay[i], LARGEST_EXPONENT)
             by_law = layer.doubling[i] * np.expm1(exponent)
         most = max(most, abs(by_law - f[i]))
-        at[i] = f[i] if f[i] > at[i] else by_law
+        at[i] += share * ((f[i] if f[i] > at[i] else by_law) - at[i])
     return most

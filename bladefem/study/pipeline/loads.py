@@ -203,7 +203,7 @@ def curve_of(
         halved=unseen.halved,
         body_mesh=unseen.body_mesh,
         # a march that seeks the resonance has the law itself
-        layer_law=unseen.layer_law if sought is None else np.nan,
+        layer_law=np.nan if sought is not None and sought.by_law else unseen.layer_law,
         layer_shift=unseen.layer_shift,
         layer_height=unseen.layer_height,
     )
@@ -230,7 +230,9 @@ def _sought_in_time(
         return None
     if curve.settings.softened or not mostly_lifts_off(top):
         return None
-    return resonance_in_time(models, curve.settings, top, case.decay)
+    found = resonance_in_time(models, curve.settings, top, case.decay)
+    # what the law changes is then told by the balances, if it is
+    return found or resonance_in_time(models, curve.settings, top)
 
 
 def _columns(points: Sequence[Solution]) -> dict[str, np.ndarray]:
