@@ -80,11 +80,11 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
         by_kept = bool(0)
         for b in range(blades):
             start = of_blade(before, b)
-            size = _violations(contacts.table, start, load1[b], w[b], f[b], gap)
+            size = _violations(contacts.tables[b], start, load1[b], w[b], f[b], gap)
             work[0] += 2.0 * m**2 + NODE_OPERATIONS * width
             if size <= limit:
                 continue
-            blade = contacts, start, load1[b], w[b], f[b]
+            blade = contacts.tables[b], contacts.flexibility, start, load1[b], w[b], f[b]
             step, share = _shortened(*blade, kept.inverse[b], gap, 1)
             if share == 0.0 and renewals[b] < RENEWALS:
                 renewals[b] += 1
@@ -112,20 +112,18 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
 
 
 @njit(**INNER_KERNEL)
-def _shortened(contacts, start, load1, w, f, inverse, gap, tries):
+def _shortened(table, flexibility, start, load1, w, f, inverse, gap, tries):
     """A Newton step (3, width) of a blade, and the largest share of it in so many halvings that
     takes away as large a share of FALL of its violation; 0.0 where none does.
     """
     step = np.dot(inverse, gap)
-    moved = np.dot(contacts.flexibility, step)
+    moved = np.dot(flexibility, step)
     forces = step.reshape(f.shape)
     size = _size(gap)
     left = np.empty_like(gap)
     share = 1.0
     for _ in range(tries):
-        found = _violations(
-            contacts.table, start, load1, w - share * moved, f + share * forces, left
-        )
+        found = _violations(table, start, load1, w - share * moved, f + share * forces, left)
         if found <= (1.0 - FALL * share) * size:
             return forces, share
         share /= 2.0
@@ -161,13 +159,12 @@ def _violations(table, start, load1, w, f, gap):
 
 
 @njit(**INNER_KERNEL)
-def _inverse(contacts, start, load1, w, f):
+def _inverse(table, F, start, load1, w, f):
     """(3 width, 3 width) inverse of 1 + B F of a blade at its forces."""
     width = f.shape[1]
-    F = contacts.flexibility
     A = np.eye(3 * width)
     for i in range(width):
-        _, (b00, b10, b20, b11, b12, b22) = violation(w, f, i, contacts.table, start, load1)
+        _, (b00, b10, b20, b11, b12, b22) = violation(w, f, i, table, start, load1)
         normal, x, y = F[i], F[width + i], F[2 * width + i]
         for k in range(3 * width):
             A[i, k] += b00 * normal[k]

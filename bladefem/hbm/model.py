@@ -78,6 +78,10 @@ class ReducedModel:
     # evaluated [m]: faces that a vibration pushes apart press as before
     # (study.adaptive.layer_change); none when None
     closing: np.ndarray | None = None
+    # (nodes,) length over which the layer's stiffness grows by e [m], infinite where it is linear
+    # (contact.equivalent_layer): marches follow its law (hbm.stiffening_layer), balances and
+    # verdicts its tangent at rest; None: all take the tangent
+    decay: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         parts: dict[str, Any] = {

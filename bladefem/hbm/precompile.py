@@ -3,8 +3,8 @@ bladefem.hbm.precompile [later]
 
 Numba keeps what it compiled; afterwards a first solve takes about a second. The installation waits
 for the kernels of 2-D elements and their solvers, which the main job (`scenes/wedge.toml`) calls.
-Those of 1-D elements, whose points are compiled as a whole, follow in the background ("later"); who
-needs them sooner compiles them on the first call.
+Those of 1-D elements, whose points are compiled as a whole, and marches with a layer that stiffens
+follow in the background ("later"); who needs them sooner compiles them on the first call.
 
 Two processes compile at the same time; both keep what they compiled on disk, where the other one
 finds what it shares.
@@ -42,7 +42,7 @@ LATER_ARGUMENT = "later"
 
 def compile_kernels() -> None:
     """Reach every kernel by the smallest models, with and without a prescribed normal load."""
-    for part in (*KERNEL_GROUPS.values(), compile_1d):
+    for part in (*KERNEL_GROUPS.values(), compile_later):
         part()
 
 
@@ -54,6 +54,13 @@ def compile_in_parallel() -> int:
     running = [subprocess.Popen([*command, name]) for name in KERNEL_GROUPS]
     codes = [process.wait() for process in running]
     return next((code for code in codes if code), 0)
+
+
+def compile_later() -> None:
+    """What the main job does not call: 1-D elements, and marches with a layer that stiffens."""
+    compile_1d()
+    plane = replace(_plane_model(), decay=np.ones(1))
+    march_ring(plane, state_of_solution(plane, solve(plane, 1.0, 2, 64)), 1)
 
 
 def compile_1d() -> None:
@@ -126,7 +133,7 @@ KERNEL_GROUPS: dict[str, Callable[[], None]] = {"2d": compile_2d, "linear": comp
 
 if __name__ == "__main__":
     if sys.argv[1:] == [LATER_ARGUMENT]:
-        compile_1d()
+        compile_later()
     elif len(sys.argv) > 1:
         KERNEL_GROUPS[sys.argv[1]]()
     else:

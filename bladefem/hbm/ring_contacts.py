@@ -24,10 +24,12 @@ NODE_OPERATIONS = 100.0
 
 
 class RingContacts(NamedTuple):
-    """What does not change from step to step, of a blade with nodes in rows of ``width``."""
+    """What does not change from step to step, of a blade with nodes in rows of ``width``; but for
+    the stiffness of a layer that stiffens (`bladefem.hbm.stiffening_layer`).
+    """
 
-    # (3, width) kt, kn, mu
-    table: np.ndarray
+    # (r, 3, width) kt, kn, mu of each blade
+    tables: np.ndarray
     # (3 width, r 3 width) displacements that each force on a blade makes on itself and, one after
     # the other, on those after it
     columns: np.ndarray
@@ -79,8 +81,9 @@ def ring_contacts(table: np.ndarray, flexibility: np.ndarray, preload: np.ndarra
     columns = in_places(by_force.transpose(1, 2, 0), places).transpose(2, 0, 1)
     own = columns[:, 0].T.reshape(3, width, 3, width).diagonal(axis1=1, axis2=3)
     load = in_places(preload, places)
+    own_table = in_places(table.T, places_of_nodes(len(table)))
     return RingContacts(
-        in_places(table.T, places_of_nodes(len(table))),
+        np.tile(own_table, (by_force.shape[1], 1, 1)),
         columns.reshape(3 * width, -1).copy(),
         own.reshape(9, width).copy(),
         columns[:, 0].T.copy(),

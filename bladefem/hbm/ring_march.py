@@ -38,6 +38,7 @@ from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
 from .step_forces import contact_forces
+from .stiffening_layer import ring_layer, stiffening_forces
 
 # of the instants of a period
 INSTANTS_PER_PERIOD = 256
@@ -305,6 +306,7 @@ def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tupl
         tuple(map(_step_terms, (E, -G0, -G1))),
         ring_readings(system, places),
         ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
+        ring_layer(model),
         no_inverses(r, len(places)),
         # a place without a node is open
         in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
@@ -424,7 +426,7 @@ def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
 
 @njit(**KERNEL)
 def _march(
-    y, f, w, steps, readings, contacts, kept, load, free, probe, motion, friction_work, work
+    y, f, w, steps, readings, contacts, layer, kept, load, free, probe, motion, friction_work, work
 ):
     """Fill motion (periods, S, r), and friction_work (periods,) of all blades; False where the
     forces of a step were not found.
@@ -434,6 +436,7 @@ def _march(
         f: (r, 3, width) contact forces, changed; w: (r, 3 width) relative displacements, changed.
         steps: of `linear_steps`; the last two for contact forces in the modes.
         readings: of the contacts; contacts: their flexibility is that for the forces after a step.
+        layer: that stiffens; None: linear.
         kept: from step to step, changed.
         load: (S, r, width) normal load at zero displacement.
         free: (S, r, 3 width) motion without contact forces.
@@ -467,7 +470,12 @@ def _march(
                 c[b, place] += free[j, b, place]
         copy_vector(f.reshape(f.size), f_before.reshape(f.size))
         copy_vector(w.reshape(w.size), w_before.reshape(w.size))
-        if not contact_forces(c, contacts, kept, w, f, change, extra, load[k % S], load[j], work):
+        loads = load[k % S], load[j]
+        if layer is None:
+            found = contact_forces(c, contacts, kept, w, f, change, extra, *loads, work)
+        else:
+            found = stiffening_forces(c, contacts, layer, kept, w, f, change, extra, *loads, work)
+        if not found:
             motion[k // S, k % S :] = np.nan
             motion[k // S + 1 :] = np.nan
             return False

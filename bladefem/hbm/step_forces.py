@@ -52,9 +52,21 @@ def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
         work: (1,) takes the operations.
     """
     before = f.copy(), w.copy(), load0
-    largest = max(_largest(contacts.preload), _largest(f.reshape(f.size)))
-    _add_parabola(change.reshape(2, f.size), f.reshape(f.size))
-    limit = SETTLED * largest
+    limit = SETTLED * largest_force(contacts, f)
+    add_parabola(change.reshape(2, f.size), f.reshape(f.size))
+    found = settled_forces(c, contacts, kept, w, f, before, load1, limit, work)
+    note_forces(contacts, f, before[0], change, extra)
+    return found
+
+
+@njit(**INNER_KERNEL)
+def settled_forces(c, contacts, kept, w, f, before, load1, limit, work):
+    """The forces f, which are guesses before, until none changes by more than a limit, and their
+    displacements w; False where they were not found. Other arguments as those of `contact_forces`.
+
+    Args:
+        before: forces, displacements and loads before the step.
+    """
     ahead = f.copy()
     found = False
     if kept.steps[0] > 0:
@@ -69,10 +81,21 @@ def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
     if not found:
         copy_vector(before[0].reshape(f.size), f.reshape(f.size))
         found = _together(c, contacts, w, f, before, load1, limit, work)
-    for b in range(len(w)):
-        _less_preload(f[b].reshape(w.shape[1]), contacts.preload, extra[b])
-    _shift_changes(f.reshape(f.size), before[0].reshape(f.size), change.reshape(2, f.size))
     return found
+
+
+@njit(**INNER_KERNEL)
+def largest_force(contacts, f):
+    """Of the preload and of forces f [N]."""
+    return max(_largest(contacts.preload), _largest(f.reshape(f.size)))
+
+
+@njit(**INNER_KERNEL)
+def note_forces(contacts, f, start, change, extra):
+    """Extra forces and changes of a step from forces ``start`` to f."""
+    for b in range(len(f)):
+        _less_preload(f[b].reshape(extra.shape[1]), contacts.preload, extra[b])
+    _shift_changes(f.reshape(f.size), start.reshape(f.size), change.reshape(2, f.size))
 
 
 # the order of a maximum is free, so that it is vectorised
@@ -85,7 +108,7 @@ def _largest(values):
 
 
 @njit(**INNER_KERNEL)
-def _add_parabola(change, target):
+def add_parabola(change, target):
     """target (k,) goes on as by the changes (2, k) in the last step and the one before."""
     last, before = change[0], change[1]
     for k in range(len(target)):
@@ -124,11 +147,11 @@ def _by_blocks(c, contacts, w, f, before, load1, limit, work):
         for b in range(blades):
             old = of_blade(before, b)
             for first in range(0, width, LANES_PER_VECTOR):
-                if _are_open(contacts.table[KN], w[b], f[b], load1[b], first):
+                if _are_open(contacts.tables[b, KN], w[b], f[b], load1[b], first):
                     continue
                 work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
                 node_steps(
-                    first, width, contacts.table, contacts.own, *old, load1[b], w[b], f[b], step
+                    first, width, contacts.tables[b], contacts.own, *old, load1[b], w[b], f[b], step
                 )
                 largest_step = max(largest_step, _largest(step.reshape(step.size)))
                 subtract_moved(contacts.columns, b, first, step, 0, w, work)
@@ -228,7 +251,7 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
     for b in range(blades):
         for i in range(width):
             own, (b00, b10, b20, b11, b12, b22) = violation(
-                w[b], f[b], i, contacts.table, of_blade(before, b), load1[b]
+                w[b], f[b], i, contacts.tables[b], of_blade(before, b), load1[b]
             )
             slopes = ((b00, 0.0, 0.0), (b10, b11, b12), (b20, b12, b22))
             for a in range(3):

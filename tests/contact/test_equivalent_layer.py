@@ -27,6 +27,7 @@ from bladefem.study.adaptive.layer_change import followed_law, layer_change
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.shared_accuracy import unseen_errors
+from bladefem.study.stability.resonance_in_time import resonance_in_time
 
 
 @pytest.fixture(scope="module")
@@ -263,6 +264,24 @@ def test_a_layer_that_stiffens_along_its_faces_at_each_instant_is_estimated(pres
     true = abs(marched / peak.height - 1)
     assert 0.09 < true
     assert true / 2 < found < 2 * true
+
+
+@pytest.mark.parametrize("press", [45.0, 45.0j])
+def test_a_resonance_sought_in_time_is_that_of_the_law(press):
+    """Marches of the tangent end 11 and 50 % higher, and their error by the law was unknown; those of
+    the law follow it at each instant, across the faces and along them.
+    """
+    model = sliding_mass(16.0, press)
+    peak = find_peak(model, 6900.0, 7, 128)
+    settings = Settings(2, 7, 128, "rigid")
+    by_tangent, by_law = (
+        resonance_in_time(family_of(model, [1]), settings, peak.solution, decay)
+        for decay in (None, np.array([DECAY]))
+    )
+    omega = 2 * np.pi * by_law.frequency
+    marched = max(marched_sliding(16.0, press, share * omega) for share in (0.995, 1, 1.005))
+    assert by_tangent.highest > 1.1 * marched
+    assert abs(by_law.highest / marched - 1) < min(0.02, 2 * by_law.error)
 
 
 def test_a_linear_layer_has_nothing_to_estimate():

@@ -169,7 +169,7 @@ def curve_of(
     curve, unseen, room = curve_with_room(scene, case, models, softer, settings, marches)
     model = family_member(models, curve.settings).model
     heights = np.array([size(p) for p in curve.points])
-    sought = _sought_in_time(scene, models, curve)
+    sought = _sought_in_time(scene, case, models, curve)
     judged = judged_resonance(marches, curve, replace(scene, accuracy=room), sought is not None)
     marks, top = judged.marks, judged.point
     estimated, in_time = estimated_errors(curve), None
@@ -202,7 +202,8 @@ def curve_of(
         notes=curve.notes,
         halved=unseen.halved,
         body_mesh=unseen.body_mesh,
-        layer_law=unseen.layer_law,
+        # a march that seeks the resonance has the law itself
+        layer_law=np.nan if sought is not None and sought.by_law else unseen.layer_law,
         layer_shift=unseen.layer_shift,
         layer_height=unseen.layer_height,
     )
@@ -217,7 +218,9 @@ def _interval_of(
     return load_interval(model, curve.settings, top, scene.accuracy, len(curve.points))
 
 
-def _sought_in_time(scene: Scene, models: Family, curve: CheckedCurve) -> ResonanceInTime | None:
+def _sought_in_time(
+    scene: Scene, case: LoadCase, models: Family, curve: CheckedCurve
+) -> ResonanceInTime | None:
     """The resonance by marches, where most contacts lift off and balances do not tell it to the
     accuracy.
     """
@@ -227,7 +230,9 @@ def _sought_in_time(scene: Scene, models: Family, curve: CheckedCurve) -> Resona
         return None
     if curve.settings.softened or not mostly_lifts_off(top):
         return None
-    return resonance_in_time(models, curve.settings, top)
+    found = resonance_in_time(models, curve.settings, top, case.decay)
+    # what the law changes is then told by the balances, if it is
+    return found or resonance_in_time(models, curve.settings, top)
 
 
 def _columns(points: Sequence[Solution]) -> dict[str, np.ndarray]:

@@ -82,6 +82,9 @@ MORE_POINTS = 4
 MOST_OPERATIONS = 4e11
 # of one march with MOST_PERIODS, of which most need a third
 MOST_OF_ONE_MARCH = 8e11
+# times as many with a layer that stiffens: its steps take more, most of all in the first period on
+# other contact points, by which a march is judged (3 times on ground faces under 36 N)
+MORE_WITH_LAW = 3.0
 
 
 @dataclass(frozen=True)
@@ -103,15 +106,18 @@ class ResonanceInTime:
     periods: int
     # of a blade's dampers in a period, mean of the periods whose amplitudes count [J]
     friction_work: float = np.nan
+    # with the law of a layer that stiffens, whose tangent the balances have
+    by_law: bool = False
 
     @property
     def sentence(self) -> str:
         """What was done and found."""
+        law = " with the law of the layer" if self.by_law else ""
         return (
             f"most contacts lift off, and balances do not tell the resonance; it was sought by "
-            f"marching in time, with {self.points} contact points a seat, at {self.frequencies} "
-            f"frequencies for {self.periods} periods: at {self.frequency:.5g} Hz the blade keeps "
-            f"between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um"
+            f"marching in time{law}, with {self.points} contact points a seat, at "
+            f"{self.frequencies} frequencies for {self.periods} periods: at {self.frequency:.5g} "
+            f"Hz the blade keeps between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um"
         )
 
 
@@ -179,6 +185,8 @@ class _Top:
 class _Work:
     """What a search has taken so far, and how it marches."""
 
+    # times MOST_OPERATIONS and MOST_OF_ONE_MARCH that it may take
+    allowance: float = 1.0
     instants: int = CLIMBING_INSTANTS
     operations: float = 0.0
     periods: int = 0
@@ -187,7 +195,7 @@ class _Work:
     @property
     def exhausted(self) -> bool:
         """No more may be marched."""
-        return self.operations > MOST_OPERATIONS
+        return self.operations > self.allowance * MOST_OPERATIONS
 
 
 class _MarchFailedError(Exception):
@@ -198,21 +206,25 @@ def resonance_in_time(
     models: Family,
     settings: Settings,
     motion: Solution,
+    decay: RealArray | None = None,
 ) -> ResonanceInTime | None:
     """The resonance next to a motion of the balance; None where marching is not possible, takes too
     long, or leads nowhere.
 
     Args:
         motion: the highest one of the balance, of these settings.
+        decay: (n,) of ``contact.equivalent_layer.decay_lengths`` for the finest elements [m]: the
+            marches follow the law of the layer, where the balance has its tangent; None for a
+            linear layer.
     """
     points = LIFTING_POINTS if "points" in settings.chosen else settings.points
     settings_here = settings_in_time(models, replace(settings, points=points))
     try:
-        model = model_in_time(models, settings_here)
+        model = _marched_model(models, settings_here, decay)
         start = motion
         if len(family_member(models, settings).model.springs) != len(model.springs):
             start = carried_motion(models, settings, motion, settings_here)
-        work = _Work()
+        work = _Work(1.0 if model.decay is None else MORE_WITH_LAW)
         top = _highest(model, start, work)
         above = top.best
         top = replace(top, best=_settled(model, above.state, work, INSTANTS_PER_PERIOD))
@@ -221,8 +233,9 @@ def resonance_in_time(
             work.instants = INSTANTS_PER_PERIOD
             top = _refined(model, top, work)
         error = _error(model, top, above, work)
-        best, finer, change = _with_more_points(models, settings_here, top, work)
-        best = _calmed(model_in_time(models, replace(settings_here, points=finer)), best, work)
+        best, finer, change = _with_more_points(models, settings_here, decay, top, work)
+        finest = _marched_model(models, replace(settings_here, points=finer), decay)
+        best = _calmed(finest, best, work)
     except (InputError, _MarchFailedError):
         return None
     return ResonanceInTime(
@@ -234,7 +247,18 @@ def resonance_in_time(
         len(work.frequencies),
         work.periods,
         best.friction_work,
+        model.decay is not None,
     )
+
+
+def _marched_model(models: Family, settings: Settings, decay: RealArray | None) -> ReducedModel:
+    """The model of marches, with the law of its layer where that stiffens."""
+    model = model_in_time(models, settings)
+    if decay is None or not np.isfinite(decay).any():
+        return model
+    # elements are on one seat each, which has one length
+    groups = family_member(models, settings).groups
+    return replace(model, decay=decay[np.unique(groups, return_index=True)[1]])
 
 
 def _highest(model: ReducedModel, start: Solution, work: _Work) -> _Top:
@@ -383,7 +407,7 @@ def _error(model: ReducedModel, top: _Top, above: _Settled, work: _Work) -> floa
 
 
 def _with_more_points(
-    models: Family, settings: Settings, top: _Top, work: _Work
+    models: Family, settings: Settings, decay: RealArray | None, top: _Top, work: _Work
 ) -> tuple[_Settled, int | None, float]:
     """The resonance with MORE_POINTS times the contact points, how many these are, and what they
     change, which is more than what is left to all of them where the change is of first order.
@@ -395,7 +419,7 @@ def _with_more_points(
     if points is None or points >= most or not top.closed_in:
         return top.best, points, 0.0
     finer = MORE_POINTS * points if MORE_POINTS * points < most else None
-    model = model_in_time(models, replace(settings, points=finer))
+    model = _marched_model(models, replace(settings, points=finer), decay)
     work.instants = CLIMBING_INSTANTS
     best, neighbour = top.best, top.neighbour
     found = _moved(model, best, best.omega, work)
@@ -406,8 +430,26 @@ def _with_more_points(
     found = _moved(model, neighbour, neighbour.omega, work)
     if found.mean < JUMP_SHARE * neighbour.mean:
         return best, points, float(np.inf)
-    change = 2 * abs(found.mean / neighbour.mean - 1) + 1 - neighbour.mean / best.mean
-    return best, points, change
+    beside = 1 - neighbour.mean / best.mean
+    change = abs(found.mean / neighbour.mean - 1)
+    if decay is None:
+        return best, points, 2 * change + beside
+    # few points of a layer that stiffens as it is pressed are too few for its resonance itself
+    away = neighbour.omega - best.omega
+    return _followed_uphill(model, found, away, work), finer, change + beside
+
+
+def _followed_uphill(
+    model: ReducedModel, start: _Settled, step: float, work: _Work, most: int = FINER_STEPS
+) -> _Settled:
+    """The highest motion of a few steps of the circular frequency, up to the first that falls."""
+    best = start
+    for _ in range(most):
+        found = _moved(model, best, best.omega + step, work)
+        if found.mean <= best.mean:
+            break
+        best = found
+    return best
 
 
 def _calmed(model: ReducedModel, found: _Settled, work: _Work) -> _Settled:
@@ -475,11 +517,12 @@ def _march(
     if not steps_are_resolved(model, state.drive.omega, instants):
         instants = max(instants, INSTANTS_PER_PERIOD)
     leaps = enough is not never_enough
-    march = march_ring(model, state, periods, instants, enough, MOST_OF_ONE_MARCH, leaps)
+    most = work.allowance * MOST_OF_ONE_MARCH
+    march = march_ring(model, state, periods, instants, enough, most, leaps)
     work.operations += march.operations * march.periods / periods
     work.periods += march.periods
     found = march.settled and bool(np.isfinite(march.motion).all())
-    if not found or march.operations > MOST_OF_ONE_MARCH:
+    if not found or march.operations > most:
         raise _MarchFailedError
     return march
 

@@ -1,0 +1,113 @@
+"""Marches by steps of a layer that stiffens with its pressure, against a plain explicit march."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import bouncing
+
+from bladefem.errors import InputError
+from bladefem.hbm.model import in_series
+from bladefem.hbm.ring_march import march_ring, state_of_solution
+from bladefem.hbm.solve import solve
+
+# over which the stiffness grows by e
+DECAY = np.array([0.1])
+PERIODS = 12
+
+
+def heights(motion):
+    """Amplitude of each period from its samples on the last axis."""
+    lines = 2 / motion.shape[-1] * np.fft.rfft(motion, axis=-1)[..., 1:8]
+    return np.linalg.norm(lines, axis=-1)
+
+
+def marched_by_law(model, modal, omega, periods, steps=2000):
+    """(periods, steps) first mass from modal displacements and velocities beyond those without
+    contact forces, in semi-implicit Euler steps; the slider starts where friction is none.
+    """
+    body, e = model.sides[0], model.elements
+    kt, kn, mu, n0 = (float(x[0]) for x in (e.kt, e.kn, e.mu, e.n0))
+    U, push = body.shapes[body.ports["contact"]], body.shapes[body.ports["load"]].T
+    push = push @ model.loads(1)[1]
+    free = push / (body.omega**2 - omega**2 + 1j * omega * body.damping)
+    q, v = modal.reshape(2, -1) + [free.real, (1j * omega * free).real]
+    touch = DECAY[0] * kn - n0
+    friction, before = np.zeros(2), (U @ q)[1:]
+    dt = 2 * np.pi / omega / steps
+    seen = np.empty((periods, steps))
+    for k in range(periods * steps):
+        seen[k // steps, k % steps] = body.shapes[body.ports["probe"]][0] @ q
+        w = U @ q
+        growth = np.exp(w[0] / DECAY[0])
+        normal = max((touch + n0) * growth - touch, 0.0)
+        friction = friction + growth * kt * (w[1:] - before)
+        friction *= min(1.0, mu * normal / max(np.hypot(*friction), 1e-300))
+        before = w[1:]
+        drive = (push * np.exp(1j * omega * k * dt)).real
+        rate = drive - body.omega**2 * q - body.damping * v - U.T @ [normal - n0, *friction]
+        v = v + dt * rate
+        q = q + dt * v
+    return seen
+
+
+def at_rest(model, omega):
+    """A state without motion of the modes beyond that without contact forces, and without friction."""
+    start = state_of_solution(model, solve(model, omega, 7, 256))
+    n0 = np.maximum(model.elements.n0, 0.0)
+    forces = np.tile([n0[0], 0.0, 0.0], (len(start.forces), 1))
+    return replace(start, modal=0.0 * start.modal, forces=forces)
+
+
+def split(model, share):
+    """The model with a softer element and the rest of the layer's compliance among the bodies."""
+    e = model.elements
+    compliance = -share / np.column_stack([e.kn, e.kt, e.kt])
+    soft = replace(e, kn=e.kn / (1 + share), kt=e.kt / (1 + share))
+    sides = tuple(in_series(side, compliance) for side in model.sides)
+    return replace(model, elements=soft, sides=sides, series=compliance)
+
+
+@pytest.mark.parametrize("omega", [1.3, 1.6])
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_a_march_follows_the_law_of_the_layer(omega, share):
+    """Split or not, where the contact lifts off and its stiffness changes hundredfold."""
+    whole = bouncing()
+    model = replace(split(whole, share) if share else whole, decay=DECAY)
+    start = at_rest(model, omega)
+    found = march_ring(model, start, PERIODS, 512)
+    assert found.settled
+    plain = heights(marched_by_law(whole, start.modal, omega, PERIODS))
+    assert heights(found.motion[:, 0]) == pytest.approx(plain, rel=0.02)
+    tangent = heights(march_ring(replace(model, decay=None), start, PERIODS, 512).motion[:, 0])
+    assert abs(tangent / plain - 1).max() > 0.5
+
+
+def test_each_blade_of_a_wave_has_the_layer_of_its_own_instant():
+    """Four blades without coupling, a quarter of a period apart, move as one alone does under a
+    force of their phase.
+    """
+    alone = replace(bouncing(), decay=DECAY)
+    body = alone.sides[0]
+    sides = tuple(replace(body, shapes=body.shapes * np.exp(0.5j * np.pi * h)) for h in range(9))
+    wave = replace(alone, sides=sides)
+    four = march_ring(wave, at_rest(wave, 1.3), 4)
+    for blade in range(4):
+        force = {1: alone.excitation[1] * np.exp(0.5j * np.pi * blade)}
+        one = replace(alone, excitation=force)
+        found = march_ring(one, at_rest(one, 1.3), 4).motion[:, 0]
+        np.testing.assert_allclose(four.motion[:, blade], found, atol=1e-3 * abs(found).max())
+
+
+def test_a_layer_of_infinite_length_is_linear():
+    model = bouncing()
+    start = state_of_solution(model, solve(model, 1.3, 7, 256))
+    found = march_ring(replace(model, decay=np.array([np.inf])), start, 3)
+    np.testing.assert_array_equal(found.motion, march_ring(model, start, 3).motion)
+
+
+def test_a_prescribed_load_on_a_layer_that_stiffens_is_refused():
+    model = replace(bouncing(), normal={1: np.array([0.1])}, decay=DECAY)
+    start = state_of_solution(model, solve(model, 1.3, 7, 256))
+    with pytest.raises(InputError, match="prescribed normal load on a layer that stiffens"):
+        march_ring(model, start, 1)
