@@ -194,9 +194,11 @@ def write_table(
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """A text file, whole or not at all."""
+    """A text file, whole or not at all; paths in it that the locale has no letters for as they are
+    on disk.
+    """
     with write_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="surrogateescape")
     return Path(path)
 
 

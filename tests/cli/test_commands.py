@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +26,7 @@ from bladefem.data import ModeSet, Patch, PressureMap
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.io.own_results import note_results
 from bladefem.io.run_folder import lock_run_folder
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import dump_scene, load_scene
 from geometry.mesh import Mesh
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -195,6 +196,18 @@ def test_umlauts_in_a_locale_of_ascii(command, tmp_path):
     assert done.returncode == 0, done.stderr.decode()
     if command == "mesh":
         assert {"named_mesh.msh", "mesh.vtu"} <= {made.name for made in (tmp_path / "ü").iterdir()}
+
+
+def test_undecoded_letters_of_the_command_line(tmp_path):
+    """Python hands them over as surrogates in a locale of ASCII; a scene and its file have UTF-8."""
+    undecoded = "title=Füße µ".encode().decode("ascii", "surrogateescape")
+    scene = load_scene(SCENES / "plane.toml", [undecoded])
+    assert scene.title == "Füße µ"
+    path = "/Öl/a.csv".encode().decode("ascii", "surrogateescape")
+    held = replace(scene, temperature=replace(scene.temperature, file=path))
+    assert '"/Öl/a.csv"' in dump_scene(held)
+    with pytest.raises(InputError, match="expected letters in UTF-8"):
+        load_scene(SCENES / "plane.toml", ["title=\udce4"])
 
 
 def test_names_of_files_that_a_locale_lacks(tmp_path):
