@@ -13,6 +13,10 @@ class InputError(ValueError):
     """The input is wrong. The message is one sentence: field, value, what was expected."""
 
 
+class UnwritableError(InputError):
+    """A file cannot be written, as on a full disk. What was finished before is good."""
+
+
 class StageMissingError(InputError, AttributeError):
     """A result was asked for that the run did not come to."""
 

@@ -5,6 +5,7 @@ ever. Ranks beyond the machine's cores wait without taking one from the others.
 from __future__ import annotations
 
 import argparse
+import errno
 import os
 import signal
 import sys
@@ -144,6 +145,8 @@ def _error_sentence(error: Exception) -> tuple[int, str]:
             "which lacks some of these letters; expected a locale with UTF-8, such as "
             "LC_ALL=C.UTF-8"
         )
+    if _is_unwritable(error):
+        return 2, f"cannot be written ({error}); finished stages are kept, the same command goes on"
     if isinstance(error, MemoryError):
         return 1, f"not solved: out of memory ({error}); a coarser mesh.size needs less"
     if (
@@ -155,6 +158,16 @@ def _error_sentence(error: Exception) -> tuple[int, str]:
         traceback.format_exception(error)
     )
 
+
+def _is_unwritable(error: Exception) -> bool:
+    """A full disk, or a place that takes no file: no library says so in words of this program."""
+    # HDF5 has the system's words in its own error, without its number
+    full = os.strerror(errno.ENOSPC) in str(error)
+    return full or (isinstance(error, OSError) and error.errno in UNWRITABLE)
+
+
+# what the system says of a file that cannot be written
+UNWRITABLE = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS, errno.EACCES, errno.EISDIR)
 
 _INSTALLED = {
     "dolfinx",

@@ -21,6 +21,8 @@ from .zmass import MassOnFoundation, Motion, ellipse, march, pulsating_load
 
 # difference of two cycles, over the largest velocity and force, that is none
 SAME_CYCLE = 1e-5
+# difference of the squared axes of a path, over their sum, that is none
+ROUND_PATH = 1e-12
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,7 @@ class Steady:
     load: np.ndarray
     # foundation cycles in the smallest period of (velocity, force)
     cycles: int
-    # reversals of the slip along x, halved, in that period
+    # reversals of the slip along ``axis``, halved, in that period
     loops: int
     # (3,) mean velocity [m/s, m/s, rad/s]
     drift: np.ndarray
@@ -69,6 +71,8 @@ class Steady:
     periods: int
     # "periodic" or why the march stopped
     reason: str
+    # (2,) unit vector along which the foundation moves most
+    axis: np.ndarray
 
     @property
     def relative(self) -> np.ndarray:
@@ -114,10 +118,30 @@ def steady(
     )
     cycles = _smallest_period(motion, steps, q)
     drift = motion.velocity.mean(axis=0)
-    loops = count_loops(motion.slip[: cycles * steps, 0])
+    axis = main_axis(drive.amplitude, drive.phase)
+    loops = count_loops(motion.slip[: cycles * steps] @ axis)
     return Steady(
-        motion, time[1:], base[1:], load[1:], cycles, loops, drift, residual, period, reason
+        motion, time[1:], base[1:], load[1:], cycles, loops, drift, residual, period, reason, axis
     )
+
+
+def main_axis(amplitude: tuple[float, float], phase: float) -> np.ndarray:
+    """(2,) unit vector of the longest semi-axis of the foundation's path; x where it is a circle or
+    at rest.
+
+    Args:
+        amplitude: along x and y [m].
+        phase: of the y motion against the x motion [rad].
+    """
+    x, y = amplitude
+    stretch = np.array([x**2 - y**2, 2 * x * y * np.cos(phase)])
+    # cos(pi / 2) is not zero in floating point; a circle has no longest axis
+    if np.hypot(*stretch) <= ROUND_PATH * (x**2 + y**2):
+        return np.array([1.0, 0.0])
+    angle = np.arctan2(stretch[1], stretch[0]) / 2
+    # so that a path along x or y has an axis free of rounding
+    axis = np.array([np.cos(angle), np.sin(angle)])
+    return np.where(np.abs(axis) < ROUND_PATH, 0.0, axis)
 
 
 def count_loops(slip: np.ndarray) -> int:
@@ -133,12 +157,14 @@ def count_loops(slip: np.ndarray) -> int:
 
 
 def spectrum(result: Steady) -> tuple[np.ndarray, np.ndarray]:
-    """Lines of the displacement without its drift: frequency (l,) [Hz] and amplitude (l, 3) [m, m,
-    rad].
+    """Lines of the displacement without its drift: frequency (l,) [Hz] and amplitude (l, 4) along
+    x, y [m], theta [rad] and ``result.axis`` [m].
 
     From the velocity, which is periodic: amplitude = |v| / (2 pi f).
     """
-    lines = np.fft.rfft(result.motion.velocity, axis=0)[1:] * 2 / len(result.time)
+    velocity = result.motion.velocity
+    velocity = np.column_stack([velocity, velocity[:, :2] @ result.axis])
+    lines = np.fft.rfft(velocity, axis=0)[1:] * 2 / len(result.time)
     frequency = np.fft.rfftfreq(len(result.time), result.motion.dt)[1:]
     return frequency, np.abs(lines) / (2 * np.pi * frequency[:, None])
 
@@ -188,10 +214,11 @@ def _smallest_period(
     """Foundation cycles after which (velocity, force) repeat: the smallest divisor of q that
     fits.
     """
+    # a mass at rest, or without friction, has zeros alone
     signal = np.hstack(
         [
-            motion.velocity[:, :2] / np.abs(motion.velocity).max(),
-            motion.force[:, :2] / np.abs(motion.force).max(),
+            values[:, :2] / (np.abs(values).max() or 1.0)
+            for values in (motion.velocity, motion.force)
         ]
     )
     for cycles in range(1, q):

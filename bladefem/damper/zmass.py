@@ -139,7 +139,7 @@ def march(
         InputError: the step is beyond the stability limit of the explicit march (2 over the highest
             stuck frequency).
     """
-    limit = stable_step(_highest_frequency(body))
+    limit = longest_step(body)
     if not 0 < dt < limit:
         raise InputError(
             f"dt = {dt:.3g} s, expected a positive step below {limit:.3g} s, the stability limit "
@@ -161,6 +161,11 @@ def march(
         dt,
     )
     return Motion(dt, history[:, :3], history[:, 3:6], history[:, 6:9], history[:, 9:], springs)
+
+
+def longest_step(body: MassOnFoundation) -> float:
+    """Stability limit [s] of the steps of :func:`march`."""
+    return stable_step(_highest_frequency(body))
 
 
 def _highest_frequency(body: MassOnFoundation) -> float:

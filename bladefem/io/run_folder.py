@@ -12,7 +12,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, UnwritableError
 from ..scene.fields import each_field, value_at
 from ..scene.tables import Scene
 from ..scene.toml import dump_scene, load_scene
@@ -87,7 +87,8 @@ def lock_run_folder(
         try:
             yield
         except InputError as error:
-            if restore_folder(before):
+            # a full disk: the stages finished so far are kept, as after an interruption
+            if not isinstance(error, UnwritableError) and restore_folder(before):
                 # the command has said that they were moved away
                 error.args = (f"{error}; the results that were moved are back",)
             raise

@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, UnwritableError
 from ..util.communicator import Communicator
 from ..util.message import Message
 from .array_codec import read_npz, tree_of, write_npz
@@ -57,7 +57,7 @@ def write_atomically(path: str | Path) -> Iterator[Path]:
     when it does not.
 
     Raises:
-        InputError: the disk is full or the folder cannot be written.
+        UnwritableError: the disk is full or the folder cannot be written.
     """
     path = Path(path)
     temporary = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
@@ -65,7 +65,7 @@ def write_atomically(path: str | Path) -> Iterator[Path]:
         yield temporary
         os.replace(temporary, path)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise UnwritableError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         with suppress(OSError):
             temporary.unlink()
@@ -194,9 +194,11 @@ def write_table(
 
 
 def write_text(path: str | Path, text: str) -> Path:
-    """A text file, whole or not at all."""
+    """A text file, whole or not at all; paths in it that the locale has no letters for as they are
+    on disk.
+    """
     with write_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(text, encoding="utf-8", errors="surrogateescape")
     return Path(path)
 
 

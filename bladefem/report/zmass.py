@@ -77,7 +77,7 @@ def motion_table(found: Sequence[tuple[FoundationMotion, Steady]]) -> pd.DataFra
     rows = []
     for drive, result in found:
         frequency, lines = spectrum(result)
-        main = lines[np.argmin(abs(frequency - drive.frequency)), 0]
+        main = lines[np.argmin(abs(frequency - drive.frequency)), -1]
         drift = known_drift(result)
         rows.append(
             {
@@ -133,10 +133,11 @@ def draw_motions(
     lines: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for drive, result in found:
         name = f"load at {float(drive.ratio) * drive.frequency:g} Hz"
-        motion = result.relative[:, 0] + result.drift[0] * result.time
-        shown[name] = (motion - motion.mean(), result.motion.force[:, 0], result.loops)
+        motion = result.relative @ result.axis + result.drift[:2] @ result.axis * result.time
+        force = result.motion.force[:, :2] @ result.axis
+        shown[name] = (motion - motion.mean(), force, result.loops)
         frequency, amplitude = spectrum(result)
-        lines[name] = (frequency, amplitude[:, 0])
+        lines[name] = (frequency, amplitude[:, -1])
     paper.draw_mass_loops(shown, loops)
     paper.draw_mass_spectra(lines, spectra)
 

@@ -199,7 +199,9 @@ def dump_scene(scene: Scene) -> str:
             table = head
         text = f"# {key} = auto" if value is None else f"{key} = {_toml_value(value, field)}"
         lines.append(f"{text:<40s}  # {field.meta['help']}" if field.meta.get("help") else text)
-    return "\n".join(lines) + "\n"
+    # TOML is UTF-8; paths in a locale of ASCII have bytes that it does not know
+    text = "\n".join(lines) + "\n"
+    return text.encode(errors="surrogateescape").decode(errors="replace")
 
 
 def _build_table(
@@ -234,6 +236,11 @@ def _refuse_unknown(name: str, value: object) -> None:
 
 
 def _split_override(override: str) -> tuple[str, str]:
+    try:
+        # a locale of ASCII hands over the command line's letters as bytes that it does not know
+        override = override.encode(errors="surrogateescape").decode()
+    except UnicodeDecodeError as error:
+        raise InputError(f"--set {override!a}: expected letters in UTF-8") from error
     name, equals, value = override.partition("=")
     if not equals or not name.strip():
         raise InputError(f"--set {override}: expected key=value, such as aerofoil.twist='25 deg'")

@@ -18,6 +18,7 @@ from bladefem.contact.resultants import resultant
 from bladefem.data import Patch, PressureMap
 
 from ..scene.units import newtons
+from .mesh import write_vtu
 from .skin import split_faces
 from .style import COLOURS, canvas, headline
 
@@ -130,9 +131,7 @@ def save_faces_vtu(
     grid.point_data["normal"] = np.concatenate([p.frame[:, 0] for p in patches])
     for name, values in fields.items():
         grid.point_data[name] = np.asarray(values)
-    Path(file).parent.mkdir(parents=True, exist_ok=True)
-    grid.save(str(file))
-    return Path(file)
+    return write_vtu(grid, file)
 
 
 def unfold(patch: Patch, points: np.ndarray | None = None) -> np.ndarray:

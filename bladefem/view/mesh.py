@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.patches import Patch as Swatch
 
+from bladefem.errors import InputError
 from geometry.mesh import Mesh
 from geometry.topology import CORNERS
 
@@ -170,7 +171,7 @@ def write_vtu(grid: UnstructuredGrid, file: str | Path) -> Path:
     writer.EncodeAppendedDataOff()
     writer.SetCompressionLevel(1)
     if not writer.Write():
-        raise OSError(f"{file}: expected a file that can be written")
+        raise InputError(f"{file}: cannot be written (VTK; is the disk full?)")
     return Path(file)
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from types import SimpleNamespace
@@ -22,10 +24,10 @@ import bladefem.study.pipeline
 from bladefem.cli.main import main, parser
 from bladefem.cli.tables import response_tables
 from bladefem.data import ModeSet, Patch, PressureMap
-from bladefem.errors import InputError, NotSolvedError
+from bladefem.errors import InputError, NotSolvedError, UnwritableError
 from bladefem.io.own_results import note_results
 from bladefem.io.run_folder import lock_run_folder
-from bladefem.scene.toml import load_scene
+from bladefem.scene.toml import dump_scene, load_scene
 from geometry.mesh import Mesh
 
 SCENES = Path(__file__).parents[2] / "scenes"
@@ -195,6 +197,18 @@ def test_umlauts_in_a_locale_of_ascii(command, tmp_path):
     assert done.returncode == 0, done.stderr.decode()
     if command == "mesh":
         assert {"named_mesh.msh", "mesh.vtu"} <= {made.name for made in (tmp_path / "ü").iterdir()}
+
+
+def test_undecoded_letters_of_the_command_line(tmp_path):
+    """Python hands them over as surrogates in a locale of ASCII; a scene and its file have UTF-8."""
+    undecoded = "title=Füße µ".encode().decode("ascii", "surrogateescape")
+    scene = load_scene(SCENES / "plane.toml", [undecoded])
+    assert scene.title == "Füße µ"
+    path = "/Öl/a.csv".encode().decode("ascii", "surrogateescape")
+    held = replace(scene, temperature=replace(scene.temperature, file=path))
+    assert '"/Öl/a.csv"' in dump_scene(held)
+    with pytest.raises(InputError, match="expected letters in UTF-8"):
+        load_scene(SCENES / "plane.toml", ["title=\udce4"])
 
 
 def test_names_of_files_that_a_locale_lacks(tmp_path):
@@ -539,6 +553,8 @@ def raiser(error):
             "dolfinx.mesh is not installed; run ./setup.sh",
         ),
         (ZeroDivisionError("our fault"), 1, "mistake in the program"),
+        (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)), 2, "finished stages are kept"),
+        (IsADirectoryError(errno.EISDIR, "Is a directory", "a.png"), 2, "a.png"),
         (BrokenPipeError(), 0, ""),
     ],
 )
@@ -550,6 +566,20 @@ def test_what_goes_wrong_has_an_exit_code_and_a_sentence(
     text = capsys.readouterr().err
     assert message in text
     assert code != 2 or text.count("\n") == 1
+
+
+def test_a_full_disk_keeps_finished_stages(pipeline, tmp_path, capsys):
+    """Bad input takes them away; hours of work are worth more than an empty folder."""
+
+    def work(*_, **__):
+        stages = tmp_path / "run" / "stages"
+        stages.mkdir(parents=True)
+        (stages / "mesh.npz").touch()
+        raise UnwritableError("stages/modes.npz: cannot be written (No space left on device)")
+
+    pipeline.state.behaviour = work
+    assert main(["modes", WEDGE, "-o", str(tmp_path / "run")]) == 2
+    assert (tmp_path / "run" / "stages" / "mesh.npz").exists()
 
 
 def test_bad_input_that_the_work_finds_leaves_no_folder(pipeline, tmp_path):

@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from bladefem.cli.main import main
-from bladefem.damper.loops import FoundationMotion, steady
+from bladefem.damper.loops import FoundationMotion, main_axis, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
+from bladefem.report.zmass import motion_table
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.kinds.zmass import (
     cluster_nodes,
@@ -88,6 +89,56 @@ def test_skewed_top_pressure_moves_the_resultant_and_turns_the_mass():
     assert body.footprint.share @ body.footprint.points == pytest.approx(wanted, rel=0.05)
     _, result = next(steady_motions(scene, mass_on_foundation(scene, press_mass(scene).seat), 500))
     assert np.abs(result.motion.velocity[:, 2]).max() > 1.0  # rad/s
+
+
+@pytest.mark.parametrize(("along", "phase"), [((0.0, 0.005), 0.0), ((0.003, 0.004), 0.0)])
+def test_loops_and_amplitude_do_not_depend_on_the_axes(along, phase):
+    """Friction on one point knows no direction: what is told along y, or aslant, is that along x."""
+    body = MassOnFoundation(footprint=Footprint(np.zeros((1, 2)), np.ones(1)))
+    drives = [
+        FoundationMotion(Fraction(1, 2), amplitude=a, phase=phase) for a in ((0.005, 0.0), along)
+    ]
+    found = [(drive, steady(body, drive, 500)) for drive in drives]
+    table = motion_table(found)
+    assert list(table["loops"]) == [2, 2]
+    assert table["amplitude"][1] == pytest.approx(table["amplitude"][0], rel=1e-9)
+
+
+def test_a_circle_has_x_as_its_axis():
+    assert list(main_axis((0.005, 0.005), np.pi / 2)) == [1, 0]
+    assert list(main_axis((0.0, 0.005), np.pi / 2)) == [0, 1]
+    assert main_axis((1.0, 1.0), np.pi) == pytest.approx(np.array([1, -1]) / np.sqrt(2))
+
+
+def test_steps_follow_the_stuck_mass_in_slow_motions(pressed):
+    """At 1 Hz 2000 steps are longer than the stuck mass allows; 1 um leaves it stuck, and carries it
+    along.
+    """
+    slow = vary(
+        SCENE,
+        foundation__frequency=1.0,
+        foundation__amplitude=(1e-6, 0.0),
+        foundation__ratios=(0.0,),
+    )
+    body = mass_on_foundation(slow, pressed.seat)
+    ((_, result),) = steady_motions(slow, body)
+    assert np.abs(result.motion.position[:, 0]).max() == pytest.approx(1e-6, rel=2e-3)
+    stiff = vary(slow, contact__kt=1e12)
+    with pytest.raises(InputError, match=r"foundation.frequency = 1 Hz: \d+ steps"):
+        list(steady_motions(stiff, mass_on_foundation(stiff, pressed.seat)))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        "study.loads=['50 N', '60 N']",
+        "contact.bedded=false",
+        "contact.normal='prescribed'",
+    ],
+)
+def test_what_the_mass_does_not_use_is_refused(change):
+    with pytest.raises(InputError, match=change.split("=")[0]):
+        load_scene("scenes/zmass.toml", [change])
 
 
 def test_pull_balances_mean_friction_while_the_mass_slips():

@@ -204,6 +204,9 @@ OTHER_KINDS = [
     ({"kind": "hertz", "mesh": {"contact_size": "1 um"}}, "mesh.contact_size"),
     ({"kind": "punch", "punch": {"radius": "15 mm"}}, "half of punch.half_width"),
     ({"kind": "punch", "mesh": {"scale": 0.02, "contact_size": "0.1 mm"}}, "mesh.scale"),
+    ({"kind": "hertz", "material": {"damper": {"G": "130 GPa"}}}, "material.damper.G"),
+    ({"kind": "punch", "material": {"blade": {"G": "130 GPa"}}}, "material.blade.G"),
+    ({"kind": "punch", "material": {"damper": {"E": "1 GPa"}}}, "material.damper.E"),
     ({"kind": "imported", "imported": {"file": __file__}}, "unknown kind of mesh"),
 ]
 

@@ -2,6 +2,7 @@
 geometry.
 """
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -338,6 +339,12 @@ def test_pressure_for_paraview(folder):
         np.testing.assert_allclose(
             grid["area [m2]"] @ grid["pressure [Pa] at 40 N"], sum(s.force.sum() for s in seats)
         )
+
+
+def test_pressure_in_a_folder_whose_name_the_locale_lacks(tmp_path):
+    """As umlauts in a locale of ASCII; here a letter of Latin 1 in one of UTF-8."""
+    file = tmp_path / os.fsdecode(b"\xfc") / "pressure.vtu"
+    assert save_pressure_vtu({40.0: synthetic.seats()}, file).stat().st_size > 0
 
 
 def test_unfolding_keeps_lengths():

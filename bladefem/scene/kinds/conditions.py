@@ -53,6 +53,20 @@ def one_of(
         )
 
 
+def isotropic(scene: Scene, *bodies: str) -> Iterator[str]:
+    """The closed form next to the finite elements is that of isotropic bodies, and a quarter of the
+    pair is meshed, whose mirrors a turned crystal has not.
+    """
+    for body in bodies:
+        material = getattr(scene.material, body)
+        for name in ("G", "orthotropic"):
+            if getattr(material, name) is not None:
+                yield (
+                    f"material.{body}.{name}: the closed form of kind '{scene.kind}' is that of "
+                    "isotropic bodies, expected E and nu alone"
+                )
+
+
 def known_diameters(scene: Scene, sectors: int) -> Iterator[str]:
     listed = scene.model.nodal_diameters or ()
     for n in sorted({n for n in listed if listed.count(n) > 1}):

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import at_most, below_limit, one_of
+from .conditions import at_most, below_limit, isotropic, one_of
 from .record import PRESSED_TABLES, Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
     hertz = scene.hertz
     yield from one_of("hertz.interference", hertz.interference, scene)
+    yield from isotropic(scene, "blade", "damper")
     yield from below_limit(
         "hertz.contact_radius", hertz.contact_radius, hertz.half_width, "hertz.half_width"
     )

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import below_limit, one_of
-from .record import PRESSED_TABLES, Kind, SceneCall
+from .conditions import below_limit, isotropic, one_of
+from .record import Kind, SceneCall
 
 
 def conditions(scene: Scene) -> Iterator[str]:
     yield from one_of("punch.interference", scene.punch.interference, scene)
+    yield from isotropic(scene, "blade")
     yield from below_limit(
         "punch.radius", scene.punch.radius, scene.punch.half_width, "punch.half_width"
     )
@@ -27,7 +28,8 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 
 KIND = Kind(
     name="punch",
-    tables=("punch", *PRESSED_TABLES),
+    # the punch is rigid: it has no material
+    tables=("punch", "mesh", "material.blade", "study.loads"),
     builder="geometry.contact_pairs:mesh_punch",
     shape=("punch", "mesh"),
     runner="bladefem.report.pair:report_pair",

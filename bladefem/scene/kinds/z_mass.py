@@ -16,6 +16,22 @@ def conditions(scene: Scene) -> Iterator[str]:
     skew = scene.foundation.skew
     if abs(skew[0]) + abs(skew[1]) > 1:
         yield f"foundation.skew = {skew[0]:g}, {skew[1]:g}: expected a sum of sizes of at most 1"
+    loads = scene.study.loads
+    if loads is not None and len(loads) > 1:
+        yield f"study.loads: {len(loads)} values, expected one, the mean load on the mass"
+    yield from _unread_contact(scene)
+
+
+def _unread_contact(scene: Scene) -> Iterator[str]:
+    """Fields of [contact] that a damper's seats have and the footprint of the mass has not."""
+    contact = scene.contact
+    why = "what the foundation carries is no seat of a damper"
+    if contact.stiffness == "rigid":
+        yield "contact.stiffness = 'rigid': the mass is held by contact.kt, expected 'given'"
+    if contact.normal != "coupled":
+        yield f"contact.normal = '{contact.normal}': {why}, expected it to be left out"
+    if not contact.bedded:
+        yield f"contact.bedded = false: {why}, expected it to be left out"
 
 
 def thin_parts(scene: Scene) -> dict[str, float]:

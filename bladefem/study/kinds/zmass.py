@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from math import ceil
 from pathlib import Path
 
 import numpy as np
@@ -24,17 +25,22 @@ from ...contact.interface_elements import pair_ratio, stiffnesses_at
 from ...contact.patch import make_patch
 from ...contact.seating import contact_problem, solve_seating
 from ...damper.loops import FoundationMotion, Steady, steady
-from ...damper.zmass import Footprint, MassOnFoundation
+from ...damper.zmass import Footprint, MassOnFoundation, longest_step
 from ...data import PressureMap
 from ...errors import InputError
 from ...io.stage_cache import cached_stage
 from ...scene.tables import Scene
+from ...scene.units import show
 from ...util.communicator import Communicator
 from ..pipeline.scene_mesh import build_mesh
 from ..pipeline.stage_inputs import stage_key
 
 # largest of a frequency ratio
 MAX_DENOMINATOR = 1000
+# time steps within the longest stable one, at least: 16 in a period of the stuck mass
+STEPS_PER_LIMIT = 5.0
+# time steps of a common period of foundation and load: 200 megabytes, and minutes for 200 periods
+MAX_STEPS = 2_000_000
 
 
 @dataclass(frozen=True)
@@ -130,14 +136,26 @@ def steady_motions(
     turning slowly.
 
     Args:
-        steps: time steps in one cycle of the foundation.
+        steps: time steps in one cycle of the foundation; more where the stuck mass swings faster.
+
+    Raises:
+        InputError: a contact too stiff to be followed through such a slow cycle.
     """
-    for drive in foundation_drives(scene):
+    drives = foundation_drives(scene)
+    cycles = max(drive.ratio.denominator for drive in drives)
+    steps = max(steps, ceil(STEPS_PER_LIMIT / (longest_step(body) * scene.foundation.frequency)))
+    if steps * cycles > MAX_STEPS:
+        raise InputError(
+            f"foundation.frequency = {show(scene.foundation.frequency, 'Hz')}: {steps * cycles} "
+            f"steps of time in {cycles} cycles with contacts of {show(body.kt, 'N/m')}, expected "
+            f"at most {MAX_STEPS}: a higher frequency or a smaller contact.kt"
+        )
+    for drive in drives:
         yield drive, steady(body, drive, steps, tolerance=1e-6)
 
 
 def mean_load(scene: Scene) -> float:
-    """The mean normal load [N]: the first of study.loads, 50 N when left out."""
+    """The mean normal load [N]: the one of study.loads, 50 N when left out."""
     return 50.0 if scene.study.loads is None else scene.study.loads[0]
 
 
