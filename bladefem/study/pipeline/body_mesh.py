@@ -145,10 +145,11 @@ def softened_change(
     """Relative change of a resonance amplitude on the softened body. Where that was not solved and
     contacts lift off, that of the blade without damper; else inf.
 
-    Where most contacts lift off, many motions exist side by side, and a flat top has several maxima:
-    the search may end on another one. Of the whole change and twice that by half of the error the
-    smaller one counts there. Of the shipped wedge under 18 N, a tenth, a quarter, a half and three
-    quarters of the error change the resonance by 0.3, 0.9, 1.7 and 2.6 %, all of it by 24 %.
+    Where most contacts lift off, many motions exist side by side, and a flat top has several
+    maxima: the search may end on another one. Of the whole change and twice that by half of the
+    error the smaller one counts there. Of the shipped wedge under 18 N, a tenth, a quarter, a half
+    and three quarters of the error change the resonance by 0.3, 0.9, 1.7 and 2.6 %, all of it by
+    24 %.
 
     Args:
         models: of the body as meshed.
