@@ -5,9 +5,9 @@ The force is marched from edge to edge of the polygon round the motion (`coulomb
 the force at a sample is that in the middle of its edge (`coulomb_2d.force_at_middle`). Its
 derivative by the coefficients is carried along as two rows, with two more columns by the force at
 the start. Marching ends when the force repeats itself; the derivative of the periodic force then
-follows from that of the period map, where it has one, else from the march itself. Some 35 to 70
-times as slow as the vector kernel, as it carries the derivative through every period that it
-marches.
+follows from that of the period map, where it has one, else from the march itself. Some ten times as
+slow as the vector kernel, as it carries the derivative through every period that it marches. Loops
+over single numbers take the place of array expressions, which numba compiles for half a minute.
 """
 
 from __future__ import annotations
@@ -26,43 +26,84 @@ SINGULAR_DETERMINANT = 1e-6
 
 
 @njit(**INNER_KERNEL)
-def _rows_at(state, f, limit, rise, by, before, change, mu, pressed):
-    """Rows (2, M) of the force f (2,) in its state, after a change of the motion.
+def _fill_rows(rows, before, change, state, force, limit, by, mu, closing, part):
+    """Fill the rows (2, M) of a force (2,) in its state, after a part of an edge.
 
     Args:
-        limit: mu N there [N], and pressed (M,) the row of N there.
-        rise: share of the change that a closing contact has felt, with its derivative's row (M,).
-        by: d(angle) by force (2), increment (2), loads at both ends of the edge.
         before: (2, M) rows of the force at the beginning of the edge.
-        change: (2, M) rows of the increment, then the loads at both ends (2, M).
+        change: (4, M) rows of the increment (2), and of the loads at both ends of the edge (2).
+        limit: mu N after the part [N].
+        by: d(angle) by force (2), increment (2), loads at both ends of the edge.
+        closing: share of the increment that a closing contact has felt, its derivatives by the
+            loads at both ends, and the increment (2).
+        part: of the edge, 0.5 or 1.
     """
-    rows = np.zeros(before.shape)
-    moved, loads, increment = change
-    if state == STICK:
-        rows[:] = before + moved
-    elif state == CLOSING:
-        share, by_share = rise
-        for c in range(2):
-            rows[c] = share * moved[c] + increment[c] * by_share
-    elif state == SLIP:
-        angle = by[0] * before[0] + by[1] * before[1]
-        angle += by[2] * moved[0] + by[3] * moved[1] + by[4] * loads[0] + by[5] * loads[1]
-        growth = mu / limit if limit > 0.0 else 0.0
-        rows[0] = -f[1] * angle + f[0] * growth * pressed
-        rows[1] = f[0] * angle + f[1] * growth * pressed
-    return rows
+    fx, fy = force
+    share, by_first, by_last, dx, dy = closing
+    growth = mu / limit if limit > 0.0 else 0.0
+    for m in range(rows.shape[1]):
+        gx = before[0, m]
+        gy = before[1, m]
+        moved_x = change[0, m]
+        moved_y = change[1, m]
+        first = change[2, m]
+        last = change[3, m]
+        if state == STICK:
+            rows[0, m] = gx + part * moved_x
+            rows[1, m] = gy + part * moved_y
+        elif state == CLOSING:
+            by_share = by_first * first + by_last * last
+            rows[0, m] = share * moved_x + dx * by_share
+            rows[1, m] = share * moved_y + dy * by_share
+        elif state == SLIP:
+            angle = by[0] * gx + by[1] * gy + by[2] * moved_x + by[3] * moved_y
+            angle += by[4] * first + by[5] * last
+            pressed = growth * ((1.0 - part) * first + part * last)
+            rows[0, m] = fx * pressed - fy * angle
+            rows[1, m] = fy * pressed + fx * angle
+        else:
+            rows[0, m] = 0.0
+            rows[1, m] = 0.0
 
 
-@njit(**KERNEL)
-def _march_period(path, basis, node, weights, f, rows, F, sums):
-    """One period from the force f (2,) with its rows (2, 3K + 2), both changed to those at its end.
+@njit(**INNER_KERNEL)
+def _fill_change(change, first, last, kt, kn):
+    """Fill the rows (4, 3K + 2) of increment and loads from the knots' basis (K,) at both ends of
+    an edge; all other columns stay 0.
+    """
+    K = first.shape[0]
+    for k in range(K):
+        step = kt * (last[k] - first[k])
+        change[0, K + k] = step
+        change[1, 2 * K + k] = step
+        change[2, k] = kn * first[k]
+        change[3, k] = kn * last[k]
+
+
+@njit(**INNER_KERNEL)
+def _add_harmonics(sums, weights, rows):
+    """Add the rows (2, M) at one sample to their harmonics sums (2, K, M) by weights (K,)."""
+    for c in range(2):
+        for k in range(weights.shape[0]):
+            for m in range(rows.shape[1]):
+                sums[c, k, m] += weights[k] * rows[c, m]
+
+
+@njit(**INNER_KERNEL)
+def _march_period(path, basis, node, weights, f, work, F, sums):
+    """One period from the force f (2,) with its rows, both changed to those at its end.
 
     Fills F (2, K) and sums (2, K, 3K + 2) with the harmonics of the forces at the samples and of
     their rows; returns the number of samples that slip.
+
+    Args:
+        work: (8, 3K + 2): the force's rows (2), those at a sample (2), of an edge's change (4).
     """
     kt, kn, mu = node
-    S, K = weights.shape
-    M = rows.shape[1]
+    S, K = basis.shape
+    rows = work[:2]
+    at_sample = work[2:4]
+    change = work[4:]
     slips = 0
     F[:] = 0.0
     sums[:] = 0.0
@@ -71,43 +112,22 @@ def _march_period(path, basis, node, weights, f, rows, F, sums):
         dy = path[1, i + 1] - path[1, i]
         N0 = path[2, i]
         N1 = path[2, i + 1]
-        moved = np.zeros((2, M))
-        loads = np.zeros((2, M))
-        after = (i + 1) % S
-        moved[0, K : 2 * K] = kt * (basis[after] - basis[i])
-        moved[1, 2 * K : 3 * K] = kt * (basis[after] - basis[i])
-        loads[0, :K] = kn * basis[i]
-        loads[1, :K] = kn * basis[after]
-        change = (moved, loads, (dx, dy))
+        _fill_change(change, basis[i], basis[(i + 1) % S], kt, kn)
         end, ex, ey, mid, by = march_edge(f[0], f[1], dx, dy, N0, N1, mu)
         mx, my, by_mid = force_at_middle(f[0], f[1], dx, dy, N0, N1, mu, mid)
-        # in the middle half of the increment is felt, or what a closing contact has felt of it
         rise = N1 - N0 if mid == CLOSING or end == CLOSING else 1.0
-        half = (loads[0] + loads[1]) / 2
-        shares = ((N1 * loads[0] - N0 * loads[1]) / rise**2, (N0 + N1) / (2 * rise))
-        if mid == STICK:
-            at_sample = rows + moved / 2
-        else:
-            at_sample = _rows_at(
-                mid,
-                (mx, my),
-                mu * (N0 + N1) / 2,
-                (shares[1], shares[0]),
-                by_mid,
-                rows,
-                change,
-                mu,
-                half,
-            )
+        by_first = N1 / rise**2
+        by_last = -N0 / rise**2
+        closing = ((N0 + N1) / (2.0 * rise), by_first, by_last, dx, dy)
+        limit = mu * (N0 + N1) / 2.0
+        _fill_rows(at_sample, rows, change, mid, (mx, my), limit, by_mid, mu, closing, 0.5)
+        closing = (N1 / rise, by_first, by_last, dx, dy)
+        _fill_rows(rows, rows, change, end, (ex, ey), mu * N1, by, mu, closing, 1.0)
         for k in range(K):
             F[0, k] += weights[i, k] * mx
             F[1, k] += weights[i, k] * my
-            sums[0, k] += weights[i, k] * at_sample[0]
-            sums[1, k] += weights[i, k] * at_sample[1]
+        _add_harmonics(sums, weights[i], at_sample)
         slips += mid == SLIP
-        rows[:] = _rows_at(
-            end, (ex, ey), mu * N1, (N1 / rise, shares[0]), by, rows, change, mu, loads[1]
-        )
         f[0] = ex
         f[1] = ey
     return slips
@@ -119,28 +139,62 @@ def _start_force(path, basis, node, f, rows):
     goes on from period to period, the limit that way.
     """
     kt, kn, mu = node
-    K = basis.shape[1]
+    S, K = basis.shape
     rows[:] = 0.0
-    f[:] = path[:2, 0]
+    f[0] = path[0, 0]
+    f[1] = path[1, 0]
     limit = mu * max(path[2, 0], 0.0)
-    way = path[:2, -1] - path[:2, 0]
-    if np.hypot(way[0], way[1]) > 0.0:
-        f[:] = limit / np.hypot(way[0], way[1]) * way
+    way_x = path[0, S] - path[0, 0]
+    way_y = path[1, S] - path[1, 0]
+    way = np.hypot(way_x, way_y)
+    if way > 0.0:
+        f[0] = limit / way * way_x
+        f[1] = limit / way * way_y
         return
+    for k in range(K):
+        rows[0, K + k] = kt * basis[0, k]
+        rows[1, 2 * K + k] = kt * basis[0, k]
     size = np.hypot(f[0], f[1])
-    rows[0, K : 2 * K] = kt * basis[0]
-    rows[1, 2 * K : 3 * K] = kt * basis[0]
     if size > limit:
         ux = f[0] / size
         uy = f[1] / size
-        across = (ux * rows[1] - uy * rows[0]) * limit / size
-        pressed = np.zeros(rows.shape[1])
-        if limit > 0.0:
-            pressed[:K] = mu * kn * basis[0]
-        rows[0] = -uy * across + ux * pressed
-        rows[1] = ux * across + uy * pressed
+        for m in range(3 * K):
+            across = (ux * rows[1, m] - uy * rows[0, m]) * limit / size
+            pressed = mu * kn * basis[0, m] if m < K and limit > 0.0 else 0.0
+            rows[0, m] = ux * pressed - uy * across
+            rows[1, m] = uy * pressed + ux * across
         f[0] = ux * limit
         f[1] = uy * limit
+
+
+@njit(**INNER_KERNEL)
+def _fill_jacobian(J, sums, rows, before):
+    """Fill J (2, K, M) of the periodic force: harmonics sums (2, K, M + 2) of a march's rows, with
+    those of the periodic start, x, in place of the march's, before (2, M).
+
+    The rows (2, M + 2) at the end are  Phi x + q,  Phi their last two columns; x = Phi x + q  where
+    the period map has such a state.
+    """
+    K, M = J.shape[1:]
+    for c in range(2):
+        for k in range(K):
+            for m in range(M):
+                J[c, k, m] = sums[c, k, m]
+    a = 1.0 - rows[0, M]
+    b = -rows[0, M + 1]
+    c = -rows[1, M]
+    d = 1.0 - rows[1, M + 1]
+    determinant = a * d - b * c
+    if abs(determinant) <= SINGULAR_DETERMINANT:
+        return
+    for m in range(M):
+        q0 = rows[0, m] - before[0, m]
+        q1 = rows[1, m] - before[1, m]
+        x0 = (d * q0 - b * q1) / determinant
+        x1 = (a * q1 - c * q0) / determinant
+        for k in range(K):
+            J[0, k, m] += sums[0, k, M] * x0 + sums[0, k, M + 1] * x1
+            J[1, k, m] += sums[1, k, M] * x0 + sums[1, k, M + 1] * x1
 
 
 @njit(**INNER_KERNEL)
@@ -148,29 +202,75 @@ def _periodic_force(path, basis, node, weights, limit, F, J):
     """Fill F (2, K) and J (2, K, 3K) of the periodic state; returns samples that slip, and cycles,
     negative where the force does not repeat itself.
     """
-    K = basis.shape[1]
+    S, K = basis.shape
     M = 3 * K
     f = np.empty(2)
-    rows = np.zeros((2, M + 2))
+    work = np.zeros((8, M + 2))
+    before = np.empty((2, M + 2))
     sums = np.empty((2, K, M + 2))
+    rows = work[:2]
     _start_force(path, basis, node, f, rows)
-    scale = node[2] * max(path[2].max(), 0.0)
+    largest = 0.0
+    for i in range(S + 1):
+        largest = max(largest, path[2, i])
     for cycle in range(1, limit + 1):
         fx = f[0]
         fy = f[1]
-        rows[:, M:] = np.eye(2)
-        before = rows[:, :M].copy()
-        slips = _march_period(path, basis, node, weights, f, rows, F, sums)
-        if np.hypot(f[0] - fx, f[1] - fy) <= REPEAT_TOLERANCE * scale:
-            left = np.eye(2) - rows[:, M:]
-            J[:] = sums[:, :, :M]
-            if abs(left[0, 0] * left[1, 1] - left[0, 1] * left[1, 0]) > SINGULAR_DETERMINANT:
-                # the periodic start's rows x fulfil  x = Phi x + q,  those of the march were before
-                shift = np.linalg.solve(left, rows[:, :M].copy() - before)
-                for c in range(2):
-                    J[c] += np.dot(np.ascontiguousarray(sums[c, :, M:]), shift)
+        for c in range(2):
+            for m in range(M):
+                before[c, m] = rows[c, m]
+            for column in range(2):
+                rows[c, M + column] = 1.0 if c == column else 0.0
+        slips = _march_period(path, basis, node, weights, f, work, F, sums)
+        if np.hypot(f[0] - fx, f[1] - fy) <= REPEAT_TOLERANCE * node[2] * largest:
+            _fill_jacobian(J, sums, rows, before)
             return slips, cycle
     return slips, -limit
+
+
+@njit(**INNER_KERNEL)
+def _fill_path(path, w, ramp, load, knots, node, n0):
+    """Fill the path (3, S + 1) at the knots: k_t times the tangential motion, and the normal load;
+    arguments are those of one element of `plain_batch`.
+    """
+    kt, kn, _ = node
+    S, K = knots.shape
+    for i in range(S + 1):
+        path[0, i] = ramp[0] * i / S
+        path[1, i] = ramp[1] * i / S
+        path[2, i] = 0.0
+        for k in range(K):
+            for c in range(2):
+                path[c, i] += knots[i % S, k] * w[1 + c, k]
+            path[2, i] += knots[i % S, k] * w[0, k]
+        path[0, i] *= kt
+        path[1, i] *= kt
+        path[2, i] *= kn
+        path[2, i] += 0.5 * (load[i % S] + load[i - 1]) if load.shape[0] else n0
+
+
+@njit(**INNER_KERNEL)
+def _normal_force(w, load, tab, kn, n0, F, J):
+    """Fill F (K,) and J (K, K) of the normal force from the normal motion w (K,); returns the
+    number of samples that are closed.
+    """
+    S, K = tab.at.shape
+    F[:] = 0.0
+    J[:] = 0.0
+    closed = 0
+    for i in range(S):
+        force = 0.0
+        for k in range(K):
+            force += tab.at[i, k] * w[k]
+        force = kn * force + (load[i] if load.shape[0] else n0)
+        if force <= 0.0:
+            continue
+        closed += 1
+        for k in range(K):
+            F[k] += tab.analysis[i, k] * force
+            for l in range(K):
+                J[k, l] += kn * tab.analysis[i, k] * tab.at[i, l]
+    return closed
 
 
 @njit(**KERNEL)
@@ -180,33 +280,16 @@ def plain_batch(w, ramp, load, nodes, tab, limit, F, J, shares, cycles):
     patterns.
     """
     S, K = tab.at.shape
-    weights = np.ascontiguousarray(tab.analysis[:S])
     path = np.empty((3, S + 1))
     for e in range(w.shape[0]):
         kt, kn, mu, n0 = nodes[e]
-        sampled = np.dot(tab.at, kn * w[e, 0])
-        for i in range(S + 1):
-            knot = tab.knots[i % S]
-            path[0, i] = kt * np.dot(knot, w[e, 1])
-            path[1, i] = kt * np.dot(knot, w[e, 2])
-            path[2, i] = kn * np.dot(knot, w[e, 0])
-            path[0, i] += kt * ramp[e, 0] * i / S
-            path[1, i] += kt * ramp[e, 1] * i / S
-            path[2, i] += 0.5 * (load[e, i % S] + load[e, i - 1]) if load.shape[1] else n0
-        if load.shape[1]:
-            sampled += load[e]
-        else:
-            sampled += n0
-        F[e] = 0.0
+        node = (kt, kn, mu)
         J[e] = 0.0
-        closed = sampled > 0.0
-        for k in range(K):
-            F[e, 0, k] = np.sum(weights[:, k] * np.maximum(sampled, 0.0))
-            for l in range(K):
-                J[e, 0, k, l] = kn * np.sum(weights[:, k] * closed * tab.at[:, l])
+        _fill_path(path, w[e], ramp[e], load[e], tab.knots, node, n0)
+        closed = _normal_force(w[e, 0], load[e], tab, kn, n0, F[e, 0], J[e, 0, :, :K])
         slips, cycles[e] = _periodic_force(
-            path, tab.knots, (kt, kn, mu), weights, limit, F[e, 1:], J[e, 1:]
+            path, tab.knots, node, tab.analysis, limit, F[e, 1:], J[e, 1:]
         )
         shares[e, 1] = slips / S
-        shares[e, 2] = 1.0 - np.mean(closed)
+        shares[e, 2] = 1.0 - closed / S
         shares[e, 0] = 1.0 - shares[e, 1] - shares[e, 2]
