@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryFile
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
@@ -80,8 +80,13 @@ def make_folder_of(file: str | Path, option: str) -> None:
         raise InputError(
             f"{option} {file}: folder {folder} cannot be made ({error.strerror})"
         ) from None
-    if not os.access(folder, os.W_OK):
-        raise InputError(f"{option} {file}: folder {folder} cannot be written")
+    try:
+        # its rights do not tell: of /proc they allow root what the system then refuses
+        TemporaryFile(dir=folder).close()
+    except OSError as error:
+        raise InputError(
+            f"{option} {file}: folder {folder} cannot be written ({error.strerror})"
+        ) from None
 
 
 def mesh(options: argparse.Namespace, comm: Communicator | None) -> None:

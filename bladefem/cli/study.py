@@ -19,7 +19,7 @@ from ..errors import InputError
 from ..scene.units import newtons
 from ..util.communicator import Communicator
 from . import tables
-from .commands import given_scene, prepared, run_folder, tell
+from .commands import given_scene, prepared, run_folder, scene_path, tell
 
 if TYPE_CHECKING:
     from ..report.study import Variant
@@ -73,6 +73,7 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     base = run_folder(options)
     plan = _make_plan(options)
+    on_root(comm, lambda: _refuse_bladeless(options))
     parts = [_run_options(options, base, plan.names, values) for values in plan.runs]
     # all, before long work
     scenes = on_root(comm, lambda: [given_scene(one, responds=True) for one in parts])
@@ -106,6 +107,18 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
         sys.stdout.flush()
     written = ", ".join(map(str, files))
     tell(options, comm, lambda: f"\n{plan.show(table)}\nwritten: {written}")
+
+
+def _refuse_bladeless(options: argparse.Namespace) -> None:
+    """A kind without forced responses, before fields are set that it does not have.
+
+    Raises:
+        InputError: the kind, and what it can be used for.
+    """
+    from ..scene.toml import read_tables
+    from ..scene.validate import refuse_bladeless
+
+    refuse_bladeless(str(read_tables(scene_path(options.scene), options.overrides)["kind"]))
 
 
 def _finished_line(place: str, seconds: float, variant: Variant) -> str:
@@ -210,13 +223,13 @@ def _map_table(names: tuple[str, ...], values: list[list[str]], table: Any) -> s
 
 
 def _parse_variation(text: str) -> tuple[str, list[str]]:
-    """Name and texts of the values; the last unit holds for those without one, as in "30, 40, 50
-    deg".
+    """Name and texts of the values, each value once; the last unit holds for those without one, as
+    in "30, 40, 50 deg".
 
     Raises:
         InputError: no such field, or no values.
     """
-    from ..scene.fields import field_at, split_values
+    from ..scene.fields import convert_value, field_at, split_values
 
     name, equals, values = (part.strip() for part in text.partition("="))
     if equals:
@@ -227,7 +240,11 @@ def _parse_variation(text: str) -> tuple[str, list[str]]:
         raise InputError(
             f"--vary {text}: expected key=values, such as damper.angle='30, 40, 50 deg'"
         )
-    return name, list(dict.fromkeys(split_values(values)))
+    texts: dict[Any, str] = {}
+    for one in split_values(values):
+        # "0.3" and "0.30", "1 mm" and "0.001 m" are one run
+        texts.setdefault(convert_value(one, field_at(name)), one)
+    return name, list(texts.values())
 
 
 def _run_options(

@@ -17,10 +17,16 @@ from fractions import Fraction
 
 import numpy as np
 
+from ..util.progress import Progress, without_progress
 from .zmass import MassOnFoundation, Motion, ellipse, march, pulsating_load
 
+# reason of a march that ends in a period that repeats
+PERIODIC = "periodic"
 # difference of two cycles, over the largest velocity and force, that is none
 SAME_CYCLE = 1e-5
+# relative change of (velocity, force) between two periods up to which the last one has what a
+# steady one has to a percent, where friction damps what is left
+NEARLY_PERIODIC = 1e-3
 # difference of the squared axes of a path, over their sum, that is none
 ROUND_PATH = 1e-12
 
@@ -79,6 +85,16 @@ class Steady:
         """(s, 2) displacement of the foundation relative to the mass, Eq. 31 [m]."""
         return self.base - self.motion.position[:, :2]
 
+    @property
+    def slips(self) -> bool:
+        """Some of the footprint slips: without it nothing damps the motion from the start."""
+        return bool(self.motion.slip.any())
+
+    @property
+    def is_known(self) -> bool:
+        """The period tells amplitude, loops and drift of the steady motion."""
+        return self.reason == PERIODIC or (self.slips and self.residual <= NEARLY_PERIODIC)
+
 
 def steady(
     body: MassOnFoundation,
@@ -86,6 +102,7 @@ def steady(
     steps: int = 2000,
     most: int = 200,
     tolerance: float = 1e-7,
+    progress: Progress = without_progress,
 ) -> Steady:
     """March until velocity and force repeat over the common period of foundation and load.
 
@@ -93,6 +110,7 @@ def steady(
         steps: time steps in one cycle of the foundation.
         most: largest number of common periods; the result then says "not periodic".
         tolerance: accepted relative change of (velocity, force) between two periods.
+        progress: wraps the loop over periods.
     """
     q = drive.ratio.denominator
     dt = 1 / (drive.frequency * steps)
@@ -104,18 +122,21 @@ def steady(
     start = None
     last = None
     residual = np.inf
+    label = f"motion, load at {beat:g} Hz"
     period = 0
-    while residual >= tolerance and period < most:
+    for _ in progress(range(most), label):
         period += 1
         motion = march(body, base, load, dt, start, drive.pull)
         residual = _relative_change(motion, last)
         start = (motion.position[-1], motion.velocity[-1], motion.springs)
         last = motion
-    reason = (
-        "periodic"
-        if residual < tolerance
-        else f"not periodic after {most} periods, change {residual:.1e}"
-    )
+        if residual < tolerance:
+            break
+    reason = PERIODIC
+    if residual >= tolerance:
+        reason = f"not periodic after {most} periods, change {residual:.1e}"
+        if not motion.slip.any():
+            reason += ": the mass never slips, so that nothing damps its motion from the start"
     cycles = _smallest_period(motion, steps, q)
     drift = motion.velocity.mean(axis=0)
     axis = main_axis(drive.amplitude, drive.phase)

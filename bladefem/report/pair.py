@@ -14,6 +14,7 @@ import pandas as pd
 from bladefem.io.stage_cache import on_root, write_results
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump_scene
+from bladefem.scene.warnings import implausible_values
 from bladefem.study.kinds.contact_pairs import (
     COMPARED_RADIUS_SHARE,
     PairState,
@@ -22,6 +23,7 @@ from bladefem.study.kinds.contact_pairs import (
 )
 from bladefem.study.kinds.hertz import hertz_pressure
 from bladefem.study.kinds.punch import johnson_pressure
+from bladefem.util.message import warning
 from bladefem.util.progress import Progress, without_progress
 from bladefem.view import contact, indentation, mesh
 from geometry.mesh import Mesh
@@ -60,7 +62,8 @@ def report_pair(
     start = perf_counter()
     found, states = solve_pair(scene, folder, comm)
     timings = {"mesh and pressure": perf_counter() - start}
-    result = PairRun(Path(folder), found, states, timings, _messages(scene, states))
+    messages = [*map(warning, implausible_values(scene)), *_messages(scene, states)]
+    result = PairRun(Path(folder), found, states, timings, messages)
     start = perf_counter()
     on_root(comm, lambda: _write(scene, result))
     timings["pictures and report"] = perf_counter() - start

@@ -12,11 +12,12 @@ from time import perf_counter
 import numpy as np
 import pandas as pd
 
-from bladefem.damper.loops import FoundationMotion, Steady, spectrum
+from bladefem.damper.loops import PERIODIC, FoundationMotion, Steady, spectrum
 from bladefem.damper.zmass import MassOnFoundation
 from bladefem.io.stage_cache import on_root, write_results, write_table
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import dump_scene
+from bladefem.scene.warnings import implausible_values
 from bladefem.study.kinds.zmass import (
     Pressed,
     mass_on_foundation,
@@ -24,12 +25,13 @@ from bladefem.study.kinds.zmass import (
     press_mass,
     steady_motions,
 )
+from bladefem.util.message import warning
 from bladefem.util.progress import Progress, without_progress
 from bladefem.view import contact, mesh, paper
 
 from ..util.communicator import Communicator
 from .datasets import resultants, table_dataset
-from .headlines import Headline
+from .headlines import NOT_DETERMINED, Headline
 from .tables import units_of, write_tables
 from .write import Page, write_report
 
@@ -62,9 +64,10 @@ def report_zmass(
     pressed = press_mass(scene, folder, comm)
     body = mass_on_foundation(scene, pressed.seat)
     pressure = perf_counter()
-    found = on_root(comm, lambda: list(steady_motions(scene, body)))
+    found = on_root(comm, lambda: list(steady_motions(scene, body, progress=progress)))
     timings = {"pressure": pressure - start, "motion": perf_counter() - pressure}
-    messages = [f"ratio {d.ratio}: {s.reason}" for d, s in found if s.reason != "periodic"]
+    messages: list[str] = [*map(warning, implausible_values(scene))]
+    messages += [warning(f"ratio {d.ratio}: {s.reason}") for d, s in found if s.reason != PERIODIC]
     result = MassRun(Path(folder), pressed, body, found, timings, messages)
     on_root(comm, lambda: _write(scene, result))
     return result
@@ -72,13 +75,16 @@ def report_zmass(
 
 def motion_table(found: Sequence[tuple[FoundationMotion, Steady]]) -> pd.DataFrame:
     """One row a frequency ratio: loops, drift [m/s], turning speed [rad/s], amplitude at the
-    foundation's frequency.
+    foundation's frequency; drift, turning and amplitude NaN where the march does not tell them.
     """
     rows = []
     for drive, result in found:
         frequency, lines = spectrum(result)
         main = lines[np.argmin(abs(frequency - drive.frequency)), -1]
         drift = known_drift(result)
+        turning = float(np.abs(result.motion.velocity[:, 2]).max())
+        if not result.is_known:
+            drift, turning, main = np.full(3, np.nan), np.nan, np.nan
         rows.append(
             {
                 "ratio": str(drive.ratio),
@@ -88,9 +94,9 @@ def motion_table(found: Sequence[tuple[FoundationMotion, Steady]]) -> pd.DataFra
                 "drift x [m/s]": drift[0],
                 "drift y [m/s]": drift[1],
                 "turning, mean [rad/s]": drift[2],
-                "turning, largest [rad/s]": float(np.abs(result.motion.velocity[:, 2]).max()),
+                "turning, largest [rad/s]": turning,
                 "amplitude": main,
-                "periodic": result.reason == "periodic",
+                "periodic": result.reason == PERIODIC,
             }
         )
     return pd.DataFrame(rows)
@@ -107,17 +113,22 @@ def motion_headlines(found: Sequence[tuple[FoundationMotion, Steady]]) -> list[H
     """The amplitude under each frequency of the load, and how far the mass walks."""
     numbers = []
     for (drive, result), (_, row) in zip(found, motion_table(found).iterrows(), strict=True):
+        what = f"amplitude of the mass, load at {row['load frequency [Hz]']:g} Hz"
+        where = f"at the foundation's {drive.frequency:g} Hz"
+        if not result.is_known:
+            numbers.append(Headline(what, NOT_DETERMINED, result.reason, where))
+            continue
         walk = float(np.hypot(row["drift x [m/s]"], row["drift y [m/s]"]))
         walks = f"walks {1e3 * walk:.4g} mm/s" if walk else "does not walk"
         loops = "1 loop" if result.loops == 1 else f"{result.loops} loops"
         numbers.append(
             Headline(
-                f"amplitude of the mass, load at {row['load frequency [Hz]']:g} Hz",
+                what,
                 f"{1e6 * row['amplitude']:.4g} µm",
                 f"{result.reason}, to {result.residual:.0e} of velocities and forces"
                 if row["periodic"]
                 else result.reason,
-                f"at the foundation's {drive.frequency:g} Hz; {loops}, {walks}",
+                f"{where}; {loops}, {walks}",
             )
         )
     return numbers

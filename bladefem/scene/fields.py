@@ -252,3 +252,14 @@ def _forgotten_unit(written: object, field: Field) -> str:
 def _similar_words(word: str, known: Any) -> str:
     near = suggestion(word, known)
     return near if "did you mean" in near else ""
+
+
+def display_value(value: Any, field: Field) -> str:
+    """A value as people read it, with its unit; "auto" for None."""
+    if value is None:
+        return "auto"
+    if isinstance(value, tuple):
+        return ", ".join(display_value(v, field) for v in value)
+    if isinstance(value, float):
+        return show(value, field.meta.get("unit") or "1")
+    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError, missing_file
 from ..util.arrays import IntegerArray, RealArray
+from ..util.csv_text import csv_lines
 from .units import parse
 
 PLACE_COLUMNS = {"x": "m", "y": "m", "z": "m", "T": "K"}
@@ -49,10 +50,7 @@ def read_temperatures(file: str) -> GivenTemperatures:
 
 @lru_cache(maxsize=4)
 def _read(file: str, _: float) -> GivenTemperatures:
-    try:
-        lines = Path(file).read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: cannot be read as a CSV file ({error})") from None
+    lines = csv_lines(file, file)
     rows = [row for row in csv.reader(lines) if any(cell.strip() for cell in row)]
     if len(rows) < 2:
         raise InputError(

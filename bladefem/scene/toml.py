@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, NamedTuple, get_type_hints
 
 from ..errors import InputError, suggestion
-from .fields import Field, convert_value, each_field, field_at, value_at
+from .fields import Field, convert_value, display_value, each_field, field_at, value_at
 from .kinds import KINDS, kind_named
 from .other_blades import whole_entry
 from .tables import Scene
-from .units import shortened, show, show_exactly
+from .units import shortened, show_exactly
 from .validate import validate
 
 # the scene inside the folder of a run
@@ -180,7 +180,7 @@ def resolved_rows(scene: Scene, given: Iterable[str] | None = None) -> list[Row]
         value = value_at(scene, field.name)
         default = value == field.default if given is None else field.name not in given
         rows.append(
-            Row(field.name, _display_value(value, field), default, field.meta.get("help", ""))
+            Row(field.name, display_value(value, field), default, field.meta.get("help", ""))
         )
     return rows
 
@@ -287,16 +287,6 @@ def _replace_field(
 def _used_fields(scene: Scene) -> Iterable[Field]:
     kind = kind_named(scene.kind)
     return (f for f in each_field() if "." not in f.name or kind.reads(f.name))
-
-
-def _display_value(value: Any, field: Field) -> str:
-    if value is None:
-        return "auto"
-    if isinstance(value, tuple):
-        return ", ".join(_display_value(v, field) for v in value)
-    if isinstance(value, float):
-        return show(value, field.meta.get("unit") or "1")
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _toml_value(value: Any, field: Field) -> str:

@@ -160,6 +160,23 @@ def refuse_response(scene: Scene) -> None:
         )
 
 
+def refuse_bladeless(name: str) -> None:
+    """Modes and responses need a blade.
+
+    Args:
+        name: of a kind of scene.
+
+    Raises:
+        InputError: it has none; the sentence says what commands do with it.
+    """
+    kind = kind_named(name)
+    if not kind.has_blade:
+        raise InputError(
+            f"kind '{name}' has no blade to vibrate: 'bladefem run' computes its {kind.result}, "
+            "'bladefem mesh' draws it"
+        )
+
+
 def refuse_given_mesh(scene: Scene) -> None:
     """A study of meshes needs a scene that is meshed here.
 

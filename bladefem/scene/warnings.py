@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from .fields import value_at
+from .fields import display_value, field_at, value_at
 from .kinds import kind_named
 from .part_materials import part_materials
 from .tables import Material, Scene
@@ -25,7 +25,7 @@ def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_doubtful_materials(scene), *_doubtful_masses(scene), *_doubtful_mesh(scene)]
     said += [*_unused_stiffnesses(scene), *_unused_solver_fields(scene), *_unused_phase(scene)]
-    said += _unused_diameters(scene)
+    said += [*_unused_diameters(scene), *_unread_fields(scene)]
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
@@ -118,6 +118,18 @@ def _unused_diameters(scene: Scene) -> Iterator[str]:
             f"model.nodal_diameters = {', '.join(map(str, listed))} is not used: this scene has a "
             "single blade, no wheel"
         )
+
+
+def _unread_fields(scene: Scene) -> Iterator[str]:
+    """What this kind's tables have and it does not read."""
+    for name in kind_named(scene.kind).unread(scene):
+        field = field_at(name)
+        value = value_at(scene, name)
+        if value != field.default:
+            yield (
+                f"{name} = {display_value(value, field)} is not used: it changes nothing in a "
+                f"scene of kind '{scene.kind}' such as this"
+            )
 
 
 def _doubtful_speed(scene: Scene) -> Iterator[str]:

@@ -15,6 +15,7 @@ from ..scene.toml import vary
 from ..scene.units import parse, show
 from ..util.arrays import RealArray
 from ..util.communicator import Communicator
+from ..util.csv_text import csv_lines
 from ..util.progress import Progress, without_progress
 from .adaptive.settings import Settings
 from .contact_identification import CONTACT_PARAMETERS, ContactFit, MeasuredLevel, fit_contact
@@ -170,7 +171,7 @@ def read_readings(path: str | Path, scene: Scene) -> Readings:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"--measured {path}: {missing_file(path)}")
-    rows = [line.split("#")[0].strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    rows = csv_lines(path, f"--measured {path}")
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
     if len(cells) < 2:
         raise InputError(f"--measured {path}: expected a row of names and readings")

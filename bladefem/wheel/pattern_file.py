@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import InputError, close_word, missing_file
 from ..util.arrays import RealArray
+from ..util.csv_text import csv_lines
 
 # what a column deviates in, by a word of its name; the first where none is said
 FREQUENCY = "frequency"
@@ -103,8 +104,7 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"mistuning.pattern = '{path}': {missing_file(path)}")
-    text = path.read_text(encoding="utf-8").splitlines()
-    rows = [line.split("#")[0].strip() for line in text]
+    rows = csv_lines(path, f"pattern file {path.name}")
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
     if len(cells) < 2:
         raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")

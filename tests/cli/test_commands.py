@@ -392,6 +392,21 @@ def test_study_runs_each_value_in_its_own_folder(pipeline, tmp_path, capsys):
     assert "| 30 deg | 812.4 | 80 | 50 | 830 | 20 |" in (tmp_path / "study.md").read_text()
 
 
+def test_a_study_runs_a_value_written_twice_once(pipeline, tmp_path):
+    command = ["study", WEDGE, "-o", str(tmp_path), "--vary", "contact.mu=0.3, 0.30, 3e-1, 0.2"]
+    assert main(command) == 0
+    assert [scene.contact.mu for scene, *_ in pipeline.calls] == [0.3, 0.2]
+
+
+def test_a_study_names_the_kind_that_has_no_blade(pipeline, tmp_path, capsys):
+    """It complained of study.influences, which it sets itself."""
+    folder = tmp_path / "run"
+    command = ["study", "scenes/hertz.toml", "-o", str(folder), "--vary", "hertz.radius=40, 50 mm"]
+    assert main(command) == 2
+    assert "kind 'hertz' has no blade to vibrate" in capsys.readouterr().err
+    assert not folder.exists()
+
+
 def test_a_study_leaves_influences_out_unless_they_are_asked_for(pipeline, tmp_path):
     command = ["study", WEDGE, "-o", str(tmp_path), "--vary", "damper.angle=30, 45 deg"]
     assert main(command) == 0

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from bladefem.cli.main import main
-from bladefem.damper.loops import FoundationMotion, main_axis, steady
+from bladefem.damper.loops import FoundationMotion, main_axis, spectrum, steady
 from bladefem.damper.zmass import Footprint, MassOnFoundation
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
-from bladefem.report.zmass import motion_table
+from bladefem.report.zmass import motion_headlines, motion_table
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.kinds.zmass import (
     cluster_nodes,
@@ -108,6 +108,37 @@ def test_a_circle_has_x_as_its_axis():
     assert list(main_axis((0.005, 0.005), np.pi / 2)) == [1, 0]
     assert list(main_axis((0.0, 0.005), np.pi / 2)) == [0, 1]
     assert main_axis((1.0, 1.0), np.pi) == pytest.approx(np.array([1, -1]) / np.sqrt(2))
+
+
+def test_a_mass_that_never_slips_has_no_amplitude_but_the_linear_one():
+    """What it does from rest swings on at its own frequency for ever: the line at the foundation's
+    frequency in one cycle is not the steady 1 / (1 - (w / w0)^2) of the motion.
+    """
+    body = MassOnFoundation(
+        mass=1.0, kt=1.0e6, mu=10.0, footprint=Footprint(np.zeros((1, 2)), np.ones(1))
+    )
+    drive = FoundationMotion(Fraction(0), frequency=100.0, amplitude=(1e-6, 0.0))
+    result = steady(body, drive, 200)
+    linear = 1e-6 / (1 - (2 * np.pi * 100) ** 2 / 1e6)
+    marched = spectrum(result)[1][0, -1]
+    assert abs(marched / linear - 1) > 0.05
+    (line,) = motion_headlines([(drive, result)])
+    assert line.value == "not determined" and "never slips" in line.uncertainty
+    assert np.isnan(motion_table([(drive, result)])["amplitude"][0])
+
+
+def test_the_march_shows_its_periods():
+    """Stiff contacts take minutes."""
+    seen = []
+
+    def watch(items, label):
+        for item in items:
+            seen.append((label, item))
+            yield item
+
+    drive = FoundationMotion(Fraction(0))
+    result = steady(MassOnFoundation(), drive, 500, progress=watch)
+    assert len(seen) == result.periods and seen[0][0] == "motion, load at 0 Hz"
 
 
 def test_steps_follow_the_stuck_mass_in_slow_motions(pressed):

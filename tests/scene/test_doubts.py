@@ -103,3 +103,37 @@ def test_nodal_diameters_of_a_single_blade_are_not_used():
         "model.nodal_diameters = 0, 3 is not used: this scene has a single blade, no wheel"
     ]
     assert implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", given)) == []
+
+
+@pytest.mark.parametrize(
+    ("scene", "override"),
+    [
+        ("hertz", "accuracy=0.1"),
+        ("hertz", "mesh.fillet_elements=9"),
+        ("hertz", "mesh.curved=false"),
+        ("hertz", "material.blade.expansion=1.2e-5 1/K"),
+        ("hertz", "material.damper.rho=4430 kg/m^3"),
+        ("punch", "mesh.fillet_elements=9"),
+        ("plane", "mesh.fillet_elements=9"),
+        ("plane", "mesh.algorithm=hxt"),
+        ("zmass", "mesh.curved=false"),
+        ("zmass", "contact.kn=1e6 N/m"),
+        ("zmass", "foundation.phase=10 deg"),
+    ],
+)
+def test_fields_that_a_kind_does_not_read_are_told(scene, override):
+    (said,) = implausible_values(load_scene(ROOT / "scenes" / f"{scene}.toml", [override]))
+    assert said.startswith(f"{override.partition('=')[0]} = ") and " is not used: " in said
+
+
+@pytest.mark.parametrize(
+    ("scene", "override"),
+    [
+        ("zmass", "foundation.amplitude=3 mm, 1 mm"),
+        ("zmass", "material.damper.rho=4430 kg/m^3"),
+        ("punch", "mesh.curved=false"),
+        ("hertz", "mesh.algorithm=hxt"),
+    ],
+)
+def test_fields_that_a_kind_reads_are_not(scene, override):
+    assert implausible_values(load_scene(ROOT / "scenes" / f"{scene}.toml", [override])) == []

@@ -122,6 +122,10 @@ COMMANDS = [
     (["modes", str(WEDGE), "--converge", "6 mm, 6 mm, 4 mm"], "a size is given twice"),
     (["look", str(WEDGE.parents[2] / "scenes" / "own_blade.step"), "--view", "x.doc"], "x.doc"),
     (
+        ["look", str(WEDGE.parents[2] / "scenes" / "own_blade.step"), "--view", "/proc/x.png"],
+        "--view /proc/x.png: folder /proc cannot be written",
+    ),
+    (
         ["look", str(WEDGE)],
         "wedge.toml: unknown kind of mesh; known are .bdf, .cdb, .inp, .med, .msh, .nas, .step",
     ),

@@ -241,6 +241,7 @@ def test_scene_of_one_harmonic_is_fitted_with_more(measured, tmp_path):
         ("frequency [Hz], amplitude [um]\n200\n", "expected 2 .*numbers in each row"),
         ("frequency [Hz], amplitude [um]\n200, -1\n", "expected 2 positive numbers"),
         ("frequency [Hz], amplitude [um]\n", "expected a row of names and readings"),
+        ("frequency [Hz];amplitude [um]\n200;1,5\n", "semicolons between its cells, expected comm"),
         ("frequency [Hz], amplitude [um]\n200, 1\n", "no column 'load .N.', expected it"),
     ],
 )
@@ -251,6 +252,18 @@ def test_bad_files_are_refused(text, message, tmp_path):
         read_readings(file, load_scene(MISTUNED, COARSE))
     with pytest.raises(InputError, match="there is no such file"):
         read_readings(tmp_path / "nowhere.csv", load_scene(MISTUNED, COARSE))
+
+
+def test_files_of_spreadsheets(tmp_path):
+    """A byte order mark is no part of a name; letters of another encoding end in one sentence."""
+    file = tmp_path / "readings.csv"
+    text = "frequency [Hz], amplitude [µm], load [N]\n200, 105, 80\n"
+    file.write_text(text, encoding="utf-8-sig")
+    read = read_readings(file, load_scene(MISTUNED, COARSE))
+    assert read.amplitude == pytest.approx([105e-6]) and list(read.load) == [80.0]
+    file.write_text(text, encoding="latin-1")
+    with pytest.raises(InputError, match="cannot be read as a CSV file in UTF-8"):
+        read_readings(file, load_scene(MISTUNED, COARSE))
 
 
 @pytest.mark.parametrize(

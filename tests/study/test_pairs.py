@@ -53,6 +53,9 @@ def test_loads_that_the_mesh_cannot_show_are_refused():
             InputError, match=r"study\.loads = .*made for 24\.6\d* N to 17\.9\d* kN"
         ):
             solve_pair(vary(HERTZ, study__loads=(load,)))
+    # elements of 0.8 mm, two of which are wider than the contact
+    with pytest.raises(InputError, match=r"study\.loads = .*made for 12\.\d* kN to 17\.9\d* kN"):
+        solve_pair(vary(HERTZ, mesh__contact_size=1e-4, mesh__scale=8.0))
     with pytest.raises(InputError, match="expected hertz or punch"):
         solve_pair(load_scene("scenes/plane.toml"))
 

@@ -21,6 +21,18 @@ BLADE_FACES = (
 )
 
 
+# what neither a drawing of straight edges nor one without fillets reads
+STRAIGHT_FIELDS = ("mesh.curved", "mesh.fillet_elements")
+# what a plane drawing does not read
+PLANE_FIELDS = (*STRAIGHT_FIELDS, "mesh.algorithm")
+
+
+def static_fields(*bodies: str) -> tuple[str, ...]:
+    """Fields of a material that isotropic bodies without motion and heat do not read."""
+    names = ("rho", "angles", "expansion", "expansion_axes")
+    return tuple(f"material.{body}.{name}" for body in bodies for name in names)
+
+
 def below_limit(
     name: str,
     value: float,

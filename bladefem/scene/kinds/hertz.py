@@ -5,7 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import at_most, below_limit, isotropic, one_of
+from .conditions import (
+    PLANE_FIELDS,
+    STRAIGHT_FIELDS,
+    at_most,
+    below_limit,
+    isotropic,
+    one_of,
+    static_fields,
+)
 from .record import PRESSED_TABLES, Kind, SceneCall
 
 
@@ -31,6 +39,12 @@ def thin_parts(scene: Scene) -> dict[str, float]:
     return {"hertz.half_width": scene.hertz.half_width}
 
 
+def unread(scene: Scene) -> tuple[str, ...]:
+    """Fields that change nothing."""
+    drawing = STRAIGHT_FIELDS if scene.hertz.dimension == 3 else PLANE_FIELDS
+    return ("accuracy", *drawing, *static_fields("blade", "damper"))
+
+
 KIND = Kind(
     name="hertz",
     tables=("hertz", *PRESSED_TABLES),
@@ -49,4 +63,5 @@ KIND = Kind(
     pictures={"hertz": SceneCall("bladefem.view.pairs:draw_hertz", ("hertz",))},
     conditions=conditions,
     thin_parts=thin_parts,
+    unread=unread,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import BLADE_FACES, at_most, below_limit
+from .conditions import BLADE_FACES, PLANE_FIELDS, at_most, below_limit
 from .record import ENGINE_TABLES, Kind, SceneCall
 
 
@@ -45,6 +45,11 @@ def face_names(_: Scene) -> tuple[str, ...]:
     return BLADE_FACES
 
 
+def unread(_: Scene) -> tuple[str, ...]:
+    """Fields that change nothing."""
+    return PLANE_FIELDS
+
+
 KIND = Kind(
     name="plane blades",
     tables=("plane", *ENGINE_TABLES),
@@ -62,4 +67,5 @@ KIND = Kind(
     pictures={"plane": SceneCall("bladefem.view.parts:draw_plane", ("plane",))},
     conditions=conditions,
     thin_parts=thin_parts,
+    unread=unread,
 )

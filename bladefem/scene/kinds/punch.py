@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import below_limit, isotropic, one_of
+from .conditions import PLANE_FIELDS, below_limit, isotropic, one_of, static_fields
 from .record import Kind, SceneCall
 
 
@@ -26,6 +26,12 @@ def thin_parts(scene: Scene) -> dict[str, float]:
     return {"punch.half_width": scene.punch.half_width}
 
 
+def unread(scene: Scene) -> tuple[str, ...]:
+    """Fields that change nothing; a round punch is drawn with curved elements."""
+    drawing = ("mesh.fillet_elements",) if scene.punch.dimension == 3 else PLANE_FIELDS
+    return ("accuracy", *drawing, *static_fields("blade"))
+
+
 KIND = Kind(
     name="punch",
     # the punch is rigid: it has no material
@@ -44,4 +50,5 @@ KIND = Kind(
     pictures={"punch": SceneCall("bladefem.view.pairs:draw_punch", ("punch",))},
     conditions=conditions,
     thin_parts=thin_parts,
+    unread=unread,
 )

@@ -32,6 +32,11 @@ def no_conditions(_: Scene) -> Iterator[str]:
     return iter(())
 
 
+def nothing_unread(_: Scene) -> tuple[str, ...]:
+    """All that its tables have is read."""
+    return ()
+
+
 def no_files(_: Scene) -> tuple[Path, ...]:
     """None."""
     return ()
@@ -121,6 +126,8 @@ class Kind:
     meshed_here: Callable[[Scene], bool] = always
     # conditions between the fields of a scene, one sentence for each that does not hold
     conditions: Callable[[Scene], Iterator[str]] = no_conditions
+    # fields of its tables that are allowed and change nothing: told where they are not the default
+    unread: Callable[[Scene], tuple[str, ...]] = nothing_unread
     # dimension name to length [m] of the parts that an element must fit into; None: unknown
     thin_parts: Callable[[Scene], dict[str, float]] | None = None
     # radius of name [m] of what moves fastest, for a check of the speed

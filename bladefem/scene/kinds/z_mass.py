@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import below_limit
+from .conditions import STRAIGHT_FIELDS, below_limit, static_fields
 from .record import PRESSED_TABLES, Kind, SceneCall
 
 
@@ -39,6 +39,17 @@ def thin_parts(scene: Scene) -> dict[str, float]:
     return {f"z_mass.{name}": getattr(scene.z_mass, name) for name in ("bar", "thickness")}
 
 
+def unread(scene: Scene) -> tuple[str, ...]:
+    """Fields that change nothing: only the mass moves, held along its faces."""
+    contact = scene.contact
+    known = contact.kt is not None or contact.kt_area is not None
+    normal = ("contact.kn", "contact.kn_area") if known else ()
+    phase = () if all(scene.foundation.amplitude) else ("foundation.phase",)
+    moves = "material.damper.rho"
+    still = [name for name in static_fields("blade", "damper") if name != moves]
+    return ("accuracy", *STRAIGHT_FIELDS, *normal, *phase, *still)
+
+
 KIND = Kind(
     name="z mass",
     tables=("z_mass", "foundation", "contact", *PRESSED_TABLES),
@@ -54,4 +65,5 @@ KIND = Kind(
     pictures={"z_mass": SceneCall("bladefem.view.parts:draw_z_mass", ("z_mass",))},
     conditions=conditions,
     thin_parts=thin_parts,
+    unread=unread,
 )

@@ -155,7 +155,7 @@ def check_loads(scene: Scene) -> tuple[float, ...]:
 def _check_load(scene: Scene, load: float) -> None:
     """Its contact must fit the mesh."""
     expected = scene.hertz.contact_radius
-    fine = scene.mesh.contact_size or expected / 10
+    fine = scene.mesh.scale * (scene.mesh.contact_size or expected / 10)
     low, high = (
         hertz_load(scene, a) for a in (MIN_ELEMENTS_PER_RADIUS * fine, MAX_RADIUS_RATIO * expected)
     )

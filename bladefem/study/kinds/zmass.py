@@ -32,6 +32,7 @@ from ...io.stage_cache import cached_stage
 from ...scene.tables import Scene
 from ...scene.units import show
 from ...util.communicator import Communicator
+from ...util.progress import Progress, without_progress
 from ..pipeline.scene_mesh import build_mesh
 from ..pipeline.stage_inputs import stage_key
 
@@ -131,12 +132,14 @@ def steady_motions(
     scene: Scene,
     body: MassOnFoundation,
     steps: int = 2000,
+    progress: Progress = without_progress,
 ) -> Iterator[tuple[FoundationMotion, Steady]]:
     """The steady motion for each frequency ratio of the scene, to 1e-6: an odd footprint keeps
     turning slowly.
 
     Args:
         steps: time steps in one cycle of the foundation; more where the stuck mass swings faster.
+        progress: wraps the periods of each march.
 
     Raises:
         InputError: a contact too stiff to be followed through such a slow cycle.
@@ -151,7 +154,7 @@ def steady_motions(
             f"at most {MAX_STEPS}: a higher frequency or a smaller contact.kt"
         )
     for drive in drives:
-        yield drive, steady(body, drive, steps, tolerance=1e-6)
+        yield drive, steady(body, drive, steps, tolerance=1e-6, progress=progress)
 
 
 def mean_load(scene: Scene) -> float:

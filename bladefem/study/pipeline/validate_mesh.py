@@ -10,8 +10,8 @@ from ...contact.face_profile import seat_gap
 from ...data import Patch
 from ...errors import InputError, suggestion
 from ...hbm.model import Damping
-from ...scene.kinds import kind_named
 from ...scene.tables import Scene
+from ...scene.validate import refuse_bladeless
 from .damper_contact import contact_patches
 from .ports import named_nodes
 
@@ -88,12 +88,7 @@ def _all_told(looks: Sequence[Callable[[], object]]) -> None:
 
 def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Modes and responses need a blade, and a blade needs its clamp."""
-    kind = kind_named(scene.kind)
-    if not kind.has_blade:
-        raise InputError(
-            f"kind '{scene.kind}' has no blade to vibrate: 'bladefem run' computes its "
-            f"{kind.result}, 'bladefem mesh' draws it"
-        )
+    refuse_bladeless(scene.kind)
     clamp = scene.support.clamp
     names = [*mesh.faces, *mesh.nodes]
     if clamp and clamp not in names:
