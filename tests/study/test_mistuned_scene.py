@@ -562,31 +562,15 @@ def test_the_reported_peak_has_dampers_that_walk(tmp_path):
     assert table["highest_amplitude_held"][0] == free.held < table["highest_amplitude"][0]
 
 
-# of the wheel with a narrow blade: half of the shipped one, as close to each other; among twelve
-# blades a narrow one moves most where the wheel does
-HALF_WHEEL = 18
-
-
 @pytest.fixture(scope="module")
 def narrow_blade(tmp_path_factory):
-    """A run with one blade of another shape that is not the highest."""
-    folder = tmp_path_factory.mktemp("narrow")
-    rows = MISTUNED.with_name("mistuned_pattern.csv").read_text("utf-8").splitlines()
-    # a comment and the names of columns come first
-    (folder / "pattern.csv").write_text("\n".join(rows[: HALF_WHEEL + 2]), "utf-8")
-    overrides = [
-        "mesh.scale=1.5",
-        f"disc.sectors={HALF_WHEEL}",
-        "disc.bore_radius=60 mm",
-        "disc.rim_radius=100 mm",
-        "excitation.engine_order=4",
-        f"mistuning.pattern={folder / 'pattern.csv'}",
-        "mistuning.blades=3: aerofoil.chord_tip = 38 mm",
-        "model.harmonics=1",
-        "model.samples=64",
-    ]
+    """A run with one blade of another shape that is not the highest, on all 36 blades: in a smaller
+    wheel it moves with its neighbours.
+    """
+    overrides = ["mistuning.blades=3: aerofoil.chord_tip = 38 mm"]
+    overrides += ["model.harmonics=1", "model.samples=64"]
     scene = load_scene(MISTUNED, [*COARSE_MISTUNED, *overrides])
-    return with_whole_wheel(pipeline.run(scene, folder))
+    return with_whole_wheel(pipeline.run(scene, tmp_path_factory.mktemp("narrow")))
 
 
 def test_a_blade_of_another_shape_is_judged_where_it_moves_most(narrow_blade):
@@ -602,8 +586,8 @@ def test_a_blade_of_another_shape_is_judged_where_it_moves_most(narrow_blade):
     (curve,) = run.response.curves
     sector = reduce_wheel(bodies, patches, 6, run.clamped, 3, run.modes, root=True)
     wheel = whole_wheel(scene, run.mesh, sector, patches, case, curve.settings)
-    deviation = scene_deviations(scene, HALF_WHEEL, 3).frequency
-    pattern = found.others.added(frequency_pattern(sector.families, deviation), HALF_WHEEL)
+    deviation = scene_deviations(scene, 36, 3).frequency
+    pattern = found.others.added(frequency_pattern(sector.families, deviation), 36)
     points = []
     # odd.frequency is within 0.2 % of the highest, below
     for omega in 2 * np.pi * odd.frequency * np.linspace(0.985, 1.015, 21):
@@ -618,7 +602,7 @@ def test_a_blade_of_another_shape_is_judged_where_it_moves_most(narrow_blade):
     _, readings = blade_readings(bodies, run.clamped, 3, run.modes, root=True)
     shapes = WheelShapes(bodies, patches, all_modes(bodies), readings)
     solved = SolvedWheel(shapes, wheel, pattern, case, top, curve.settings.points)
-    _, own = odd_blade_stress(run, solved, 2, other_blades(scene, HALF_WHEEL)[2])
+    _, own = odd_blade_stress(run, solved, 2, other_blades(scene, 36)[2])
     assert odd.own_stress.largest == pytest.approx(own.largest, rel=0.01)
     nodes = blade_nodes(own.mesh)
     goodman = own.field / (scene.fatigue.endurance * (1 - own.mean / scene.fatigue.ultimate))
@@ -631,11 +615,11 @@ def test_a_blade_of_another_shape_is_judged_where_it_moves_most(narrow_blade):
 
 
 def test_the_blade_that_uses_most_is_told(narrow_blade, tmp_path):
-    """Though another one moves more: the same run, with ten times the stress in the narrow blade."""
+    """Though another one moves more: the same run, with more stress in the narrow blade."""
     run = narrow_blade
     (found,) = run.wheel
     highest, odd = found.blades
-    own = replace(odd.own_stress, field=10 * odd.own_stress.field)
+    own = replace(odd.own_stress, field=3 * odd.own_stress.field)
     run = replace(run, wheel=[replace(found, blades=(highest, replace(odd, own_stress=own)))])
     ((first, second),) = wheel_utilisation(run)
     assert (first.blade.blade, second.blade.blade) == (2, found.peak.blade)
