@@ -25,7 +25,7 @@ def implausible_values(scene: Scene) -> list[str]:
     """One sentence for each value that is unlikely to be meant."""
     said = [*_doubtful_materials(scene), *_doubtful_masses(scene), *_doubtful_mesh(scene)]
     said += [*_unused_stiffnesses(scene), *_unused_solver_fields(scene), *_unused_phase(scene)]
-    said += [*_unused_diameters(scene), *_unread_fields(scene)]
+    said += [*_unused_diameters(scene), *_unread_fields(scene), *_unused_angles(scene)]
     if "operation" in kind_named(scene.kind).tables:
         said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
@@ -53,6 +53,18 @@ def _doubtful_material(name: str, material: Material) -> Iterator[str]:
             f"{name}.rho = {show(material.rho, 'kg/m^3')}: solids for machines have 500 to 25000 "
             "kg/m^3"
         )
+
+
+def _unused_angles(scene: Scene) -> Iterator[str]:
+    """A crystal's directions in a body that is alike in all of them."""
+    for name in ("blade", "damper"):
+        material = getattr(scene.material, name)
+        crystal = material.G is not None or material.orthotropic is not None
+        if any(material.angles) and not (crystal or material.table or material.expansion_axes):
+            yield (
+                f"material.{name}.angles is not used: without material.{name}.G or orthotropic the "
+                "body is alike in all directions"
+            )
 
 
 def _doubtful_masses(scene: Scene) -> Iterator[str]:

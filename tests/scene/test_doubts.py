@@ -116,6 +116,10 @@ def test_nodal_diameters_of_a_single_blade_are_not_used():
         ("punch", "mesh.fillet_elements=9"),
         ("plane", "mesh.fillet_elements=9"),
         ("plane", "mesh.algorithm=hxt"),
+        ("wedge", "root.pitch=10 mm"),
+        ("wedge", "root.neck=50 mm"),
+        ("wedge", "shroud.width=8 mm"),
+        ("wedge", "shroud.at=0.5"),
         ("zmass", "mesh.curved=false"),
         ("zmass", "contact.kn=1e6 N/m"),
         ("zmass", "foundation.phase=10 deg"),
@@ -124,6 +128,23 @@ def test_nodal_diameters_of_a_single_blade_are_not_used():
 def test_fields_that_a_kind_does_not_read_are_told(scene, override):
     (said,) = implausible_values(load_scene(ROOT / "scenes" / f"{scene}.toml", [override]))
     assert said.startswith(f"{override.partition('=')[0]} = ") and " is not used: " in said
+
+
+def test_parts_that_a_blade_has_are_read():
+    root = ["root.lobes=2", "root.pitch=7 mm", "root.taper=10 deg"]
+    shroud = ["shroud.thickness=3 mm", "shroud.gap=2 mm"]
+    for given in (root, shroud):
+        assert implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", given)) == []
+    one = load_scene(ROOT / "scenes" / "wedge.toml", ["root.lobes=1", "root.taper=10 deg"])
+    assert "root.taper = 10 deg is not used" in implausible_values(one)[0]
+
+
+def test_directions_of_what_is_alike_in_all_are_not_used():
+    turned = "material.blade.angles=10 deg, 0 deg, 0 deg"
+    (said,) = implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", [turned]))
+    assert said.startswith("material.blade.angles is not used")
+    crystal = ["material.blade.E=130 GPa", "material.blade.G=125 GPa", turned]
+    assert implausible_values(load_scene(ROOT / "scenes" / "wedge.toml", crystal)) == []
 
 
 @pytest.mark.parametrize(

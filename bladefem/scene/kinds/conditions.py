@@ -29,7 +29,7 @@ PLANE_FIELDS = (*STRAIGHT_FIELDS, "mesh.algorithm")
 
 def static_fields(*bodies: str) -> tuple[str, ...]:
     """Fields of a material that isotropic bodies without motion and heat do not read."""
-    names = ("rho", "angles", "expansion", "expansion_axes")
+    names = ("rho", "expansion", "expansion_axes")
     return tuple(f"material.{body}.{name}" for body in bodies for name in names)
 
 

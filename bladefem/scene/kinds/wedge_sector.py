@@ -101,6 +101,20 @@ def face_names(scene: Scene) -> tuple[str, ...]:
     return (*FACES, *fillet, *shroud)
 
 
+def unread(scene: Scene) -> tuple[str, ...]:
+    """Fields of parts that the blade does not have."""
+    names: tuple[str, ...] = () if scene.aerofoil.fillet != 0 else ("mesh.fillet_elements",)
+    if scene.root.lobes == 0:
+        parts = ("neck", "pitch", "bearing", "flank_angle", "taper", "clearance")
+        names += tuple(f"root.{part}" for part in parts)
+    elif scene.root.lobes == 1:
+        # deeper necks are narrower, and there is one
+        names += ("root.taper",)
+    if scene.shroud.thickness == 0:
+        names += tuple(f"shroud.{part}" for part in ("at", "length", "width", "gap"))
+    return names
+
+
 KIND = Kind(
     name="wedge sector",
     tables=(*SHAPE, *EXTRAS, "mistuning", "aerodynamics", *ENGINE_TABLES),
@@ -130,4 +144,5 @@ KIND = Kind(
     conditions=conditions,
     thin_parts=thin_parts,
     radii=outer_radii,
+    unread=unread,
 )
