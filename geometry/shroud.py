@@ -16,6 +16,9 @@ from .section import section_frame, section_outline
 
 # of the shroud's thickness: between the aerofoil's skin and an edge of the block
 MARGIN = 0.3
+# [m] thinner ones need elements as small all over the block, millions of them; a fifth of a
+# millimetre takes three times those of a half
+THINNEST = 3e-4
 # sections over the thickness that are looked at
 SECTIONS = 5
 
@@ -47,6 +50,11 @@ def shroud_block(
     """
     if shroud.thickness == 0:
         return None
+    if shroud.thickness < THINNEST:
+        raise InputError(
+            f"shroud.thickness = {show(shroud.thickness, 'm')}: expected 0 mm for none, or at "
+            f"least {show(THINNEST, 'm')}"
+        )
     at_tip = shroud.at == 1.0
     half = shroud.thickness / 2
     middle = aerofoil.span - half if at_tip else shroud.at * aerofoil.span

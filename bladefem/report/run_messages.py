@@ -106,7 +106,8 @@ def damper_spin_messages(result: SolvedRun) -> list[str]:
     if max(spin.softening, spin.softening_amplitude) > least:
         said.append(
             warning(
-                f"spin softening of the damper, which responses leave out, lowers the resonance of "
+                f"spin softening of the damper, which neither responses nor their estimated errors "
+                f"count, lowers the resonance of "
                 f"mode {mode} in full stick by some {percent(spin.softening)} of its frequency, "
                 f"and changes its amplitude with friction by some "
                 f"{percent(spin.softening_amplitude)}."

@@ -158,6 +158,7 @@ def test_left_out_sizes_cover_the_tip_and_reach_the_gap():
         ({"width": 0.07}, "shroud.width = 70 mm: expected at most 61.5"),
         ({"width": 0.02}, "shroud.width = 20 mm: expected at least 32.1.* to cover the tip"),
         ({"length": 0.02}, "shroud.length = 20 mm: expected at least 39.2.* to cover the tip"),
+        ({"thickness": 1e-5}, "shroud.thickness = 10 um: expected 0 mm for none, or at least"),
         ({"gap": 0.04}, "shroud.gap = 40 mm: leaves a block of"),
         ({"at": 0.97}, "shroud.at = 0.97: the block comes within its thickness of the tip"),
         ({"at": 0.5, "length": 0.06}, "shroud.length = 60 mm: expected at most"),

@@ -115,7 +115,7 @@ def test_nodal_diameters_of_a_single_blade_are_not_used():
         ("hertz", "material.damper.rho=4430 kg/m^3"),
         ("punch", "mesh.fillet_elements=9"),
         ("plane", "mesh.fillet_elements=9"),
-        ("plane", "mesh.algorithm=hxt"),
+        ("plane", "mesh.curved=false"),
         ("wedge", "root.pitch=10 mm"),
         ("wedge", "root.neck=50 mm"),
         ("wedge", "shroud.width=8 mm"),

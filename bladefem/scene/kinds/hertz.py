@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import (
-    PLANE_FIELDS,
     STRAIGHT_FIELDS,
     at_most,
     below_limit,
@@ -39,10 +38,9 @@ def thin_parts(scene: Scene) -> dict[str, float]:
     return {"hertz.half_width": scene.hertz.half_width}
 
 
-def unread(scene: Scene) -> tuple[str, ...]:
+def unread(_: Scene) -> tuple[str, ...]:
     """Fields that change nothing."""
-    drawing = STRAIGHT_FIELDS if scene.hertz.dimension == 3 else PLANE_FIELDS
-    return ("accuracy", *drawing, *static_fields("blade", "damper"))
+    return ("accuracy", *STRAIGHT_FIELDS, *static_fields("blade", "damper"))
 
 
 KIND = Kind(
