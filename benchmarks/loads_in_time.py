@@ -63,6 +63,8 @@ STRONG_PERIODS = 25
 HARMONICS = 7
 # step times the highest frequency of the stuck ring, beyond which explicit steps grow
 LARGEST_STEP = 2.0
+# stiffness over that at rest that counts at most: of a march that has grown without bound
+LARGEST_GROWTH = 1e6
 
 
 @dataclass(frozen=True)
@@ -111,6 +113,8 @@ class State:
     opens: np.ndarray
     # (blades,) friction work of each damper over the last period [J]
     work: np.ndarray
+    # (nodes,) largest stiffness of a layer that stiffens so far, over that at rest
+    growth: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -236,9 +240,14 @@ def ring_of(scene: Scene, reduced: Reduced, first: int) -> Ring:
     )
 
 
-def steps_needed(ring: Ring, layer: Layer, frequency: float) -> float:
-    """Steps a period below which explicit ones grow where all contacts stick."""
-    springs = np.column_stack([layer.kn] + [layer.kt] * layer.t0.shape[1]).ravel()
+def steps_needed(ring: Ring, layer: Layer, frequency: float, growth: np.ndarray) -> float:
+    """Steps a period below which explicit ones grow where all contacts stick.
+
+    Args:
+        growth: (nodes,) stiffness of the contacts over that at rest.
+    """
+    alike = np.column_stack([layer.kn] + [layer.kt] * layer.t0.shape[1])
+    springs = (growth[:, None] * alike).ravel()
     rows, blades = len(springs), ring.blades
     both = np.zeros((blades * rows, len(ring.omega) + blades * len(ring.damper_omega)))
     both[:, : len(ring.omega)] = ring.contact
@@ -256,8 +265,10 @@ def steps_needed(ring: Ring, layer: Layer, frequency: float) -> float:
 
 
 @njit
-def contact_forces(w, before, friction, layer, out, slips, opens, work):
-    """Forces (blades, rows) on the dampers beyond the preload; friction holds the sliders'."""
+def contact_forces(w, before, friction, layer, out, slips, opens, work, most):
+    """Forces (blades, rows) on the dampers beyond the preload; friction holds the sliders', and
+    most (nodes,) the largest stiffness over that at rest.
+    """
     kt, kn, mu, n0, decay, t0 = layer
     per = 1 + friction.shape[2]
     x = np.zeros(friction.shape[2])
@@ -269,6 +280,7 @@ def contact_forces(w, before, friction, layer, out, slips, opens, work):
             if np.isfinite(decay[k]):
                 growth = np.exp(w[b, i] / decay[k])
                 normal = n0[k] + kn[k] * decay[k] * (growth - 1)
+                most[k] = max(most[k], growth)
             if normal <= 0:
                 normal = 0.0
                 opens[b, k] += 1
@@ -297,7 +309,7 @@ def march_steps(ring, damper, contact, state, drive, out):
     """Semi-implicit Euler steps; out (steps, blades) becomes the readings."""
     moved, pushed, force, reading, stiffness, damping = ring
     shapes, damper_stiffness, damper_damping = damper
-    q, v, p, z, friction, before, slips, opens, work = state
+    q, v, p, z, friction, before, slips, opens, work, most = state
     omega, phase, dt, first = drive
     blades = p.shape[0]
     rows = shapes.shape[0]
@@ -313,7 +325,7 @@ def march_steps(ring, damper, contact, state, drive, out):
             # the first seat touches this blade, the other one the next
             w[b, :half] = u[b, :half] - d[b, :half]
             w[b, half:] = u[(b + 1) % blades, half:] - d[b, half:]
-        contact_forces(w, before, friction, contact, on_damper, slips, opens, work)
+        contact_forces(w, before, friction, contact, on_damper, slips, opens, work, most)
         for b in range(blades):
             on_blade[b, :half] = on_damper[b, :half]
             on_blade[b, half:] = on_damper[(b - 1) % blades, half:]
@@ -345,6 +357,7 @@ def start_at_rest(ring: Ring, layer: Layer) -> State:
         np.zeros((blades, nodes)),
         np.zeros((blades, nodes)),
         np.zeros(blades),
+        np.ones(nodes),
     )
 
 
@@ -378,6 +391,7 @@ def march(
             state.slips,
             state.opens,
             state.work,
+            state.growth,
         ),
         (omega, ring.phase, dt, float(ring.first)),
         out,
@@ -417,7 +431,7 @@ def kept(ring: Ring, layer: Layer, state: State, frequency: float, steps: int) -
             shares.append((float(state.work.mean()), slip, opens))
         # beats that die out leave the mean where it is
         now = np.array([np.mean(heights[-STEADY_PERIODS:]), np.max(heights[-STEADY_PERIODS:])])
-        if (abs(now / last - 1) < STEADY).all():
+        if (abs(now / last - 1) < STEADY).all() or not np.isfinite(now).all():
             break
         last = now
     few = np.array(heights[-STEADY_PERIODS:])
@@ -426,20 +440,41 @@ def kept(ring: Ring, layer: Layer, state: State, frequency: float, steps: int) -
 
 
 def passed_band(
-    ring: Ring, layer: Layer, frequency: float, around: Sequence[float], steps: int
+    ring: Ring,
+    layer: Layer,
+    state: State,
+    frequency: float,
+    around: Sequence[float],
+    steps: int,
 ) -> tuple[float, float]:
     """Frequency [Hz] and amplitude [m] of the highest motion over a band passed upwards, then
     downwards.
 
     Args:
+        state: at rest; changed.
         around: [%] of the frequency, below and above.
     """
     offsets = np.unique(np.r_[[-x for x in around], 0.0, around])
     places = frequency * (1 + np.r_[offsets, offsets[-2::-1]] / 100)
-    state = start_at_rest(ring, layer)
     heights = [kept(ring, layer, state, place, steps).high for place in places]
     top = int(np.argmax(heights))
     return float(places[top]), heights[top]
+
+
+def has_enough_steps(
+    ring: Ring, layer: Layer, state: State, load: float, frequency: float, steps: int
+) -> bool:
+    """Whether steps are short enough for the stiffness that the layer has reached; prints how many
+    it takes where they are not.
+    """
+    needed = steps_needed(ring, layer, frequency, np.minimum(state.growth, LARGEST_GROWTH))
+    if steps < needed:
+        print(
+            f"{load:g} N: {steps} steps a period, expected more than {needed:.0f} for a layer "
+            f"{state.growth.max():.3g} times as stiff as at rest",
+            flush=True,
+        )
+    return steps >= needed
 
 
 def print_load(
@@ -449,12 +484,10 @@ def print_load(
     begin = time.process_time()
     frequency = told["peak_frequency [Hz]"]
     amplitude = told["peak_amplitude [m]"]
-    needed = steps_needed(ring, layer, frequency)
-    if steps < needed:
-        print(f"{load:g} N: {steps} steps a period, expected more than {needed:.0f}")
+    state = start_at_rest(ring, layer)
+    if not has_enough_steps(ring, layer, state, load, frequency, steps):
         return
     words = "rest"
-    state = start_at_rest(ring, layer)
     found = kept(ring, layer, state, frequency, steps)
     if found.high < amplitude / 2:
         words = f"{STRONG:g} times the force"
@@ -462,9 +495,14 @@ def print_load(
         for _ in range(STRONG_PERIODS):
             march(ring, layer, state, frequency, steps, STRONG)
         found = kept(ring, layer, state, frequency, steps)
+    if not has_enough_steps(ring, layer, state, load, frequency, steps):
+        return
     beside = "-"
     if around:
-        place, height = passed_band(ring, layer, frequency, around, steps)
+        state = start_at_rest(ring, layer)
+        place, height = passed_band(ring, layer, state, frequency, around, steps)
+        if not has_enough_steps(ring, layer, state, load, frequency, steps):
+            return
         beside = f"{1e6 * height:.4g} at {place:.2f}"
     seconds = time.process_time() - begin
     print(

@@ -17,7 +17,14 @@ from numba import njit
 from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import node_steps
 from ..util.numba_options import INNER_KERNEL
-from .ring_contacts import NODE_OPERATIONS, displace, of_blade, subtract_moved, violation
+from .ring_contacts import (
+    NODE_OPERATIONS,
+    displace,
+    of_blade,
+    subtract_moved,
+    table_of_blade,
+    violation,
+)
 
 # most sweeps over the blades in a step, and new inverses of a blade
 BLADE_SWEEPS = 30
@@ -80,11 +87,12 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
         by_kept = bool(0)
         for b in range(blades):
             start = of_blade(before, b)
-            size = _violations(contacts.tables[b], start, load1[b], w[b], f[b], gap)
+            table = table_of_blade(contacts.table, b)
+            size = _violations(table, start, load1[b], w[b], f[b], gap)
             work[0] += 2.0 * m**2 + NODE_OPERATIONS * width
             if size <= limit:
                 continue
-            blade = contacts.tables[b], contacts.flexibility, start, load1[b], w[b], f[b]
+            blade = table, contacts.flexibility, start, load1[b], w[b], f[b]
             step, share = _shortened(*blade, kept.inverse[b], gap, 1)
             if share == 0.0 and renewals[b] < RENEWALS:
                 renewals[b] += 1

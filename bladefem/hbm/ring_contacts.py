@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import overload
 
 from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, KT, MU, subtract_block, subtract_node
@@ -28,8 +29,8 @@ class RingContacts(NamedTuple):
     the stiffness of a layer that stiffens (`bladefem.hbm.stiffening_layer`).
     """
 
-    # (r, 3, width) kt, kn, mu of each blade
-    tables: np.ndarray
+    # (3, width) kt, kn, mu of all blades alike; (r, 3, width) of each one where the layer stiffens
+    table: np.ndarray
     # (3 width, r 3 width) displacements that each force on a blade makes on itself and, one after
     # the other, on those after it
     columns: np.ndarray
@@ -67,12 +68,15 @@ def in_places(values: np.ndarray, places: np.ndarray, empty: float = 0.0) -> np.
     return np.ascontiguousarray(found)
 
 
-def ring_contacts(table: np.ndarray, flexibility: np.ndarray, preload: np.ndarray) -> RingContacts:
+def ring_contacts(
+    table: np.ndarray, flexibility: np.ndarray, preload: np.ndarray, stiffens: bool = False
+) -> RingContacts:
     """From what is counted node by node.
 
     Args:
         table: (n, 3) kt, kn, mu and preload: (n d,) of one blade.
         flexibility: (r n d, n d) of all blades by the forces on the first.
+        stiffens: each blade has a table of its own.
     """
     places = places_of_directions(len(table), len(preload) // len(table))
     m, width = len(preload), len(places) // 3
@@ -83,7 +87,7 @@ def ring_contacts(table: np.ndarray, flexibility: np.ndarray, preload: np.ndarra
     load = in_places(preload, places)
     own_table = in_places(table.T, places_of_nodes(len(table)))
     return RingContacts(
-        np.tile(own_table, (by_force.shape[1], 1, 1)),
+        np.tile(own_table, (by_force.shape[1], 1, 1)) if stiffens else own_table,
         columns.reshape(3 * width, -1).copy(),
         own.reshape(9, width).copy(),
         columns[:, 0].T.copy(),
@@ -102,6 +106,20 @@ def forces_of_nodes(forces: np.ndarray, nodes: int) -> np.ndarray:
     """(r n, 3) contact forces of the n nodes of each blade from those in places (r, 3, width)."""
     place = np.argsort(places_of_nodes(nodes))[-nodes:]
     return forces[:, :, place].swapaxes(1, 2).reshape(-1, 3)
+
+
+def table_of_blade(table: np.ndarray, b: int) -> np.ndarray:
+    """(3, width) constants of blade b from those of all alike or of each."""
+    return table if table.ndim == 2 else table[b]
+
+
+# chosen by the type and written into its callers: a view of an array, and handing it on, cost a
+# march of one node several percent
+@overload(table_of_blade, inline="always")
+def _table_of_blade(table, b):
+    if table.ndim == 2:
+        return lambda table, b: table
+    return lambda table, b: table[b]
 
 
 @njit(**INNER_KERNEL)

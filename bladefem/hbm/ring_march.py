@@ -38,7 +38,7 @@ from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
 from .step_forces import contact_forces
-from .stiffening_layer import ring_layer, stiffening_forces
+from .stiffening_layer import RingLayer, reached_springs, ring_layer, stiffening_forces
 
 # of the instants of a period
 INSTANTS_PER_PERIOD = 256
@@ -80,7 +80,8 @@ class RingMarch:
     periods: int
     # the forces of each step were found
     settled: bool
-    # steps are short enough for forces that are linear in them; else they are constant
+    # steps are short enough for forces that are linear in them, also where a layer was stiffest;
+    # where they are not at rest forces are constant in them
     resolved: bool
     # operations that all periods would have taken, roughly
     operations: float
@@ -132,7 +133,7 @@ def march_ring(
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
     y, forces = start.modal.copy(), forces_in_places(start.forces, r)
-    resolved, prepared = _prepared(model, start, S)
+    resolved, layer, prepared = _prepared(model, start, S)
     motion = np.empty((periods, S, r))
     friction_work = np.zeros(periods)
     work = np.zeros(1)
@@ -159,6 +160,9 @@ def march_ring(
             part_marched = motion[done - at_once : done].transpose(0, 2, 1)
             if _leapt(_system(model), start.drive.omega, envelope, part_marched, y, prepared):
                 leapt = done
+    if resolved and layer is not None and settled:
+        step = 2 * np.pi / start.drive.omega / S
+        resolved = step <= _longest_step(model, reached_springs(model, layer))
     marched = motion[leapt:done].transpose(0, 2, 1)
     end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
     spent = friction_work[leapt:done] / r
@@ -261,26 +265,30 @@ def driven_anew(model: ReducedModel, state: RingState, drive: Drive) -> RingStat
 
 def steps_are_resolved(model: ReducedModel, omega: float, instants: int) -> bool:
     """Whether steps with so many instants a period are short enough for forces that are linear in
-    them.
+    them, with the stiffness of the contacts at rest.
     """
+    longest = model.once("longest linear step", lambda: _longest_step(model, model.springs))
+    return 2 * np.pi / omega / instants <= longest
 
-    def longest() -> float:
-        system = _system(model)
-        springs = np.tile(model.springs.ravel(), system.blades)
-        bodies = (system.stiffness_matrix, system.contact.T, system.residual)
-        return longest_linear_step(*bodies, springs)
 
-    return 2 * np.pi / omega / instants <= model.once("longest linear step", longest)
+def _longest_step(model: ReducedModel, springs: np.ndarray) -> float:
+    """Longest step for forces that are linear in it [s] with springs (n, directions) [N/m]."""
+    system = _system(model)
+    bodies = (system.stiffness_matrix, system.contact.T, system.residual)
+    own = springs[:, : model.directions]
+    return longest_linear_step(*bodies, np.tile(own.ravel(), system.blades))
 
 
 def _system(model: ReducedModel) -> SectorModes:
     return model.once("ring", lambda: sector_modes(model))
 
 
-def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tuple[Any, ...]]:
-    """Whether steps at S instants a period are short enough for forces that are linear in them, and
-    what `_march` takes after state and forces: displacements, which it changes, and the steps of
-    the bodies.
+def _prepared(
+    model: ReducedModel, start: RingState, S: int
+) -> tuple[bool, RingLayer | None, tuple[Any, ...]]:
+    """Whether steps at S instants a period are short enough for forces that are linear in them, the
+    layer that stiffens, and what `_march` takes after state and forces: displacements, which it
+    changes, and the steps of the bodies.
     """
     system = _system(model)
     r, M = system.blades, len(system.stiffness)
@@ -294,6 +302,7 @@ def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tupl
     resolved = steps_are_resolved(model, omega, S)
     E, G0, G1 = linear_steps(system, dt, mean=not resolved)
     e = model.elements
+    layer = ring_layer(model)
     own = len(model.preload)
     extra = start.forces[:, : 1 + e.tangents].ravel() - np.tile(model.preload, r)
     w = free[0] + system.contact @ start.modal[:M] - system.residual @ extra
@@ -301,20 +310,28 @@ def _prepared(model: ReducedModel, start: RingState, S: int) -> tuple[bool, tupl
     places = places_of_directions(len(e.kt), model.directions)
     nodes = places_of_nodes(len(e.kt))
     probes = len(system.probe) // r
-    return resolved, (
-        in_places(w.reshape(r, own), places),
-        tuple(map(_step_terms, (E, -G0, -G1))),
-        ring_readings(system, places),
-        ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
-        ring_layer(model),
-        no_inverses(r, len(places)),
-        # a place without a node is open
-        in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
-        in_places(free.reshape(S, r, own), places),
+    return (
+        resolved,
+        layer,
         (
-            np.ascontiguousarray(system.probe[::probes]),
-            in_places(system.probe_residual[::probes].reshape(r, r, own), places).reshape(r, -1),
-            np.ascontiguousarray(free_probe),
+            in_places(w.reshape(r, own), places),
+            tuple(map(_step_terms, (E, -G0, -G1))),
+            ring_readings(system, places),
+            ring_contacts(
+                np.column_stack([e.kt, e.kn, e.mu]), F, model.preload, stiffens=layer is not None
+            ),
+            layer,
+            no_inverses(r, len(places)),
+            # a place without a node is open
+            in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
+            in_places(free.reshape(S, r, own), places),
+            (
+                np.ascontiguousarray(system.probe[::probes]),
+                in_places(system.probe_residual[::probes].reshape(r, r, own), places).reshape(
+                    r, -1
+                ),
+                np.ascontiguousarray(free_probe),
+            ),
         ),
     )
 

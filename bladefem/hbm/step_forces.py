@@ -19,7 +19,14 @@ from ..friction.simd.node_steps import KN, node_steps
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import by_blades, note_step
 from .linear.array_copy import copy_vector
-from .ring_contacts import NODE_OPERATIONS, displace, of_blade, subtract_moved, violation
+from .ring_contacts import (
+    NODE_OPERATIONS,
+    displace,
+    of_blade,
+    subtract_moved,
+    table_of_blade,
+    violation,
+)
 
 # most sweeps over the nodes in a step
 SWEEPS = 20
@@ -52,14 +59,16 @@ def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
         work: (1,) takes the operations.
     """
     before = f.copy(), w.copy(), load0
-    limit = SETTLED * largest_force(contacts, f)
+    limit = SETTLED * largest_force(contacts.preload, f)
     add_parabola(change.reshape(2, f.size), f.reshape(f.size))
     found = settled_forces(c, contacts, kept, w, f, before, load1, limit, work)
-    note_forces(contacts, f, before[0], change, extra)
+    note_forces(contacts.preload, f, before[0], change, extra)
     return found
 
 
-@njit(**INNER_KERNEL)
+# as part of its callers: arrays of a tuple that is handed on are counted anew at each call, which
+# took a fifth of a march of one node
+@njit(inline="always", **INNER_KERNEL)
 def settled_forces(c, contacts, kept, w, f, before, load1, limit, work):
     """The forces f, which are guesses before, until none changes by more than a limit, and their
     displacements w; False where they were not found. Other arguments as those of `contact_forces`.
@@ -84,17 +93,17 @@ def settled_forces(c, contacts, kept, w, f, before, load1, limit, work):
     return found
 
 
-@njit(**INNER_KERNEL)
-def largest_force(contacts, f):
-    """Of the preload and of forces f [N]."""
-    return max(_largest(contacts.preload), _largest(f.reshape(f.size)))
+@njit(inline="always", **INNER_KERNEL)
+def largest_force(preload, f):
+    """Of the preload (3 width,) and of forces f (r, 3, width) [N]."""
+    return max(_largest(preload), _largest(f.reshape(f.size)))
 
 
-@njit(**INNER_KERNEL)
-def note_forces(contacts, f, start, change, extra):
+@njit(inline="always", **INNER_KERNEL)
+def note_forces(preload, f, start, change, extra):
     """Extra forces and changes of a step from forces ``start`` to f."""
     for b in range(len(f)):
-        _less_preload(f[b].reshape(extra.shape[1]), contacts.preload, extra[b])
+        _less_preload(f[b].reshape(extra.shape[1]), preload, extra[b])
     _shift_changes(f.reshape(f.size), start.reshape(f.size), change.reshape(2, f.size))
 
 
@@ -146,13 +155,12 @@ def _by_blocks(c, contacts, w, f, before, load1, limit, work):
         largest_step = 0.0
         for b in range(blades):
             old = of_blade(before, b)
+            table = table_of_blade(contacts.table, b)
             for first in range(0, width, LANES_PER_VECTOR):
-                if _are_open(contacts.tables[b, KN], w[b], f[b], load1[b], first):
+                if _are_open(table[KN], w[b], f[b], load1[b], first):
                     continue
                 work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
-                node_steps(
-                    first, width, contacts.tables[b], contacts.own, *old, load1[b], w[b], f[b], step
-                )
+                node_steps(first, width, table, contacts.own, *old, load1[b], w[b], f[b], step)
                 largest_step = max(largest_step, _largest(step.reshape(step.size)))
                 subtract_moved(contacts.columns, b, first, step, 0, w, work)
         # by how much the next one would change a force, if it falls again as it did
@@ -249,9 +257,10 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
             w[b, k] = c[b, k] - _product(F[b * m + k], extra)
     total = 0.0
     for b in range(blades):
+        table = table_of_blade(contacts.table, b)
         for i in range(width):
             own, (b00, b10, b20, b11, b12, b22) = violation(
-                w[b], f[b], i, contacts.tables[b], of_blade(before, b), load1[b]
+                w[b], f[b], i, table, of_blade(before, b), load1[b]
             )
             slopes = ((b00, 0.0, 0.0), (b10, b11, b12), (b20, b12, b22))
             for a in range(3):

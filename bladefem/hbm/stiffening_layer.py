@@ -57,6 +57,8 @@ class RingLayer(NamedTuple):
     tangential: np.ndarray
     # (2, width) compliance across and along the faces that the bodies' flexibility has [m/N]
     series: np.ndarray
+    # largest normal force in a march of all blades [N], changed by its steps
+    reached: np.ndarray
 
 
 def ring_layer(model: ReducedModel) -> RingLayer | None:
@@ -89,7 +91,21 @@ def ring_layer(model: ReducedModel) -> RingLayer | None:
         in_places(closure, places),
         in_places(kt * doubling / (doubling + rest), places),
         in_places(np.ascontiguousarray(series.T), places),
+        in_places(rest, places),
     )
+
+
+def reached_springs(model: ReducedModel, layer: RingLayer) -> np.ndarray:
+    """(n, 3) normal and tangential stiffness of the contacts [N/m] at the largest forces that a
+    march had.
+    """
+    e = model.elements
+    places = places_of_nodes(len(e.kt))
+    springs = np.column_stack([e.kn, e.kt, e.kt])
+    for place in np.flatnonzero((places >= 0) & np.isfinite(layer.decay)):
+        kn, kt = _tangent_springs(layer, place, layer.reached[place])
+        springs[places[place]] = kn, kt, kt
+    return springs
 
 
 @njit(**KERNEL)
@@ -98,7 +114,7 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
     of the contacts become its tangents.
     """
     start = f.copy(), w.copy()
-    largest = largest_force(contacts, f)
+    largest = largest_force(contacts.preload, f)
     add_parabola(change.reshape(2, f.size), f.reshape(f.size))
     tangent_at = np.maximum(f[:, 0], 0.0)
     loads = load0.copy(), load1.copy()
@@ -111,7 +127,7 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
                 tangent_at[b],
                 start[0][b],
                 start[1][b],
-                contacts.tables[b],
+                contacts.table[b],
                 loads[0][b],
                 loads[1][b],
             )
@@ -124,7 +140,7 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
             settled = min(settled * LOOSER, OFF_THE_LAW)
             continue
         # an impact raises all forces far above those before
-        largest = max(largest, largest_force(contacts, f))
+        largest = max(largest, largest_force(contacts.preload, f))
         off = 0.0
         share = 1.0 if turn < DAMPED_FROM else 0.5
         for b in range(len(w)):
@@ -132,7 +148,10 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
         if off <= OFF_THE_LAW * largest:
             found = True
             break
-    note_forces(contacts, f, start[0], change, extra)
+    note_forces(contacts.preload, f, start[0], change, extra)
+    for b in range(len(f)):
+        for i in range(len(layer.reached)):
+            layer.reached[i] = max(layer.reached[i], f[b, 0, i])
     return found
 
 
@@ -149,19 +168,29 @@ def _take_tangents(layer, at, f_before, w_before, table, load0, load1):
             continue
         stiffness = (layer.doubling[i] + at[i]) / layer.decay[i]
         closure = layer.decay[i] * np.log1p(at[i] / layer.doubling[i])
-        across, along = layer.series[0, i], layer.series[1, i]
+        across = layer.series[0, i]
         # f = at + stiffness (closure at rest + w + across (f - rest) - closure)
-        share = 1.0 - stiffness * across
-        kn = stiffness / share
         moved = layer.closure[i] - across * layer.rest[i] - closure
-        load1[i] = (at[i] + stiffness * moved) / share
-        tangential = layer.tangential[i] * (1.0 + at[i] / layer.doubling[i])
+        load1[i] = (at[i] + stiffness * moved) / (1.0 - stiffness * across)
+        kn, kt = _tangent_springs(layer, i, at[i])
         table[KN, i] = kn
-        table[KT, i] = tangential / (1.0 - tangential * along)
+        table[KT, i] = kt
         normal = f_before[0, i]
         if normal <= 0.0:
             normal = min(load1[i] + kn * w_before[i], 0.0)
         load0[i] = normal - kn * w_before[i]
+
+
+@njit(**KERNEL)
+def _tangent_springs(layer, i, force):
+    """Normal and tangential stiffness of the element in place i at a normal force, less the
+    compliance that the bodies have.
+    """
+    growth = 1.0 + force / layer.doubling[i]
+    normal = growth * layer.doubling[i] / layer.decay[i]
+    tangential = growth * layer.tangential[i]
+    normal /= 1.0 - normal * layer.series[0, i]
+    return normal, tangential / (1.0 - tangential * layer.series[1, i])
 
 
 @njit(**INNER_KERNEL)

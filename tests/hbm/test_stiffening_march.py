@@ -1,15 +1,19 @@
 """Marches by steps of a layer that stiffens with its pressure, against a plain explicit march."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from models import bouncing
 
+from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.hbm.model import in_series
-from bladefem.hbm.ring_march import march_ring, state_of_solution
+from bladefem.hbm.model import ReducedModel, in_series
+from bladefem.hbm.ring_march import march_ring, state_of_solution, steps_are_resolved
 from bladefem.hbm.solve import solve
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.study.stability import resonance_in_time
 
 # over which the stiffness grows by e
 DECAY = np.array([0.1])
@@ -22,7 +26,7 @@ def heights(motion):
     return np.linalg.norm(lines, axis=-1)
 
 
-def marched_by_law(model, modal, omega, periods, steps=2000):
+def marched_by_law(model, modal, omega, periods, steps=2000, decay=DECAY[0]):
     """(periods, steps) first mass from modal displacements and velocities beyond those without
     contact forces, in semi-implicit Euler steps; the slider starts where friction is none.
     """
@@ -32,14 +36,14 @@ def marched_by_law(model, modal, omega, periods, steps=2000):
     push = push @ model.loads(1)[1]
     free = push / (body.omega**2 - omega**2 + 1j * omega * body.damping)
     q, v = modal.reshape(2, -1) + [free.real, (1j * omega * free).real]
-    touch = DECAY[0] * kn - n0
+    touch = decay * kn - n0
     friction, before = np.zeros(2), (U @ q)[1:]
     dt = 2 * np.pi / omega / steps
     seen = np.empty((periods, steps))
     for k in range(periods * steps):
         seen[k // steps, k % steps] = body.shapes[body.ports["probe"]][0] @ q
         w = U @ q
-        growth = np.exp(w[0] / DECAY[0])
+        growth = np.exp(w[0] / decay)
         normal = max((touch + n0) * growth - touch, 0.0)
         friction = friction + growth * kt * (w[1:] - before)
         friction *= min(1.0, mu * normal / max(np.hypot(*friction), 1e-300))
@@ -81,6 +85,49 @@ def test_a_march_follows_the_law_of_the_layer(omega, share):
     assert heights(found.motion[:, 0]) == pytest.approx(plain, rel=0.02)
     tangent = heights(march_ring(replace(model, decay=None), start, PERIODS, 512).motion[:, 0])
     assert abs(tangent / plain - 1).max() > 0.5
+
+
+# length over which the layer of a stop stiffens
+SHARP = 2e-2
+BOUNCES = 6
+
+
+@pytest.fixture(scope="module")
+def stop():
+    """A unit mass on a unit spring that bounces on a layer some hundred times as stiff in an impact
+    as at rest, and the amplitudes of its periods in 4000 plain steps each.
+    """
+    ports = {"contact": [0, 1, 2], "load": [0], "probe": [0]}
+    K = np.diag([1.0, 50.0, 50.0])
+    body = port_model_from_matrices(np.eye(3), K, ports, C=0.05 * np.diag([1.0, 7.0, 7.0]))
+    values = (1e-3, 1.01 * 0.05 / SHARP, 0.0, 0.05)
+    element = Elements(*(np.array([x]) for x in values), tangents=2)
+    model = ReducedModel((body,), element, {1: np.array([0.3])}, decay=np.array([SHARP]))
+    start = at_rest(model, 1.0)
+    plain = heights(marched_by_law(model, start.modal, 1.0, BOUNCES, 4000, SHARP))
+    return SimpleNamespace(model=model, start=start, plain=plain)
+
+
+def test_steps_are_resolved_by_the_stiffness_that_the_layer_reaches(stop):
+    """At rest 64 instants a period are enough; with 256 the mass gains from its impacts."""
+    few, enough = (march_ring(stop.model, stop.start, BOUNCES, n) for n in (256, 1024))
+    assert steps_are_resolved(stop.model, 1.0, 64)
+    assert not few.resolved
+    assert heights(few.motion[:, 0])[-1] > 2 * stop.plain[-1]
+    assert enough.resolved
+    assert heights(enough.motion[:, 0]) == pytest.approx(stop.plain, rel=0.02)
+
+
+def test_a_search_takes_steps_for_the_stiffness_that_the_layer_reaches(stop, monkeypatch):
+    """Or none, where these would be too many."""
+    work = resonance_in_time._Work()
+    found = resonance_in_time._march(stop.model, stop.start, BOUNCES, work)
+    assert found.resolved
+    assert work.final_instants == work.instants > resonance_in_time.INSTANTS_PER_PERIOD
+    assert heights(found.motion[:, 0]) == pytest.approx(stop.plain, rel=0.15)
+    monkeypatch.setattr(resonance_in_time, "MOST_INSTANTS", 256)
+    with pytest.raises(resonance_in_time._MarchFailedError):
+        resonance_in_time._march(stop.model, stop.start, BOUNCES, resonance_in_time._Work())
 
 
 def test_each_blade_of_a_wave_has_the_layer_of_its_own_instant():

@@ -66,6 +66,14 @@ def test_a_search_that_is_not_closed_in_says_so(folding):
     assert found.highest < 0.9 * folding.truth and found.error == np.inf
 
 
+def test_an_error_as_large_as_the_amplitude_is_unknown(folding, monkeypatch):
+    start = solve(folding.model, 360.0, 15, 512)
+    monkeypatch.setattr(module, "LARGEST_ERROR", 1e-3)
+    found = resonance_in_time(family_of(folding.model), SETTINGS, start)
+    assert found.highest == pytest.approx(folding.truth, rel=0.02)
+    assert found.error == np.inf
+
+
 def test_a_response_that_falls_smoothly_has_its_linear_peak():
     """A contact so far open that it never closes: the peak of one mass, force / (2 zeta k)."""
     model = rebounding(1.0, 1e3, 0.04)

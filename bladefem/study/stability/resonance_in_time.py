@@ -50,8 +50,15 @@ UNDERDRIVEN_PERIODS = 25
 # instants of a period of a climb, where steps of that length are short enough for the bodies on
 # their contacts; its end has INSTANTS_PER_PERIOD
 CLIMBING_INSTANTS = 128
+# with a layer that stiffens, most instants of a period: steps are halved until they are short
+# enough for the stiffness that it reaches, and the search is begun anew from what shorter ones keep
+# until twice as many instants change its end by less than a share
+MOST_INSTANTS = 2048
+LARGEST_STEP_CHANGE = 0.05
 # after which a motion is taken as it is
 MOST_PERIODS = 396
+# relative error from which nothing is known: the blade might as well stand still
+LARGEST_ERROR = 1.0
 # relative change that is none: of the ends of the band of amplitudes, from one part of a march to
 # the next, and on the way to the limit of the mean amplitude
 SETTLED_CHANGE = 5e-3
@@ -188,9 +195,16 @@ class _Work:
     # times MOST_OPERATIONS and MOST_OF_ONE_MARCH that it may take
     allowance: float = 1.0
     instants: int = CLIMBING_INSTANTS
+    # of the motion that is told
+    final_instants: int = INSTANTS_PER_PERIOD
     operations: float = 0.0
     periods: int = 0
     frequencies: set[float] = field(default_factory=set)
+
+    def shorten_steps(self, instants: int) -> None:
+        """March with so many instants a period at least from now on."""
+        self.instants = max(self.instants, instants)
+        self.final_instants = max(self.final_instants, instants)
 
     @property
     def exhausted(self) -> bool:
@@ -225,24 +239,18 @@ def resonance_in_time(
         if len(family_member(models, settings).model.springs) != len(model.springs):
             start = carried_motion(models, settings, motion, settings_here)
         work = _Work(1.0 if model.decay is None else MORE_WITH_LAW)
-        top = _highest(model, start, work)
-        above = top.best
-        top = replace(top, best=_settled(model, above.state, work, INSTANTS_PER_PERIOD))
-        if top.jump:
-            # the frequency of a jump hangs on the steps in time
-            work.instants = INSTANTS_PER_PERIOD
-            top = _refined(model, top, work)
-        error = _error(model, top, above, work)
+        top, error = _by_short_steps(model, start, work)
         best, finer, change = _with_more_points(models, settings_here, decay, top, work)
         finest = _marched_model(models, replace(settings_here, points=finer), decay)
         best = _calmed(finest, best, work)
     except (InputError, _MarchFailedError):
         return None
+    error += change
     return ResonanceInTime(
         best.omega / (2 * np.pi),
         best.lowest,
         best.highest,
-        error + change,
+        error if error < LARGEST_ERROR else float(np.inf),
         finer or _most_points(models, settings_here),
         len(work.frequencies),
         work.periods,
@@ -261,17 +269,52 @@ def _marched_model(models: Family, settings: Settings, decay: RealArray | None) 
     return replace(model, decay=decay[np.unique(groups, return_index=True)[1]])
 
 
-def _highest(model: ReducedModel, start: Solution, work: _Work) -> _Top:
+def _by_short_steps(model: ReducedModel, start: Solution, work: _Work) -> tuple[_Top, float]:
+    """The highest motion uphill of a start, and its estimated relative error but for that by the
+    contact points, by steps so short that half of them change it little.
+
+    How short they have to be hangs on how stiff the contacts become where they are pressed: a layer
+    that stiffens may be some hundred times stiffer in an impact than at rest.
+
+    Raises:
+        _MarchFailedError: it was not closed in, or no steps were short enough.
+    """
+    state = state_of_solution(model, start)
+    while True:
+        top = _highest(model, state, work)
+        above = top.best
+        top = replace(top, best=_settled(model, above.state, work, work.final_instants))
+        if top.jump:
+            # the frequency of a jump hangs on the steps in time
+            work.instants = work.final_instants
+            top = _refined(model, top, work)
+        best = top.best
+        if model.decay is None and best.resolved:
+            return top, _error(model, top, above, work)
+        instants = work.final_instants
+        finer = _settled(model, best.state, work, 2 * instants)
+        change = abs(finer.mean / best.mean - 1)
+        # no two periods are alike in a wide band, which the error contains as well
+        tolerated = max(LARGEST_STEP_CHANGE, _half_band(best))
+        if model.decay is None or change < tolerated:
+            return top, _error(model, top, above, work) + change
+        if 4 * instants > MOST_INSTANTS or work.exhausted:
+            raise _MarchFailedError
+        state = finer.state
+        work.shorten_steps(2 * instants)
+
+
+def _highest(model: ReducedModel, state: RingState, work: _Work) -> _Top:
     """The highest motion uphill of a start; driven hard once more where that has led far away.
 
     Raises:
         _MarchFailedError: it was not closed in.
     """
-    bend = bend_of_mode(model, start.omega)
+    omega = state.drive.omega
+    bend = bend_of_mode(model, omega)
     if bend <= 0:
         raise _MarchFailedError
-    state = state_of_solution(model, start)
-    here = _overdriven(model, state, start.omega, work)
+    here = _overdriven(model, state, omega, work)
     width = np.sqrt(2 / bend)
     top = _climbed(model, here, bend, work)
     if abs(top.best.omega - here.omega) * here.mean < width:
@@ -383,7 +426,8 @@ def _refined(model: ReducedModel, top: _Top, work: _Work, most: int = MOST_STEPS
 
 
 def _error(model: ReducedModel, top: _Top, above: _Settled, work: _Work) -> float:
-    """Estimated relative error of the highest amplitude, but for that by the contact points.
+    """Estimated relative error of the highest amplitude, but for those by the contact points and by
+    the steps in time.
 
     Args:
         above: what the climb ended on, with longer steps in time, on its way down.
@@ -399,11 +443,12 @@ def _error(model: ReducedModel, top: _Top, above: _Settled, work: _Work) -> floa
     changes = [abs(one.mean / best.mean - 1) for one in others if one.mean > JUMP_SHARE * best.mean]
     error = max([SETTLED_CHANGE, *changes])
     # single periods that are higher may come
-    error += (best.highest - best.lowest) / (2 * best.highest) + top.left + best.left
-    if not best.resolved:
-        finer = _settled(model, best.state, work, 2 * INSTANTS_PER_PERIOD)
-        error += abs(finer.mean / best.mean - 1)
-    return error
+    return error + _half_band(best) + top.left + best.left
+
+
+def _half_band(found: _Settled) -> float:
+    """Half width of the band of amplitudes, over its highest."""
+    return (found.highest - found.lowest) / (2 * found.highest)
 
 
 def _with_more_points(
@@ -420,7 +465,8 @@ def _with_more_points(
         return top.best, points, 0.0
     finer = MORE_POINTS * points if MORE_POINTS * points < most else None
     model = _marched_model(models, replace(settings, points=finer), decay)
-    work.instants = CLIMBING_INSTANTS
+    if decay is None:
+        work.instants = CLIMBING_INSTANTS
     best, neighbour = top.best, top.neighbour
     found = _moved(model, best, best.omega, work)
     if found.mean > JUMP_SHARE * best.mean:
@@ -458,7 +504,7 @@ def _calmed(model: ReducedModel, found: _Settled, work: _Work) -> _Settled:
     Raises:
         _MarchFailedError: the forces of a step were not found, or the march takes too long.
     """
-    if found.highest - found.lowest < 2 * WIDE_BAND * found.highest:
+    if _half_band(found) < WIDE_BAND:
         return found
     return _end_of(_march(model, found.state, CALMING_PERIODS, work))
 
@@ -507,24 +553,31 @@ def _march(
     instants: int | None = None,
     enough: Callable[[RealArray], bool] = never_enough,
 ) -> RingMarch:
-    """A march with the instants that were asked for, those of the search when None, or with
-    INSTANTS_PER_PERIOD where these are too few for the bodies on their contacts.
+    """A march with the instants that were asked for, those of the search when None, or with those
+    of the motion that is told where these are too few for the bodies on their contacts; with more
+    where a layer becomes too stiff for them.
 
     Raises:
         _MarchFailedError: the forces of a step were not found, or the march takes too long.
     """
     instants = instants or work.instants
     if not steps_are_resolved(model, state.drive.omega, instants):
-        instants = max(instants, INSTANTS_PER_PERIOD)
+        instants = max(instants, work.final_instants)
     leaps = enough is not never_enough
     most = work.allowance * MOST_OF_ONE_MARCH
-    march = march_ring(model, state, periods, instants, enough, most, leaps)
-    work.operations += march.operations * march.periods / periods
-    work.periods += march.periods
-    found = march.settled and bool(np.isfinite(march.motion).all())
-    if not found or march.operations > most:
-        raise _MarchFailedError
-    return march
+    while True:
+        march = march_ring(model, state, periods, instants, enough, most, leaps)
+        work.operations += march.operations * march.periods / periods
+        work.periods += march.periods
+        found = march.settled and bool(np.isfinite(march.motion).all())
+        if march.operations > most:
+            raise _MarchFailedError
+        if found and (model.decay is None or march.resolved):
+            return march
+        if model.decay is None or 2 * instants > MOST_INSTANTS:
+            raise _MarchFailedError
+        instants *= 2
+        work.shorten_steps(instants)
 
 
 def _has_settled(motion: RealArray) -> bool:
