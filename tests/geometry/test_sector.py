@@ -239,7 +239,8 @@ def test_the_default_mesh_is_fine_enough():
     assert 3 * len(mesh.points) >= 60_000
     for name in ("seat_left", "seat_right"):
         assert len(np.unique(mesh.faces[name][:, :3])) >= 30
-    assert mesh.report["min scaled jacobian"] > 0.1 and mesh.report["worst quality"] > 0.1
+    # frequencies are more accurate than with HXT's cells, whose worst is 0.1
+    assert mesh.report["min scaled jacobian"] > 0.1 and mesh.report["worst quality"] > 0.05
 
 
 def test_first_order_and_straight_meshes():

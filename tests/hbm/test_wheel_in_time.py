@@ -72,7 +72,9 @@ def test_balance_agrees_with_the_free_ring_in_time(wheel, load, harmonics):
     case = load_cases(scene, wheel.mesh, Seating(wheel.problem, maps))[0]
     model = joint_model(scene, wheel.mesh, wheel.reduced, wheel.patches, case, harmonics, "elastic")
     free = wheel.reduced.sector[9].omega[0]
-    curve = [solve(model, free * x, 3, 128) for x in np.linspace(1.03, 1.07, 5)]
+    # near the peak: on a flank under 640 N a quarter of the nodes never slip, and what the way there
+    # leaves in them moves the amplitude by 1 %
+    curve = [solve(model, free * x, 3, 128) for x in np.linspace(1.03, 1.07, 9)]
     highest = max((p for p in curve if p.converged), key=lambda p: abs(p.probe[1, 0]))
     # where every node slips the tangential forces turn fast: 15 harmonics are 0.4 % off
     top = solve(model, highest.omega, harmonics, 512, start=highest)

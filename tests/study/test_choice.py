@@ -144,8 +144,8 @@ def test_parts_of_an_error_that_is_unknown_are_not_computed(monkeypatch):
     plain = shared_accuracy.resonance_curve
 
     def run(error):
-        def with_error(*arguments):
-            curve = plain(*arguments)
+        def with_error(*arguments, **options):
+            curve = plain(*arguments, **options)
             return replace(curve, settings=replace(curve.settings, error=error))
 
         monkeypatch.setattr(shared_accuracy, "resonance_curve", with_error)
@@ -171,9 +171,9 @@ def test_what_the_mesh_takes_of_the_accuracy_is_not_left_to_the_balance(mesh, as
     plain = shared_accuracy.resonance_curve
     accuracies = []
 
-    def curve_to(family, settings, band, mode, accuracy, march):
+    def curve_to(family, settings, band, mode, accuracy, march, **options):
         accuracies.append(accuracy)
-        curve = plain(family, settings, band, mode, 0.02, march)
+        curve = plain(family, settings, band, mode, 0.02, march, **options)
         return replace(curve, settings=replace(curve.settings, error=0.9 * accuracy))
 
     monkeypatch.setattr(shared_accuracy, "resonance_curve", curve_to)

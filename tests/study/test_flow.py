@@ -133,7 +133,7 @@ def test_limit_cycle_is_where_the_balance_ends_without_force(reduced, coriolis):
     for one in (held, largest):
         model = subject._wave_model(reduced, sector, patches, case, flow, one.wave, 0)
         last = None
-        for force in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01):
+        for force in (1.0, 0.5, 0.2, 0.1, 0.05, 0.02, 0.01, 0.005):
             driven = replace(model, excitation={1: np.array([force])})
             last = solve(driven, 2 * np.pi * one.frequency, 1, 128, start=last)
             assert last.converged

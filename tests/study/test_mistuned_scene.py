@@ -290,6 +290,8 @@ def test_blades_of_another_shape(folder, tmp_path):
     overrides = [f"mistuning.blades=3: {entry}, 8: {entry}", "mistuning.pattern=none.csv"]
     # more of them are what this is not about
     overrides += ["model.harmonics=3", "model.samples=128"]
+    # on cells of 30 mm the blade's own mesh and the wheel's differ by 1.1 % in stress by Delaunay
+    overrides += ["mesh.algorithm=hxt"]
     scene = vary(load_scene(MISTUNED, [*ROUGH_MISTUNED, *overrides]), mistuning__pattern=None)
     scene = vary(scene, mistuning__scatter=None)
     run = with_whole_wheel(pipeline.run(scene, folder))
