@@ -36,7 +36,7 @@ from loads_in_time import layer_of, march, ring_of, start_at_rest
 
 MODES = 12
 STEPS = 1000
-PERIODS = 120
+PERIODS = 160
 
 
 @pytest.fixture(scope="module")
