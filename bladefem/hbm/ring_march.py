@@ -138,17 +138,15 @@ def march_ring(
     friction_work = np.zeros(periods)
     work = np.zeros(1)
     m, M = _system(model).contact.shape
-    of_bodies = 8.0 * periods * S * M * (M + m)
-    operations = of_bodies
+    operations = of_bodies = 8.0 * periods * S * M * (M + m)
     settled, done, leapt = True, 0, 0
     envelope: list[complex] = []
     at_once = PERIODS_OF_PART if leaps else PERIODS_AT_ONCE
     while settled and done < periods:
         # the first period tells what the others take
-        following = min(done - done % at_once + at_once, periods) if done else 1
-        part = slice(done, following)
+        begin, done = done, min(done - done % at_once + at_once, periods) if done else 1
+        part = slice(begin, done)
         settled = _marched(y, forces, prepared, motion[part], friction_work[part], work)
-        done = following
         operations = of_bodies + work[0] * periods / done
         if operations > most:
             break
@@ -164,8 +162,8 @@ def march_ring(
         step = 2 * np.pi / start.drive.omega / S
         resolved = step <= _longest_step(model, reached_springs(model, layer))
     marched = motion[leapt:done].transpose(0, 2, 1)
-    end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
     spent = friction_work[leapt:done] / r
+    end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
     return RingMarch(marched, spent, done, settled, resolved, operations, end)
 
 

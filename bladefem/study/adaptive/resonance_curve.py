@@ -67,9 +67,8 @@ def resonance_curve(
 
     A rough sweep finds the peak, the settings are chosen there, and the curve is swept with them.
     It is swept again where that shows a higher peak, or points where harmonics that were left out
-    move more than the accuracy allows; then with settings that are no poorer, since those would ask
-    for the same again. What the highest point of the curve differs by from the peak that the
-    settings were chosen at is counted in its error.
+    move more than the accuracy allows; then with settings that are no poorer. What the highest
+    point of the curve differs by from the peak that the settings were chosen at is counted.
 
     Args:
         settings: where the choice begins, for example those of a neighbouring load.
@@ -81,7 +80,6 @@ def resonance_curve(
     Raises:
         NotSolvedError: no point converged.
     """
-    settings = with_excited_harmonics(family, replace(settings, error=None))
     settings, points = _rough_curve(family, settings, band, mode)
     used, top = with_harmonics_of_stiff_layer(family, settings, peak_of(points), accuracy)
     swept = settings, 1.0
@@ -90,9 +88,8 @@ def resonance_curve(
         used, peak, errors = _chosen(family, used, top, accuracy, number == 0, fixed, march)
         in_time = marched_widely(march, used, top) if errors is None else errors.in_time
         if number == 0 and not in_time and same_settings(used, settings):
-            used, peak, errors = _with_missed(
-                family, used, points, top, accuracy, fixed, peak, errors
-            )
+            chosen = used, peak, errors
+            used, peak, errors = _with_missed(family, points, top, accuracy, fixed, chosen)
         if swept[1] != accuracy or not same_settings(swept[0], used):
             finer = _with_fewer_folds(used, peak) if number == 0 else None
             limits = USUAL_LIMITS if finer is None else PathLimits(MANY_FOLDS, MANY_POINTS)
@@ -109,10 +106,9 @@ def resonance_curve(
             # the flanks of a peak that is far from right need no look of their own
             return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
-        found = _checked_flanks(family, used, points, top, errors)
         # what harmonics leave out a march has told
         significant = {} if in_time else _checked_significant(family, used, points, top, accuracy)
-        found = significant | found
+        found = significant | _checked_flanks(family, used, points, top, errors)
         missed = _harmonics_missed(used, points, top, significant, accuracy)
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
@@ -129,6 +125,7 @@ def _rough_curve(
     """A rough sweep, and the settings that it was made with: others than those given where contacts
     lift off at its peak and ask for them, unless that peak is lost with them.
     """
+    settings = with_excited_harmonics(family, replace(settings, error=None))
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     top = peak_of(points)
     suited = _suited_to_lift_off(family, settings, top)
@@ -220,24 +217,23 @@ def _refined_top(
 
 def _with_missed(
     family: Family,
-    settings: Settings,
     points: Sequence[Solution],
     top: Solution,
     accuracy: float,
     fixed: tuple[str, ...],
-    peak: Peak | None,
-    errors: PeakErrors | None,
+    chosen: tuple[Settings, Peak | None, PeakErrors | None],
 ) -> tuple[Settings, Peak | None, PeakErrors | None]:
     """The choice with the harmonics that points of the rough sweep lack, where the curve will be
     followed round folds: sweeping it twice costs far more than these points.
     """
+    settings = chosen[0]
     lifts = any(lifts_off(p) for p in points if p.converged)
     if not lifts or too_large_to_follow(family, settings):
-        return settings, peak, errors
+        return chosen
     significant = _checked_significant(family, settings, points, top, accuracy)
     richer = _harmonics_missed(settings, points, top, significant, accuracy)
     if richer is None:
-        return settings, peak, errors
+        return chosen
     return _chosen(family, richer, top, accuracy, lower=False, fixed=fixed)
 
 

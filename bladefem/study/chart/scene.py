@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,13 +57,11 @@ def scene_chart(
     patches = list(done.contact.problem.patches)
     cases = load_cases(scene, done.mesh, done.contact)
     case = cases[len(cases) // 2]
-    settings, reduced = reduced_sector(
-        scene,
-        bodies,
-        case,
-        patches,
-        lambda name, key, make: cached_stage(folder, name, key, make, comm)[0],
-    )
+
+    def stage(name: str, key: str, make: Callable[[], Reduced]) -> Reduced:
+        return cached_stage(folder, name, key, make, comm)[0]
+
+    settings, reduced = reduced_sector(scene, bodies, case, patches, stage)
 
     def family(known: Reduced) -> Family:
         return family_of_case(scene, done.mesh, known, patches, case)
@@ -95,10 +93,8 @@ def scene_chart(
     made.remarks.append(f"take this, at the beginning of the scene: {scene_line(made.settings)}")
     if sizes is None:
         return made
-    return replace(
-        made,
-        meshes=mesh_table(scene, made.settings, case.load, variants, budget, made.remarks, comm),
-    )
+    table = mesh_table(scene, made.settings, case.load, variants, budget, made.remarks, comm)
+    return replace(made, meshes=table)
 
 
 def _judged_sentence(scene: Scene, marches: Marches, curve: CheckedCurve) -> str:
