@@ -25,6 +25,9 @@ MIN_FRICTION_REDUCTION = 0.05
 AT_END = 0.01
 # relative difference below which a best load was studied: tables have nine digits
 STUDIED_LOAD = 1e-6
+# what a search compared
+BALANCES = "balances"
+KEPT_MOTIONS = "motions kept"
 # parts of the error of a load that the balances of the search do not show: they are those of the
 # nearest load that was studied
 UNSEEN_PARTS = ("halved", "body_mesh", "layer_law")
@@ -82,6 +85,10 @@ def best_load_table(found: Sequence[BestLoad], curves: Sequence[Curve] = ()) -> 
         row = asdict(best)
         row["searched_amplitude"] = best.amplitude
         row["lowest_searched"], row["highest_searched"] = row.pop("searched")
+        kept = row.pop("kept")
+        row["compared"] = BALANCES if kept is None else KEPT_MOTIONS
+        if kept is not None:
+            row |= {"tolerance": kept["tolerance"], "between": kept["between"]}
         row["tolerated_from"], row["tolerated_to"] = row.pop("between")
         settings = row.pop("settings")
         error = settings["error"]
@@ -203,9 +210,12 @@ def stress_error_words(row: pd.Series) -> str:
 def flat_range(best: pd.Series) -> str:
     """What the loads around the best one are, which stand before it as its uncertainty."""
     low, high = best.get("tolerated_from", np.nan), best.get("tolerated_to", np.nan)
+    by = "by exact search"
+    if best.get("compared", BALANCES) == KEPT_MOTIONS:
+        by = "of those studied, by the motions that the blade keeps"
     if np.isfinite(low) and np.isfinite(high):
-        return "by exact search; under these loads the amplitude keeps within the accuracy of it"
-    return "by exact search"
+        return f"{by}; under these loads the amplitude keeps within the accuracy of it"
+    return by
 
 
 def certainty(best: pd.Series) -> str:

@@ -39,8 +39,9 @@ CAPTIONS = {
     "modes/mac": "Modal assurance criterion against the modes of the other run.",
     "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
     "response/best_load": "The load that makes the resonance smallest, by exact search; every load "
-    "of the range in the last columns was open to it. The search compares balances; amplitude, "
-    "frequency and error are those of the response under this load.",
+    "of the range in the last columns was open to it. The search compares balances; where the "
+    "blade does not keep to the one that it ended at, motions that it keeps under this and other "
+    "loads are compared. Amplitude, frequency and error are those of the response under this load.",
     "response/influences": "What the best load depends on: each parameter over its range, by exact "
     "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
     "response/influences_at_ends": "Best load and its resonance amplitude at both ends of each "

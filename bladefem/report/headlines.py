@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from ..scene.units import newton_range, newtons
-from .best_load import error_words, found_best, stress_error_words
+from .best_load import BALANCES, error_words, found_best, stress_error_words
 from .statements import ResponseAnswer
 
 # what an answer says in place of a number that the data cannot carry
@@ -112,7 +112,9 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
 def _of_search(best: pd.Series, points: pd.DataFrame | None) -> dict[str, str]:
     """How sure the exact search is; the load by where the amplitude stays within the accuracy."""
     total = best.copy()
-    total["error"] += best["tolerance"]
+    # of balances, where the amplitude is the lowest one; others are those of the load itself
+    if best.get("compared", BALANCES) == BALANCES:
+        total["error"] += best["tolerance"]
     low, high = (
         None if np.isnan(best[name]) else float(best[name])
         for name in ("tolerated_from", "tolerated_to")

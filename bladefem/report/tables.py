@@ -243,6 +243,7 @@ COLUMNS = {
     "reference_error": Column("error of the reference", "1", "%", 100.0, 2),
     "given_error": Column("error of the given mesh", "1", "%", 100.0, 2),
     "frequency_error": Column("estimated error of the resonance", "1", "%", 100.0, 2),
+    "compared": Column("compared by the search"),
     "tolerance": Column("tolerance of the search", "1", "%", 100.0, 2),
     "tolerated_from": Column("within the accuracy from", "N", digits=3),
     "tolerated_to": Column("within the accuracy up to", "N", digits=3),

@@ -11,11 +11,11 @@ import pytest
 from bladefem.report.best_load import best_load_table, found_best
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.settings import Settings
-from bladefem.study.pipeline import loads as module
 from bladefem.study.pipeline import pipeline, response_stage
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import BestLoad
-from bladefem.study.pipeline.loads import best_curve, study_loads
+from bladefem.study.pipeline.kept_best_load import MAX_ADDED_LOADS, study_kept_loads
+from bladefem.study.pipeline.loads import Search, StudiedLoads, best_curve, study_loads
 from bladefem.study.pipeline.response_remarks import best_load_remarks
 
 
@@ -31,7 +31,9 @@ def case(load: float, mass: float | None = None) -> LoadCase:
     return LoadCase(load, None, None, mass)
 
 
-def curve(load: float, amplitude: float, mass: float | None = None) -> SimpleNamespace:
+def curve(
+    load: float, amplitude: float, mass: float | None = None, unstable: str | None = None
+) -> SimpleNamespace:
     return SimpleNamespace(
         load=load,
         mass=mass,
@@ -40,21 +42,19 @@ def curve(load: float, amplitude: float, mass: float | None = None) -> SimpleNam
         error=0.04,
         friction_work=5e-4,
         input_work=6e-4,
+        unstable_peak=unstable,
     )
 
 
-@pytest.fixture
-def studied(monkeypatch):
+def searches_of(found):
+    return [Search(lambda b=b: b, lambda load, b=b: case(load, b.mass)) for b in found]
+
+
+def studied(cases, found):
     """Curves of the given cases with searches that end at these best loads."""
-    monkeypatch.setattr(
-        module, "curve_of", lambda scene, case, *_: curve(case.load, 1e-6, case.mass)
+    return study_loads(
+        cases, lambda one: curve(one.load, 1e-6, one.mass), searches=searches_of(found)
     )
-
-    def study(cases, found):
-        searches = [lambda b=b: (b, lambda load: case(load, b.mass)) for b in found]
-        return study_loads(None, cases, None, None, searches=searches)
-
-    return study
 
 
 def test_a_search_is_told_as_a_search():
@@ -65,14 +65,14 @@ def test_a_search_is_told_as_a_search():
     assert lost.startswith("best load: not found between") and lost.endswith("no maximum")
 
 
-def test_a_best_load_that_was_not_given_takes_its_place(studied):
+def test_a_best_load_that_was_not_given_takes_its_place():
     found = studied([case(150.0), case(9.0)], [best(78.9107)])
     assert [c.load for c in found.curves] == [9.0, 78.91, 150.0]
     assert [c.load for c in found.cases] == [9.0, 78.91, 150.0]
     assert [b.load for b in found.best] == [78.9107]
 
 
-def test_each_mass_has_its_own(studied):
+def test_each_mass_has_its_own():
     cases = [case(load, mass) for mass in (0.02, 0.01) for load in (9.0, 150.0)]
     found = studied(cases, [best(80.0, 0.02), best(60.0, 0.01)])
     assert [(c.mass, c.load) for c in found.curves] == [
@@ -81,7 +81,7 @@ def test_each_mass_has_its_own(studied):
 
 
 @pytest.mark.parametrize("found", [best(78.9107), best(np.nan, reason="no peak")])
-def test_nothing_is_added_where_it_was_given_or_not_found(studied, found):
+def test_nothing_is_added_where_it_was_given_or_not_found(found):
     given = studied([case(9.0), case(78.91)], [found])
     assert [c.load for c in given.curves] == [9.0, 78.91]
 
@@ -112,8 +112,9 @@ def test_a_load_under_which_the_blade_keeps_far_more_is_not_the_best():
 def test_none_is_sought_without_friction(mu, count):
     """The response hangs on the load only where contacts lift off: the wedge's best was 47 kN."""
     scene = load_scene("scenes/wedge.toml", [f"contact.mu={mu}"])
-    study = response_stage._Study(scene, None, None, None, None)
-    searches = response_stage._best_load_searches(study, None)
+    space, runner = SimpleNamespace(dimension=3), SimpleNamespace(alone=print)
+    study = response_stage._Study(scene, space, None, Settings(10, 3, 64, "rigid", 4), runner)
+    searches = response_stage._best_load_searches(study, SimpleNamespace(problem=None, rough=None))
     assert len(searches) == count
 
 
@@ -171,3 +172,60 @@ def test_the_own_load_is_looked_up_for_the_damper_mass_that_makes_it():
     # the damper's own mass alone
     curves = [SimpleNamespace(load=load, mass=None) for load in (80.0, 121.4, 200.0)]
     assert response_stage.own_curve(curves, 121.4, 12.6e-3) == 1
+
+
+def kept_amplitude(load: float, lowest: float = 71.0) -> float:
+    """Two branches that cross, as those of the shipped wedge: powers of the load [m]."""
+    return 140e-6 * max((lowest / load) ** 2.0, (load / lowest) ** 0.6)
+
+
+def studied_by_kept_motions(loads, found, amplitude=kept_amplitude, unstable="torus"):
+    """With these loads given, a search that ended at the best load, and what the blade keeps."""
+
+    def curve_at(one):
+        return curve(one.load, amplitude(one.load), one.mass, unstable)
+
+    given = [case(load, found.mass) for load in loads]
+    started = StudiedLoads(given, [curve_at(one) for one in given], [found])
+    return study_kept_loads(started, searches_of([found]), curve_at, 0.05)
+
+
+@pytest.mark.parametrize(
+    "loads", [(9.0, 36.0, 73.0, 79.68, 121.4), (9.96, 19.9, 39.8, 79.68, 159.4, 318.7)]
+)
+def test_the_lowest_motion_that_the_blade_keeps_is_the_best(loads):
+    """Not the lowest balance: 148 um are kept under the load of the search, 140 under another."""
+    found = studied_by_kept_motions(loads, best(79.68))
+    (kept,) = [b.kept for b in found.best]
+    assert kept_amplitude(kept.load) < 1.025 * kept_amplitude(71.0)
+    assert len(found.curves) <= len(loads) + MAX_ADDED_LOADS
+    k = best_curve(found.curves, found.best)
+    assert found.curves[k].load == kept.load
+    (row,) = best_load_table(found.best, found.curves).to_dict("records")
+    assert row["load"] == kept.load and row["amplitude"] == kept_amplitude(kept.load)
+    assert row["compared"] == "motions kept" and row["tolerance"] == kept.tolerance
+    # the amplitude is within the accuracy in all of the range
+    low, high = row["tolerated_from"], row["tolerated_to"]
+    assert low < kept.load < high
+    assert max(map(kept_amplitude, (low, high))) <= 1.051 * row["amplitude"]
+
+
+def test_what_another_load_may_gain_is_told_with_it():
+    found = studied_by_kept_motions((36.0, 73.0, 79.68, 121.4), best(79.68))
+    (kept,) = [b.kept for b in found.best]
+    assert (
+        kept.tolerance >= 0.5 * (kept_amplitude(kept.load) / 140e-6 - 1) and kept.tolerance < 0.02
+    )
+    remarks = list(best_load_remarks(SimpleNamespace(accuracy=0.05), found.best))
+    assert f"those under {kept.load:.4g} N are the lowest" in remarks[1]
+
+
+def test_balances_that_the_blade_keeps_need_no_further_loads():
+    found = studied_by_kept_motions((36.0, 79.68, 159.0), best(79.68), unstable=None)
+    assert len(found.curves) == 3 and found.best[0].kept is None
+
+
+def test_a_resonance_that_falls_to_the_end_of_all_loads_has_no_best():
+    """Looked for outwards, and then refused rather than told."""
+    found = studied_by_kept_motions((36.0, 79.68), best(79.68), amplitude=lambda load: 1e-2 / load)
+    assert len(found.curves) == 2 + MAX_ADDED_LOADS and found.best[0].kept is None

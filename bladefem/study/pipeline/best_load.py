@@ -59,6 +59,19 @@ REPEATED_RANGE = 4.0
 
 
 @dataclass(frozen=True)
+class KeptLoad:
+    """The load with the lowest resonance of those that the blade keeps."""
+
+    # of a seat [N], one of those studied
+    load: float
+    # relative, of the amplitude: by how much another load may be lower
+    tolerance: float
+    # loads between which the amplitude is within the scene's accuracy of the lowest [N]; NaN where
+    # none of those studied is as high
+    between: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class BestLoad:
     """What the search found; where it failed, ``reason`` says why and the numbers are NaN."""
 
@@ -90,6 +103,9 @@ class BestLoad:
     points: int
     # empty where the search succeeded
     reason: str = ""
+    # what is lowest of the motions that the blade keeps, where it does not keep to the balances
+    # that the search compares
+    kept: KeptLoad | None = None
 
 
 def find_best_load(
@@ -422,5 +438,7 @@ def chart_loads(bests: Sequence[BestLoad]) -> tuple[float, ...]:
 
 
 def studied_load(best: BestLoad) -> float:
-    """The best load [N] with the digits with which its response is studied and shown."""
-    return float(f"{best.load:.4g}")
+    """The best load [N] with the digits with which its response is studied and shown: of the
+    motions that the blade keeps, else of the balances of the search.
+    """
+    return float(f"{best.load:.4g}") if best.kept is None else best.kept.load

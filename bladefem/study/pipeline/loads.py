@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,16 +30,16 @@ from .curve import Curve
 from .load_interval import LoadInterval, load_interval
 from .shared_accuracy import curve_with_room
 
-Keep: TypeAlias = "Callable[[LoadCase, Callable[[], Curve]], Curve]"
-# a best load, and the case of any load [N] of that damper
-Search: TypeAlias = "Callable[[], tuple[BestLoad, Callable[[float], LoadCase]]]"
 # number of loads when none are given
 DEFAULT_LOADS = 8
 
 
-def compute_without_keeping(case: LoadCase, compute: Callable[[], Curve]) -> Curve:
-    """The keeper that keeps nothing."""
-    return compute()
+class Search(NamedTuple):
+    """A search for the best load of one damper."""
+
+    find: Callable[[], BestLoad]
+    # the case of any load [N] of that damper
+    case_at: Callable[[float], LoadCase]
 
 
 class StudiedLoads(NamedTuple):
@@ -51,14 +51,10 @@ class StudiedLoads(NamedTuple):
 
 
 def study_loads(
-    scene: Scene,
     cases: list[LoadCase],
-    family: Callable[[LoadCase], Family],
-    settings: Settings,
+    curve_at: Callable[[LoadCase], Curve],
     comm: Communicator | None = None,
     progress: Progress = without_progress,
-    keep: Keep = compute_without_keeping,
-    softer: SofterBody | None = None,
     best: float = 0.0,
     searches: Sequence[Search] = (),
 ) -> StudiedLoads:
@@ -70,31 +66,22 @@ def study_loads(
     keeps to one of them is not known before it is judged.
 
     Args:
-        family: of a load case, its models.
-        settings: modes and damper model to keep; each case then takes the rest from what its own
-            curve needs.
+        curve_at: the response of a load case.
         progress: wraps the numbers of this rank's cases, as tqdm does, under a label.
-        keep: keep(case, compute) gives the curve of a load, found from an earlier run or computed
-            and kept.
-        softer: the body less the error of its stiffness, for the error by its mesh.
         best: load with the smallest resonance [N]; 0 where it is not known.
-        searches: each gives a best load and the case of any load; they take as long as the response
-            of a load below the best one.
+        searches: they take as long as the response of a load below the best one.
     """
     given = {(case.load, case.mass) for case in cases}
     order = longest_first([case.load for case in cases], best)
-
-    def curve_at(case: LoadCase) -> Curve:
-        return keep(case, partial(curve_of, scene, case, family, settings, softer))
 
     def shown(numbers: Iterable[int]) -> Iterable[int]:
         return progress(numbers, "forced responses", total=len(tasks), delay=0.0)
 
     def searched(search: Search) -> tuple[BestLoad, tuple[LoadCase, Curve] | None]:
-        found, case_at = search()
+        found = search.find()
         if found.reason or (studied_load(found), found.mass) in given:
             return found, None
-        case = case_at(studied_load(found))
+        case = search.case_at(studied_load(found))
         return found, (case, curve_at(case))
 
     tasks: list[Callable[[], Any]] = [
@@ -103,13 +90,19 @@ def study_loads(
     ]
     done: list[Any] = share_work(lambda task: task(), tasks, comm, shown, on_demand=True)
     found = done[: len(searches)]
-    studied = [(cases[i], curve) for i, curve in zip(order, done[len(searches) :], strict=True)]
-    studied += [added for _, added in found if added is not None]
-    masses = [case.mass for case in cases]
-    studied.sort(key=lambda pair: (masses.index(pair[0].mass), pair[0].load))
-    return StudiedLoads(
-        [case for case, _ in studied], [curve for _, curve in studied], [one for one, _ in found]
+    given_curves = dict(zip(order, done[len(searches) :], strict=True))
+    studied = StudiedLoads(
+        cases, [given_curves[i] for i in range(len(cases))], [one for one, _ in found]
     )
+    return in_order(studied, [added for _, added in found if added is not None])
+
+
+def in_order(studied: StudiedLoads, added: Sequence[tuple[LoadCase, Curve]] = ()) -> StudiedLoads:
+    """Studied loads with further ones, of each mass by ascending load."""
+    masses = [case.mass for case in studied.cases]
+    pairs = [*zip(studied.cases, studied.curves, strict=True), *added]
+    pairs.sort(key=lambda pair: (masses.index(pair[0].mass), pair[0].load))
+    return studied._replace(cases=[case for case, _ in pairs], curves=[curve for _, curve in pairs])
 
 
 def best_curve(curves: Sequence[Curve], best: Sequence[BestLoad]) -> int:

@@ -310,6 +310,13 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
             f"{tolerated}; "
             f"{b.settings.sentence(error_text=error)}"
         )
+        if b.kept is not None:
+            yield (
+                f"best load{damper}: the blade does not keep to the balance under "
+                f"{newtons(b.load, 4)}; of the motions that it keeps those under "
+                f"{newtons(b.kept.load, 4)} are the lowest, and another load lowers them by "
+                f"{percent(b.kept.tolerance)} at most, as far as they are convex there"
+            )
 
 
 def lower_studied_remarks(

@@ -29,8 +29,9 @@ from .changed_cases import cases_of, changed_cases
 from .curve import Curve, load_of
 from .damped_motion import DampedStress, damped_stress
 from .history import FRICTIONLESS
+from .kept_best_load import study_kept_loads
 from .linear_limits import Limit, judged_limits
-from .loads import Search, best_curve, study_loads
+from .loads import Search, best_curve, curve_of, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
 from .response_remarks import (
@@ -90,8 +91,7 @@ def run_response(
     best: list[BestLoad] = []
     if scene.study.loads is None:
         with clock("best load"):
-            best = share_work(_best_of, searches, keep.comm, on_demand=True)
-        searches = []
+            best = share_work(lambda one: one.find(), searches, keep.comm, on_demand=True)
     if best and not any(b.reason for b in best):
         loads = studied_loads(scene, before.contact.own, chart_loads(best))
         before = replace(before, contact=seat_at_loads(scene, before.contact, loads, clock))
@@ -185,32 +185,37 @@ def _load_responses(
 
     Args:
         softer: the body less the error of its stiffness, for the error by its mesh.
-        best: loads that were searched before.
-        searches: for those that were not.
+        best: loads that were searched before; none when they were not.
+        searches: for them.
     """
     scene, family, settings, keep = study.scene, study.family, study.settings, study.keep
     clock = keep.clock
+
+    def curve_at(case: LoadCase) -> Curve:
+        return keep.alone(
+            f"response_{_case_label(case)}",
+            stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
+            partial(curve_of, scene, case, family, settings, softer),
+        )
+
     with clock("response"):
-        cases, curves, found = study_loads(
-            scene,
+        studied = study_loads(
             cases,
-            family,
-            settings,
+            curve_at,
             keep.comm,
             clock.progress,
-            lambda case, make: keep.alone(
-                f"response_{_case_label(case)}",
-                stage_key("response", scene, case.load, case.mass, replace(settings, error=None)),
-                make,
-            ),
-            softer,
             min((b.load for b in best if not b.reason), default=0.0),
-            searches,
+            () if best else searches,
         )
+        if best:
+            studied = studied._replace(best=list(best))
+        if scene.study.stability:
+            studied = study_kept_loads(studied, searches, curve_at, scene.accuracy, keep.comm)
+        cases, curves, found = studied
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         limits = _limits_of_masses(study, cases, softer, band)
         models = family(cases[-1])
-    best = (*best, *found)
+    best = tuple(found)
     clock.messages.extend(best_load_remarks(scene, best))
     nodes = -(-len(cases[0].elements.kt) // 2)
     judged = Disturbances()
@@ -286,18 +291,16 @@ def _best_load_searches(study: _Study, contact: Seating) -> list[Search]:
     if loads is not None and (len(loads) == 1 or is_frictionless(scene)):
         return []
 
-    def search(mass: float | None) -> tuple[BestLoad, Callable[[float], LoadCase]]:
+    def search(mass: float | None) -> Search:
         tangents = study.mesh.dimension - 1
         case_at = cases_of(scene, contact.problem, tangents, mass, contact.rough)
         key = stage_key("response", scene, "best load", mass, replace(settings, error=None))
         find = partial(find_best_load, scene, case_at, study.family, settings, mass)
-        return study.keep.alone(f"best_load{_mass_label(mass)}", key, find), case_at
+        return Search(
+            partial(study.keep.alone, f"best_load{_mass_label(mass)}", key, find), case_at
+        )
 
-    return [partial(search, mass) for mass in scene.study.masses or (None,)]
-
-
-def _best_of(search: Search) -> BestLoad:
-    return search()[0]
+    return [search(mass) for mass in scene.study.masses or (None,)]
 
 
 def _influences(study: _Study, contact: Seating, best: BestLoad | None) -> tuple[Influence, ...]:
