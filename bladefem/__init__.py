@@ -24,6 +24,7 @@ _WHERE = {
     "NotSolvedError": ".errors",
     "Scene": ".scene.tables",
     "build_mesh": ".study.pipeline.scene_mesh",
+    "curve_of": ".study.pipeline.loads",
     "find_modes": ".study.pipeline.normal_modes",
     "load_scene": ".scene.toml",
     "open": ".report.opened:open_run",

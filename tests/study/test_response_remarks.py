@@ -122,7 +122,7 @@ def test_points_beyond_their_tolerance_are_counted_for_each_load():
 def test_a_best_load_above_a_load_studied_is_told():
     """The highest motion counts, stable or not; another damper's curves do not."""
     scene = SimpleNamespace(accuracy=0.05)
-    best = SimpleNamespace(reason="", mass=0.02, load=50.0, amplitude=198e-6)
+    best = SimpleNamespace(reason="", mass=0.02, load=50.0, amplitude=198e-6, kept=None)
     studied = [
         SimpleNamespace(
             mass=mass,
