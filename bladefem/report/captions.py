@@ -43,7 +43,8 @@ CAPTIONS = {
     "blade does not keep to the one that it ended at, motions that it keeps under this and other "
     "loads are compared. Amplitude, frequency and error are those of the response under this load.",
     "response/influences": "What the best load depends on: each parameter over its range, by exact "
-    "derivatives (bars); the two with the largest effect solved again at both ends (diamonds).",
+    "derivatives of the balances that its search compares (bars); the two with the largest effect "
+    "solved again at both ends (diamonds).",
     "response/influences_at_ends": "Best load and its resonance amplitude at both ends of each "
     "parameter's range: by the exact derivatives, and solved again for the two with the largest "
     "effect; the amplitudes are those of balances, as the search compares them.",

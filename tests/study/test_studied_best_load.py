@@ -229,3 +229,12 @@ def test_a_resonance_that_falls_to_the_end_of_all_loads_has_no_best():
     """Looked for outwards, and then refused rather than told."""
     found = studied_by_kept_motions((36.0, 79.68), best(79.68), amplitude=lambda load: 1e-2 / load)
     assert len(found.curves) == 2 + MAX_ADDED_LOADS and found.best[0].kept is None
+
+
+def test_resonances_that_are_hardly_known_are_not_compared():
+    """The lowest of several would be the one whose highest motion was missed."""
+    given = [case(load) for load in (36.0, 79.68, 159.0)]
+    curves = [curve(c.load, kept_amplitude(c.load), unstable="torus") for c in given]
+    curves[1].error = 0.9
+    started = StudiedLoads(given, curves, [best(79.68)])
+    assert study_kept_loads(started, searches_of(started.best), None, 0.05) == started
