@@ -76,8 +76,8 @@ def resonance_curve(
         march: what the blade keeps to after a motion, by which harmonics are chosen where most
             contacts lift off; richer balances tell them when None.
         fixed: names that a choice at the peak may not change although they are not the user's, such
-            as modes, chosen with the reduction. What lift-off, folds and flanks ask for of harmonics,
-            samples and points is taken all the same.
+            as modes, chosen with the reduction. Harmonics, samples and points that lift-off, folds
+            and flanks ask for are taken all the same.
 
     Raises:
         NotSolvedError: no point converged.
