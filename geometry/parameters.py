@@ -298,7 +298,7 @@ class MeshSize:
     algorithm: str = quantity(
         "delaunay",
         choices=("delaunay", "hxt"),
-        help="how gmsh fills volumes; the other one is tried when it fails or leaves flat cells",
+        help="how gmsh fills volumes; the other one is tried when it fails or leaves poor cells",
     )
     scale: float = quantity(
         1.0, "1", 0.02, 50.0, "factor on all element sizes, also those that are left open"

@@ -86,7 +86,7 @@ def coriolis_messages(result: SolvedRun) -> list[str]:
 def damper_spin_messages(result: SolvedRun) -> list[str]:
     """What the rotation does to resonances through the damper, and whether responses have it."""
     spin = result.reduced.damper_spin
-    if spin is None or not spin.coriolis > 0:
+    if spin is None:
         return []
     mode = result.scene.excitation.mode
     least = CORIOLIS_SHARE * result.scene.accuracy
@@ -95,14 +95,15 @@ def damper_spin_messages(result: SolvedRun) -> list[str]:
         f"{percent(spin.coriolis)} of its frequency, and change its amplitude with friction by "
         f"some {percent(spin.amplitude)}"
     )
+    said: list[str] = []
     if result.reduced.damper.damping is not None:
-        said: list[str] = [method(f"{share}; responses have them.")]
-    elif max(spin.coriolis, spin.amplitude) <= least:
-        said = [method(f"{share}; they are left out of the responses.")]
-    else:
-        said = [
+        said.append(method(f"{share}; responses have them."))
+    elif max(spin.coriolis, spin.amplitude) > least:
+        said.append(
             warning(f"{share}, and are left out of the responses by operation.coriolis = false.")
-        ]
+        )
+    elif spin.coriolis > 0:
+        said.append(method(f"{share}; they are left out of the responses."))
     if max(spin.softening, spin.softening_amplitude) > least:
         said.append(
             warning(

@@ -2,6 +2,7 @@
 scene, coarser mesh.
 """
 
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
@@ -125,6 +126,19 @@ def test_a_mass_that_never_slips_has_no_amplitude_but_the_linear_one():
     (line,) = motion_headlines([(drive, result)])
     assert line.value == "not determined" and "never slips" in line.uncertainty
     assert np.isnan(motion_table([(drive, result)])["amplitude"][0])
+
+
+@pytest.mark.parametrize(
+    ("residual", "mu", "known"), [(5e-4, 0.3, True), (5e-4, 10.0, False), (5e-3, 0.3, False)]
+)
+def test_a_nearly_steady_motion_is_known_where_friction_damps_what_is_left(residual, mu, known):
+    body = MassOnFoundation(
+        mass=1.0, kt=1.0e6, mu=mu, footprint=Footprint(np.zeros((1, 2)), np.ones(1))
+    )
+    drive = FoundationMotion(Fraction(0), frequency=100.0, amplitude=(1e-4, 0.0))
+    found = replace(steady(body, drive, 200, most=2), residual=residual, reason="not periodic")
+    assert found.slips == (mu < 1)
+    assert found.is_known == known
 
 
 def test_the_march_shows_its_periods():

@@ -111,6 +111,33 @@ def test_the_other_algorithm_is_told(monkeypatch, fails):
     check_mesh(mesh)
 
 
+@pytest.mark.parametrize(
+    ("delaunay", "hxt", "filled"),
+    [
+        (0.06, 0.5, ["delaunay"]),
+        (0.03, 0.04, ["delaunay", "hxt"]),
+        (0.04, 0.03, ["delaunay", "hxt", "delaunay"]),
+        (0.04, None, ["delaunay", "hxt", "delaunay"]),
+    ],
+)
+def test_the_better_of_two_poor_meshes_is_kept(monkeypatch, delaunay, hxt, filled):
+    """By their worst cells; the other algorithm may fail (None)."""
+    from geometry import finalise_mesh
+
+    worst, calls = {"delaunay": delaunay, "hxt": hxt}, []
+
+    def fill(gmsh, groups, algorithm):
+        calls.append(algorithm)
+        if worst[algorithm] is None:
+            raise Exception("no tetrahedra")
+        return worst[algorithm]
+
+    monkeypatch.setattr(finalise_mesh, "_filled", fill)
+    notes = finalise_mesh.fill_with_tetrahedra(None, None, "delaunay")
+    assert calls == filled
+    assert bool(notes) == (filled[-1] == "hxt")
+
+
 def test_plane_blades():
     rng = np.random.default_rng(9)
     meshed = 0

@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import eigsh, splu
 
 from bladefem.contact.seating import solve_seating
 from bladefem.fem.constraint import at_diameter
+from bladefem.hbm.model import Damping
+from bladefem.hbm.solve import solve
 from bladefem.report.run_messages import damper_spin_messages
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.pipeline.assemble_model import joint_model
@@ -163,6 +165,63 @@ def test_the_indicator_decides_as_for_the_blade(wedge, damper, asked, accuracy, 
     model = joint_model(scene, mesh, found, patches, case, 1, damper)
     coupling = model.damper.gyroscopic if damper == "rigid" else model.damper[0].damping
     assert (coupling is not None) == counted
+
+
+def sticking_response(wedge, engine_order, omega):
+    """Probe of the sector in full stick without losses, by the matrices of both bodies."""
+    scene, mesh, bodies, patches, case, _ = wedge
+    blade, damper = at_diameter(bodies.frame, DIAMETER), bodies.damper.con
+    speed = rotation_of(bodies).speed
+    K, M, G, _ = full_matrices(blade)
+    Kd, Md, Gd, _ = (HEAVIER * A for A in full_matrices(damper))
+    port = blade_ports(mesh, patches, scene.excitation)
+    rows = (port.matrix.T @ sp.csr_matrix(blade.T)).tocsr()
+    if engine_order != DIAMETER:
+        # the wave that runs against the count
+        K, M, G, rows = (A.conj() for A in (K, M, G, rows))
+    contact, load, probe = (rows[port.names[name]] for name in ("contact", "load", "probe"))
+    turn = np.ones(contact.shape[0], complex)
+    turn[3 * len(patches[0].area) :] = np.exp(2j * np.pi * engine_order / scene.disc.sectors)
+    at_damper = damper_ports(mesh, patches).matrix.T @ sp.csr_matrix(damper.T)
+    relative = case.selection.T @ sp.hstack([sp.diags(turn) @ contact, -at_damper])
+    e = case.elements
+    springs = sp.diags(np.column_stack([e.kn, e.kt, e.kt]).ravel())
+    elastic = sp.block_diag([K, Kd / HEAVIER]) + relative.conj().T @ springs @ relative
+    coriolis = speed * sp.block_diag([G, Gd])
+    Z = elastic - omega**2 * sp.block_diag([M, Md]) + 1j * omega * coriolis
+    force = np.zeros(Z.shape[0], complex)
+    force[: K.shape[0]] = (load.conj().T @ np.atleast_1d(scene.excitation.force)).ravel()
+    return (probe @ splu(sp.csc_matrix(Z)).solve(force)[: K.shape[0]])[0]
+
+
+@pytest.mark.parametrize(("engine_order", "raises"), [(27, False), (9, True)])
+def test_both_waves_respond_as_by_full_matrices(wedge, engine_order, raises):
+    """The damper's Coriolis forces lower the response of one wave and raise that of the other."""
+    scene, mesh, _, patches, case, reduced = wedge
+    omega = 2 * np.pi * 400.0
+    scene = vary(scene, excitation__engine_order=engine_order, operation__coriolis=True)
+    gripping = replace(case, elements=replace(case.elements, mu=1e5 + 0 * case.elements.mu))
+    heavy = with_damper_mass(with_coriolis(scene, reduced), HEAVIER * reduced.mass)
+    found = []
+    for one in (heavy, with_damper_coriolis(scene, mesh, heavy, patches, case)):
+        model = joint_model(scene, mesh, one, patches, gripping, 1, "rigid")
+        lossless = replace(model, damping=Damping(), damper_damping=Damping())
+        found.append(solve(lossless, omega, 1, 64).probe[1, 0])
+    change = (found[1] / found[0] - 1).real
+    assert change > 4e-3 if raises else change < -4e-3
+    assert found[1] == pytest.approx(sticking_response(wedge, engine_order, omega), rel=5e-4)
+
+
+def test_a_damper_that_is_a_mass_has_none(wedge):
+    """They push it up and down the slope, where the paper's damper does not go."""
+    scene, mesh, _, patches, case, reduced = wedge
+    scene = vary(scene, model__damper="mass", operation__coriolis=True)
+    found = with_damper_coriolis(scene, mesh, reduced, patches, case)
+    assert found.damper.damping is None
+    assert found.damper_spin.coriolis == found.damper_spin.amplitude == 0.0
+    said = damper_spin_messages(SimpleNamespace(scene=scene, reduced=found))
+    assert not [text for text in said if "Coriolis" in text]
+    assert damper_spin_messages(SimpleNamespace(scene=replace(scene, accuracy=1e-6), reduced=found))
 
 
 @pytest.mark.parametrize(

@@ -38,13 +38,13 @@ from branch_models import random_case
 ROUGH = Options(tolerance=1e-6, fallbacks=False, frugal=True)
 
 
-def curve_of_seed(seed):
+def curve_of_seed(seed, fixed=()):
     case = random_case(seed)
     nodes = np.arange(len(case.model.elements.kt))
     family = Family(lambda _: Member(case.model, nodes), len(case.model.sides[0].omega))
     start = replace(first_for(10), points=None, chosen=("harmonics", "samples"))
     band = case.band[0] / (2 * np.pi), case.band[1] / (2 * np.pi)
-    return case.model, resonance_curve(family, start, band, 1, 0.02)
+    return case.model, resonance_curve(family, start, band, 1, 0.02, fixed=fixed)
 
 
 @pytest.mark.parametrize("seed", [41, 59])
@@ -65,6 +65,27 @@ def test_harmonics_that_a_flank_needs_are_swept_once_and_kept(seed, monkeypatch)
     # without the rough ones
     fine = [replace(s, error=None) for s in swept if s.error is not None]
     assert len(fine) == len(set(fine)) <= 2
+
+
+def test_every_choice_at_the_peak_knows_what_is_fixed(monkeypatch):
+    """Also that with the harmonics that points of the rough sweep lack."""
+    asked = []
+    chosen = curve_module.choose_at_peak
+
+    def recorded(family, settings, peak, accuracy, fixed):
+        asked.append(fixed)
+        return chosen(family, settings, peak, accuracy, fixed)
+
+    monkeypatch.setattr(curve_module, "choose_at_peak", recorded)
+    curve_of_seed(63, fixed=("modes",))
+    once = len(asked)
+    monkeypatch.setattr(curve_module, "lifts_off", lambda _: True)
+    monkeypatch.setattr(curve_module, "too_large_to_follow", lambda *_: False)
+    richer = iter([replace(first_for(10), points=None, harmonics=7)])
+    monkeypatch.setattr(curve_module, "_harmonics_missed", lambda *_: next(richer, None))
+    curve_of_seed(63, fixed=("modes",))
+    assert len(asked) > 2 * once
+    assert set(asked) == {("modes",)}
 
 
 @pytest.mark.parametrize("seed", [10, 53, 63])

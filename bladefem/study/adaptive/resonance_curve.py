@@ -75,7 +75,9 @@ def resonance_curve(
         band: [Hz]; round the resonances when None.
         march: what the blade keeps to after a motion, by which harmonics are chosen where most
             contacts lift off; richer balances tell them when None.
-        fixed: names that may not be changed here although they are not the user's.
+        fixed: names that a choice at the peak may not change although they are not the user's, such
+            as modes, chosen with the reduction. Harmonics, samples and points that lift-off, folds
+            and flanks ask for are taken all the same.
 
     Raises:
         NotSolvedError: no point converged.

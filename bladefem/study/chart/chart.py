@@ -96,7 +96,7 @@ def method_chart(
         poorer: names of other families that are compared with the first one by their richest
             member.
         march: what the blade keeps to after a motion; the automatic choice asks it as in a run.
-        fixed: settings that the automatic choice does not change.
+        fixed: of ``study.adaptive.resonance_curve``.
 
     Raises:
         InputError: the budget is no time.

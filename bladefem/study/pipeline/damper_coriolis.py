@@ -38,10 +38,14 @@ def with_damper_coriolis(
 ) -> Reduced:
     """The reduced sector with Coriolis forces of the damper where responses are to have them, and
     with what the rotation does to it.
+
+    A damper that is a mass has none: they push it up and down the slope, where it does not go.
     """
     if reduced.damper_coriolis is None:
         return reduced
     spin = damper_spin(scene, mesh, reduced, patches, case)
+    if scene.model.damper == "mass":
+        return replace(reduced, damper_spin=replace(spin, coriolis=0.0, amplitude=0.0))
     reduced = replace(reduced, damper_spin=spin)
     return (
         _turning(reduced) if counts_coriolis(scene, max(spin.coriolis, spin.amplitude)) else reduced
