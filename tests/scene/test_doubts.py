@@ -160,6 +160,17 @@ def test_a_mesh_of_a_file_is_not_meshed_nor_its_damper_drawn(tmp_path, override)
     assert implausible_values(load_scene(scene, ["damper.mass=20 g", "damper.axial=held"])) == []
 
 
+def test_a_row_of_plane_blades_is_told_to_turn_without_spin_softening():
+    """In-plane motion of a blade of 150 mm with its platform, hub radius 0, 6000 rpm: 245.3 Hz in the
+    row, 224.6 about the axis z, apart by the 100 Hz of the speed.
+    """
+    plane = ROOT / "scenes" / "plane.toml"
+    (said,) = implausible_values(load_scene(plane, ["operation.speed=6000 rpm"]))
+    assert said.startswith("operation.speed = 6000 rpm: ") and "(100 Hz)^2" in said
+    still = ["operation.speed=6000 rpm", "operation.stiffening=false"]
+    assert implausible_values(load_scene(plane, still)) == []
+
+
 def test_parts_that_a_blade_has_are_read():
     root = ["root.lobes=2", "root.pitch=7 mm", "root.taper=10 deg"]
     shroud = ["shroud.thickness=3 mm", "shroud.gap=2 mm"]
