@@ -57,7 +57,8 @@ def build_isolated(scene: Scene) -> Mesh:
         failure = answer
     raise InputError(
         f"mesh.size: gmsh {failure} on this scene of kind '{scene.kind}' with both algorithms, "
-        "expected a geometry that it can mesh; change mesh.size, or the parameter that was changed last"
+        "expected a geometry that it can mesh; change mesh.size, or the parameter that was "
+        "changed last"
     )
 
 

@@ -167,8 +167,8 @@ def _unsoftened_row(scene: Scene) -> Iterator[str]:
         turns = show(operation.speed / (2 * pi), "Hz")
         yield (
             f"operation.speed = {show(operation.speed, 'rad/s')}: a row of plane blades is "
-            "stiffened by rotation without spin softening; the square of a frequency of a wheel's blade "
-            f"that moves in its plane is lower by up to ({turns})^2"
+            "stiffened by rotation without spin softening; the square of a frequency of a wheel's "
+            f"blade that moves in its plane is lower by up to ({turns})^2"
         )
 
 
