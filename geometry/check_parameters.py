@@ -50,8 +50,8 @@ def check_names(scene: Scene) -> None:
     for field, name in [("excitation.at", scene.excitation.at), *_held_names(scene)]:
         if name not in known:
             raise InputError(
-                f"{field} = {name!r}: a {scene.kind} has no face or node set of that "
-                f"name{suggestion(name, known)}"
+                f"{field} = {name!r}: a scene of kind '{scene.kind}' has no face or node set of "
+                f"that name{suggestion(name, known)}"
             )
 
 

@@ -56,8 +56,9 @@ def build_isolated(scene: Scene) -> Mesh:
             raise answer
         failure = answer
     raise InputError(
-        f"mesh.size: gmsh {failure} on this {scene.kind} with both algorithms, expected a geometry "
-        "that it can mesh; change mesh.size, or the parameter that was changed last"
+        f"mesh.size: gmsh {failure} on this scene of kind '{scene.kind}' with both algorithms, "
+        "expected a geometry that it can mesh; change mesh.size, or the parameter that was "
+        "changed last"
     )
 
 

@@ -58,7 +58,7 @@ def resolved_scene(rows: Sequence[Any]) -> str:
 
 def mesh_quality(mesh: Mesh) -> str:
     """Sizes of bodies and faces, then what the mesher reports."""
-    rows: list[Sequence[object]] = [["points", len(mesh.points)]]
+    rows: list[Sequence[object]] = [["nodes", len(mesh.points)]]
     rows += [[f"body {name}, cells", len(cells)] for name, cells in mesh.bodies.items()]
     rows += [[f"volume {name}, cells", len(part)] for name, part in mesh.parts.items()]
     rows += [[f"face {name}, cells", len(cells)] for name, cells in mesh.faces.items()]

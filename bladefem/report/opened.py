@@ -236,10 +236,10 @@ class RunFolder:
             sectors = 0 if self.mesh.sector is None else self.mesh.sector.count
             wanted = min(known, key=lambda n: abs(n - _folded(order, sectors)))
         if wanted not in known:
-            raise InputError(
-                f"plot: nodal_diameter = {wanted} is not there, expected one of "
-                f"{', '.join(str(n) for n in known)}"
-            )
+            # the modes of a body without cyclic faces are stored under -1
+            listed = [str(n) for n in known if n >= 0]
+            wheel = f"one of {', '.join(listed)}" if listed else "it to be left out: no wheel"
+            raise InputError(f"plot: nodal_diameter = {wanted} is not there, expected {wheel}")
         part = data.sel(nodal_diameter=wanted)
         if not 1 <= mode <= part.sizes["mode"]:
             raise InputError(f"plot: mode = {mode}, expected 1 to {part.sizes['mode']}")

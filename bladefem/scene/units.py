@@ -127,7 +127,7 @@ def parse(
         return number
     if unit == "K" and written in _ZEROS:
         return number + _ZEROS[written]
-    factor, dimension = _parse_dimension(written, f"{name} = {shortened(value)}")
+    factor, dimension = _parse_dimension(written, f"{name} = {shortened(value)}", unit)
     _, wanted = _parse_dimension(unit, name)
     if dimension != wanted:
         raise InputError(
@@ -242,16 +242,22 @@ def _split_number(
     return float(match[1]), match[2] or ""
 
 
-def _parse_dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
-    """Factor to SI and exponents of a product of powers."""
+def _parse_dimension(
+    text: str,
+    where: str,
+    wanted: str = "1",
+) -> tuple[float, tuple[int, ...]]:
+    """Factor to SI and exponents of a product of powers; ``wanted`` is the SI unit that a message
+    about an unknown one tells.
+    """
     if len(text) > LONGEST_UNIT:
-        raise InputError(f"{where}: unknown unit '{shortened(text, 20)}'")
+        raise _unknown_unit(text, where, wanted)
     # exact: 7.85 g/cm^3 is 7850, not 7849.999...
     factor = Fraction(1)
     exponents = [0, 0, 0, 0, 0]
     for place, part in enumerate(text.replace("**", "^").split("/")):
         for word in filter(None, re.split(r"[ *·]+", part)):
-            size, dimension, power = _parse_unit(word, where)
+            size, dimension, power = _parse_unit(word, where, wanted)
             power = power if place == 0 else -power
             factor *= Fraction(str(size)) ** power
             exponents = [e + power * d for e, d in zip(exponents, dimension, strict=True)]
@@ -261,13 +267,19 @@ def _parse_dimension(text: str, where: str) -> tuple[float, tuple[int, ...]]:
         raise InputError(f"{where}: expected a unit of this world, not {text}") from None
 
 
-def _parse_unit(word: str, where: str) -> tuple[float, tuple[int, ...], int]:
+def _parse_unit(word: str, where: str, wanted: str) -> tuple[float, tuple[int, ...], int]:
     word = word.replace("²", "^2").replace("³", "^3")
     for candidate, power in ((word, 1), *_split_powers(word)):
         candidate = _SPELLINGS.get(candidate, candidate)
         if candidate in _UNITS:
             return *_UNITS[candidate], power
-    raise InputError(f"{where}: unknown unit '{shortened(word, 20)}'")
+    raise _unknown_unit(word, where, wanted)
+
+
+def _unknown_unit(word: str, where: str, wanted: str) -> InputError:
+    return InputError(
+        f"{where}: unknown unit '{shortened(word, 20)}', expected {_unit_examples(wanted)}"
+    )
 
 
 def _split_powers(word: str) -> list[tuple[str, int]]:

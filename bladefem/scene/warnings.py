@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import pi
 
 from .fields import display_value, field_at, value_at
 from .kinds import kind_named
@@ -27,7 +28,7 @@ def implausible_values(scene: Scene) -> list[str]:
     said += [*_unused_stiffnesses(scene), *_unused_solver_fields(scene), *_unused_phase(scene)]
     said += [*_unused_diameters(scene), *_unread_fields(scene), *_unused_angles(scene)]
     if "operation" in kind_named(scene.kind).tables:
-        said += [*_doubtful_speed(scene), *_doubtful_damping(scene)]
+        said += [*_doubtful_speed(scene), *_doubtful_damping(scene), *_unsoftened_row(scene)]
     if scene.contact.history == "frictionless" and (locked := self_locking(scene)):
         said.append(f"{locked}, which a seating without friction does not know")
     if is_frictionless(scene):
@@ -155,6 +156,20 @@ def _doubtful_speed(scene: Scene) -> Iterator[str]:
                 f"{MAX_RIM_SPEED:.0f} m/s that wheels withstand"
             )
             return
+
+
+def _unsoftened_row(scene: Scene) -> Iterator[str]:
+    """An endless row is pulled along its blades alone, wherever they stand: what softens blades of
+    a wheel that move in its plane is not there.
+    """
+    operation = scene.operation
+    if kind_named(scene.kind).is_plane and operation.stiffening and operation.speed > 0:
+        turns = show(operation.speed / (2 * pi), "Hz")
+        yield (
+            f"operation.speed = {show(operation.speed, 'rad/s')}: a row of plane blades is "
+            "stiffened by rotation without spin softening; the square of a frequency of a wheel's "
+            f"blade that moves in its plane is lower by up to ({turns})^2"
+        )
 
 
 def _doubtful_damping(scene: Scene) -> Iterator[str]:

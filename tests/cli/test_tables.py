@@ -8,7 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from bladefem.cli.tables import survey_tables
+from bladefem.cli.tables import mesh_quality, survey_tables
+
+
+def test_a_mesh_is_told_in_nodes():
+    """Points are those of a curve, or of a contact."""
+    mesh = SimpleNamespace(points=np.zeros((7, 3)), bodies={}, parts={}, faces={}, report={})
+    assert mesh_quality(mesh).splitlines()[-1].split() == ["nodes", "7"]
 
 
 def survey(**parts):

@@ -238,6 +238,13 @@ def test_a_mode_that_is_not_there_is_named(run, asked, said):
         run._draw_modes(data, **{"nodal_diameter": 9, **asked})
 
 
+def test_a_single_blade_has_no_nodal_diameters(run):
+    coordinates = {"nodal_diameter": [-1], "mode": [1]}
+    data = xr.Dataset({"frequency": (("nodal_diameter", "mode"), [[1.0]])}, coordinates)
+    with pytest.raises(InputError, match="nodal_diameter = 9 .*expected it to be left out"):
+        run._draw_modes(data, nodal_diameter=9)
+
+
 def test_a_folder_without_a_run_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"no scene\.toml in it"):
         bladefem.open(tmp_path)

@@ -116,6 +116,7 @@ def test_nodal_diameters_of_a_single_blade_are_not_used():
         ("punch", "mesh.fillet_elements=9"),
         ("plane", "mesh.fillet_elements=9"),
         ("plane", "mesh.curved=false"),
+        ("plane", "mesh.algorithm=hxt"),
         ("wedge", "root.pitch=10 mm"),
         ("wedge", "root.neck=50 mm"),
         ("wedge", "shroud.width=8 mm"),
@@ -128,6 +129,46 @@ def test_nodal_diameters_of_a_single_blade_are_not_used():
 def test_fields_that_a_kind_does_not_read_are_told(scene, override):
     (said,) = implausible_values(load_scene(ROOT / "scenes" / f"{scene}.toml", [override]))
     assert said.startswith(f"{override.partition('=')[0]} = ") and " is not used: " in said
+
+
+@pytest.mark.parametrize("kind", ["hertz", "punch"])
+def test_pairs_without_volumes_do_not_read_how_volumes_are_filled(kind):
+    given = [f"{kind}.dimension=2", "mesh.algorithm=hxt"]
+    (said,) = implausible_values(load_scene(ROOT / "scenes" / f"{kind}.toml", given))
+    assert said.startswith("mesh.algorithm = hxt is not used: ")
+
+
+@pytest.mark.parametrize(
+    "override", ["imported.tolerance=0.01", "mesh.fillet_elements=9", "damper.angle=41 deg"]
+)
+def test_a_drawing_is_not_matched_and_its_platforms_have_the_angles(override):
+    (said,) = implausible_values(load_scene(ROOT / "scenes" / "own_blade.toml", [override]))
+    assert said.startswith(f"{override.partition('=')[0]} = ") and " is not used: " in said
+
+
+@pytest.mark.parametrize(
+    "override",
+    ["mesh.size=1 mm", "mesh.scale=2", "mesh.algorithm=hxt", "damper.angle=41 deg"]
+    + ["damper.length=10 mm"],
+)
+def test_a_mesh_of_a_file_is_not_meshed_nor_its_damper_drawn(tmp_path, override):
+    (tmp_path / "sector.msh").touch()
+    scene = tmp_path / "scene.toml"
+    scene.write_text('kind = "imported"\n[imported]\nfile = "sector.msh"\nsectors = 36\n')
+    (said,) = implausible_values(load_scene(scene, [override]))
+    assert said.startswith(f"{override.partition('=')[0]} = ") and " is not used: " in said
+    assert implausible_values(load_scene(scene, ["damper.mass=20 g", "damper.axial=held"])) == []
+
+
+def test_a_row_of_plane_blades_is_told_to_turn_without_spin_softening():
+    """In-plane motion of a blade of 150 mm with its platform, hub radius 0, 6000 rpm: 245.3 Hz in the
+    row, 224.6 about the axis z, apart by the 100 Hz of the speed.
+    """
+    plane = ROOT / "scenes" / "plane.toml"
+    (said,) = implausible_values(load_scene(plane, ["operation.speed=6000 rpm"]))
+    assert said.startswith("operation.speed = 6000 rpm: ") and "(100 Hz)^2" in said
+    still = ["operation.speed=6000 rpm", "operation.stiffening=false"]
+    assert implausible_values(load_scene(plane, still)) == []
 
 
 def test_parts_that_a_blade_has_are_read():

@@ -83,9 +83,12 @@ WITHOUT_A_MESH = [
     ("mesh.scale=0.02", "mesh.scale = 0.02: gives about"),
     ("mesh.size=0.1 mm", "mesh.size = 0.0001 m: gives about"),
     ("mesh.contact_size=1 um", "mesh.contact_size = 1e-06 m: gives about"),
-    ("support.clamp=rooot", "support.clamp = 'rooot': a wedge sector has no face or node set"),
-    ('support.directions=["rim: z"]', "support.directions = 'rim': a wedge sector has no face"),
-    ("excitation.at=nowhere", "excitation.at = 'nowhere': a wedge sector has no face or node set"),
+    ("support.clamp=rooot", "support.clamp = 'rooot': a scene of kind 'wedge sector' has no face"),
+    (
+        'support.directions=["rim: z"]',
+        "support.directions = 'rim': a scene of kind 'wedge sector' has no",
+    ),
+    ("excitation.at=nowhere", "excitation.at = 'nowhere': a scene of kind 'wedge sector' has"),
     ("excitation.at=tip_midd", "did you mean 'tip_mid'?"),
     ("disc.bore_radius=195 mm", "95 % of disc.rim_radius"),
     ("shank.length=44.9 mm", "before disc.width, expected the same"),
@@ -200,7 +203,10 @@ def test_a_force_on_the_fillet_needs_one():
 
 OTHER_KINDS = [
     ({"kind": "plane blades", "plane": {"seat_width": "21.8 mm"}}, "98 % of the platform"),
-    ({"kind": "plane blades", "excitation": {"at": "trailing_edge"}}, "a plane blades has no"),
+    (
+        {"kind": "plane blades", "excitation": {"at": "trailing_edge"}},
+        "of kind 'plane blades' has no",
+    ),
     ({"kind": "plane blades", "mesh": {"scale": 0.02, "size": "0.1 mm"}}, "mesh.scale"),
     ({"kind": "z mass", "z_mass": {"bar": "29 mm"}}, "z_mass.bar"),
     ({"kind": "z mass", "mesh": {"scale": 0.02}}, "mesh.scale"),

@@ -60,7 +60,7 @@ WRONG = [
     ("1e400 m", "m", "finite"),
     (float("nan"), "m", "finite"),
     (float("inf"), "1", "finite"),
-    ("3 mmm", "m", "unknown unit 'mmm'"),
+    ("3 mmm", "m", "unknown unit 'mmm', expected m or mm or um"),
     ("", "m", "expected a number"),
     ("mm", "m", "expected a number"),
     ("1,5 mm", "m", "expected a number"),

@@ -21,9 +21,10 @@ BLADE_FACES = (
 )
 
 
-# what neither a drawing of straight edges nor one without fillets reads; mesh.algorithm, which
-# nothing plane reads, is not told: run folders have written it out with defaults of their time
+# what neither a drawing of straight edges nor one without fillets reads
 STRAIGHT_FIELDS = ("mesh.curved", "mesh.fillet_elements")
+# what a drawing without volumes does not read either
+PLANE_FIELDS = (*STRAIGHT_FIELDS, "mesh.algorithm")
 
 
 def static_fields(*bodies: str) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from ..tables import Scene
 from .conditions import (
+    PLANE_FIELDS,
     STRAIGHT_FIELDS,
     at_most,
     below_limit,
@@ -38,9 +39,10 @@ def thin_parts(scene: Scene) -> dict[str, float]:
     return {"hertz.half_width": scene.hertz.half_width}
 
 
-def unread(_: Scene) -> tuple[str, ...]:
+def unread(scene: Scene) -> tuple[str, ...]:
     """Fields that change nothing."""
-    return ("accuracy", *STRAIGHT_FIELDS, *static_fields("blade", "damper"))
+    drawing = STRAIGHT_FIELDS if scene.hertz.dimension == 3 else PLANE_FIELDS
+    return ("accuracy", *drawing, *static_fields("blade", "damper"))
 
 
 KIND = Kind(

@@ -14,6 +14,13 @@ from ..tables import Scene
 from .conditions import known_diameters
 from .record import ENGINE_TABLES, Kind, SceneCall
 
+# what draws and meshes, which a mesh file has behind it
+MESHING_FIELDS = ("size", "contact_size", "fillet_elements", "algorithm", "scale", "curved")
+# what joins the files of a mesh and matches its nodes
+MATCHING_FIELDS = ("linear", "tolerance", "cut_gap", "more")
+# what draws a damper between imported.seats, but for the angles, which are those of the seats
+DRAWN_DAMPER_FIELDS = ("shape", "length", "base")
+
 
 def conditions(scene: Scene) -> Iterator[str]:
     file = scene.imported.file
@@ -76,6 +83,20 @@ def is_drawing(scene: Scene) -> bool:
     return Path(scene.imported.file).suffix.lower() in (".step", ".stp")
 
 
+def unread(scene: Scene) -> tuple[str, ...]:
+    """Fields that change nothing: a mesh is not drawn, a drawing is not matched, and a damper of
+    the file has its own shape.
+    """
+    if is_drawing(scene):
+        # fillets of a drawing are faces like others
+        names = ["mesh.fillet_elements", *(f"imported.{name}" for name in MATCHING_FIELDS)]
+    else:
+        names = [f"mesh.{name}" for name in MESHING_FIELDS]
+    if scene.imported.seats is None:
+        names += [f"damper.{name}" for name in DRAWN_DAMPER_FIELDS]
+    return (*names, "damper.angle", "damper.angle_next")
+
+
 def whole_paths(scene: Scene, folder: Path) -> Scene:
     """The scene with whole paths of its files."""
     imported = scene.imported
@@ -112,4 +133,5 @@ KIND = Kind(
     whole_paths=whole_paths,
     files=input_files,
     conditions=conditions,
+    unread=unread,
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import BLADE_FACES, STRAIGHT_FIELDS, at_most, below_limit
+from .conditions import BLADE_FACES, PLANE_FIELDS, at_most, below_limit
 from .record import ENGINE_TABLES, Kind, SceneCall
 
 
@@ -47,7 +47,7 @@ def face_names(_: Scene) -> tuple[str, ...]:
 
 def unread(_: Scene) -> tuple[str, ...]:
     """Fields that change nothing."""
-    return STRAIGHT_FIELDS
+    return PLANE_FIELDS
 
 
 KIND = Kind(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import STRAIGHT_FIELDS, below_limit, isotropic, one_of, static_fields
+from .conditions import PLANE_FIELDS, below_limit, isotropic, one_of, static_fields
 from .record import Kind, SceneCall
 
 
@@ -28,7 +28,7 @@ def thin_parts(scene: Scene) -> dict[str, float]:
 
 def unread(scene: Scene) -> tuple[str, ...]:
     """Fields that change nothing; a round punch is drawn with curved elements."""
-    drawing = ("mesh.fillet_elements",) if scene.punch.dimension == 3 else STRAIGHT_FIELDS
+    drawing = ("mesh.fillet_elements",) if scene.punch.dimension == 3 else PLANE_FIELDS
     return ("accuracy", *drawing, *static_fields("blade"))
 
 
