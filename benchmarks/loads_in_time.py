@@ -264,7 +264,7 @@ def steps_needed(ring: Ring, layer: Layer, frequency: float, growth: np.ndarray)
     return float(highest / frequency / LARGEST_STEP)
 
 
-@njit
+@njit(cache=True, error_model="numpy")
 def contact_forces(w, before, friction, layer, out, slips, opens, work, most):
     """Forces (blades, rows) on the dampers beyond the preload; friction holds the sliders', and
     most (nodes,) the largest stiffness over that at rest.
@@ -292,7 +292,8 @@ def contact_forces(w, before, friction, layer, out, slips, opens, work, most):
             size = np.sqrt(size)
             limit = mu[k] * normal
             if size > limit:
-                x *= limit / size
+                for t in range(per - 1):
+                    x[t] *= limit / size
                 if normal > 0:
                     slips[b, k] += 1
             for t in range(per - 1):
@@ -301,12 +302,16 @@ def contact_forces(w, before, friction, layer, out, slips, opens, work, most):
                 friction[b, k, t] = x[t]
                 out[b, i + 1 + t] = x[t] - t0[k, t]
             out[b, i] = normal - max(n0[k], 0.0)
-    before[:] = w
+        for i in range(w.shape[1]):
+            before[b, i] = w[b, i]
 
 
-@njit
+@njit(cache=True, error_model="numpy")
 def march_steps(ring, damper, contact, state, drive, out):
-    """Semi-implicit Euler steps; out (steps, blades) becomes the readings."""
+    """Semi-implicit Euler steps; out (steps, blades) becomes the readings.
+
+    In loops: expressions of whole arrays take 20 s to compile.
+    """
     moved, pushed, force, reading, stiffness, damping = ring
     shapes, damper_stiffness, damper_damping = damper
     q, v, p, z, friction, before, slips, opens, work, most = state
@@ -316,32 +321,40 @@ def march_steps(ring, damper, contact, state, drive, out):
     half = int(first)
     w = np.zeros((blades, rows))
     on_damper = np.zeros((blades, rows))
-    on_blade = np.zeros((blades, rows))
+    on_blade = np.zeros(blades * rows)
+    waves = np.zeros(blades)
     turned = np.ascontiguousarray(shapes.T)
     for i in range(out.shape[0]):
-        u = np.dot(moved, q).reshape(blades, rows)
+        u = np.dot(moved, q)
         d = np.dot(p, turned)
         for b in range(blades):
-            # the first seat touches this blade, the other one the next
-            w[b, :half] = u[b, :half] - d[b, :half]
-            w[b, half:] = u[(b + 1) % blades, half:] - d[b, half:]
+            for r in range(rows):
+                # the first seat touches this blade, the other one the next
+                blade = b if r < half else (b + 1) % blades
+                w[b, r] = u[blade * rows + r] - d[b, r]
         contact_forces(w, before, friction, contact, on_damper, slips, opens, work, most)
         for b in range(blades):
-            on_blade[b, :half] = on_damper[b, :half]
-            on_blade[b, half:] = on_damper[(b - 1) % blades, half:]
-        push = -np.dot(pushed, on_blade.ravel())
-        time = i * dt
-        for b in range(blades):
-            push += force[:, b] * np.cos(omega * time + b * phase)
-        v[:] = (v + dt * (push - stiffness * q)) / (1 + dt * damping)
-        q += dt * v
+            for r in range(rows):
+                blade = b if r < half else (b + 1) % blades
+                on_blade[blade * rows + r] = on_damper[b, r]
+        push = np.dot(pushed, on_blade)
         push_damper = np.dot(on_damper, shapes)
         for b in range(blades):
-            step = dt * (push_damper[b] - damper_stiffness * p[b])
-            z[b] = (z[b] + step) / (1 + dt * damper_damping)
-        p += dt * z
+            waves[b] = np.cos(omega * (i * dt) + b * phase)
+        for m in range(q.size):
+            total = -push[m]
+            for b in range(blades):
+                total += force[m, b] * waves[b]
+            v[m] = (v[m] + dt * (total - stiffness[m] * q[m])) / (1 + dt * damping[m])
+            q[m] += dt * v[m]
         for b in range(blades):
-            out[i, b] = np.sum(reading[:, b] * q)
+            for m in range(p.shape[1]):
+                step = dt * (push_damper[b, m] - damper_stiffness[m] * p[b, m])
+                z[b, m] = (z[b, m] + step) / (1 + dt * damper_damping[m])
+                p[b, m] += dt * z[b, m]
+            out[i, b] = 0.0
+            for m in range(q.size):
+                out[i, b] += reading[m, b] * q[m]
 
 
 def start_at_rest(ring: Ring, layer: Layer) -> State:

@@ -75,7 +75,8 @@ def model_of(force, shift=0, harmonics=31):
     return ReducedModel(tuple(sides), contact, {1: np.array([force])}, damper=damper)
 
 
-@njit
+# in loops: expressions of whole arrays take 11 s to compile, loops 1 s
+@njit(cache=True)
 def march(state, slider, old, matrices, steps, omega, force):
     """Symplectic Euler steps of one period; returns the aerofoils' motion (steps, blades).
 
@@ -93,8 +94,11 @@ def march(state, slider, old, matrices, steps, omega, force):
     w = np.empty(3)
     f = np.empty(3)
     for i in range(steps):
-        z[:] = x + DAMPING * v
-        lift[:] = 0.0
+        for b in range(blades):
+            for a in range(4):
+                z[b, a] = x[b, a] + DAMPING * v[b, a]
+            for a in range(3):
+                lift[b, a] = 0.0
         for b in range(blades):
             after = (b + 1) % blades
             for a in range(4):
@@ -114,18 +118,22 @@ def march(state, slider, old, matrices, steps, omega, force):
                 f[1] = slider[b, k, 0] + KT * (w[1] - old[b, k, 0])
                 f[2] = slider[b, k, 1] + KT * (w[2] - old[b, k, 1])
                 limit = MU * normal / max(np.sqrt(f[1] ** 2 + f[2] ** 2), 1e-300)
-                f[1:] *= min(limit, 1.0)
-                slider[b, k] = f[1:]
-                old[b, k] = w[1:]
+                for d in (1, 2):
+                    f[d] *= min(limit, 1.0)
+                    slider[b, k, d - 1] = f[d]
+                    old[b, k, d - 1] = w[d]
                 for a in range(3):
                     for d in range(3):
                         push[blade, a] -= f[d] * contacts[k, d, a]
                         lift[b, a] += f[d] * contacts[k, d, a]
-        v += dt * push / inertia
-        u += dt * lift / DAMPER_MASS
-        x += dt * v
-        y += dt * u
-        out[i] = x[:, 3]
+        for b in range(blades):
+            for a in range(4):
+                v[b, a] += dt * push[b, a] / inertia[a]
+                x[b, a] += dt * v[b, a]
+            for a in range(3):
+                u[b, a] += dt * lift[b, a] / DAMPER_MASS
+                y[b, a] += dt * u[b, a]
+            out[i, b] = x[b, 3]
     return out
 
 

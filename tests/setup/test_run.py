@@ -116,6 +116,13 @@ def test_exit_codes_come_through(place):
     assert run(place, "mpirun", "2", "x.py", FAIL="x.py", CODE="2").returncode == 2
 
 
+def test_ranks_of_tests_leave_their_core_while_they_wait(place):
+    """Where others have the cores, ranks that wait busily wait for each other's turns."""
+    mpirun = place / ".venv" / "bin" / "mpirun"
+    mpirun.write_text('#!/bin/sh\necho "idle $OMPI_MCA_mpi_yield_when_idle"\n')
+    assert run(place, "test").stdout.count("idle 1\n") == 2
+
+
 def test_all_tests_run_on_one_two_and_four_ranks(place):
     done = run(place, "test")
     assert done.returncode == 0

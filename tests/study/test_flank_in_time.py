@@ -32,26 +32,40 @@ FREQUENCIES = (1077.0, 1069.4, 1061.8, 1054.3, 1046.7, 1039.1, 1031.5, 1023.9, 1
 STEPS, PERIODS, COUNTED = 1000, 400, 150
 
 
-@njit
+# in loops: 0.3 times the time of expressions of small arrays
+@njit(cache=True)
 def march(stiffness, damping, W, R, kt, kn, mu, n0, force, probe, omega, q, v, z, steps, periods):
     """Symplectic Euler steps of modes and damper; the motion (periods, steps) of the probe."""
     n, d = W.shape
     dt = 2 * np.pi / omega / steps
     out = np.empty((periods, steps))
+    a = np.empty(d)
     for period in range(periods):
         for step in range(steps):
             angle = 2 * np.pi * step / steps
-            a = force[:, 0] + force[:, 1] * np.cos(angle) + force[:, 2] * np.sin(angle)
-            a -= stiffness * q + damping @ v
+            for i in range(d):
+                a[i] = force[i, 0] + force[i, 1] * np.cos(angle) + force[i, 2] * np.sin(angle)
+                a[i] -= stiffness[i] * q[i]
+                for j in range(d):
+                    a[i] -= damping[i, j] * v[j]
             for c in range(n):
-                w = W[c] @ q
-                normal = max(n0[c] + kn[c] * (R[c] @ q), 0.0)
-                friction = min(max(kt[c] * (w - z[c]), -mu[c] * normal), mu[c] * normal)
-                z[c] = w - friction / kt[c]
-                a -= W[c] * friction + R[c] * (normal - max(n0[c], 0.0))
-            v += dt * a
-            q += dt * v
-            out[period, step] = probe @ q
+                along = 0.0
+                across = 0.0
+                for i in range(d):
+                    along += W[c, i] * q[i]
+                    across += R[c, i] * q[i]
+                normal = max(n0[c] + kn[c] * across, 0.0)
+                friction = min(max(kt[c] * (along - z[c]), -mu[c] * normal), mu[c] * normal)
+                z[c] = along - friction / kt[c]
+                beyond = normal - max(n0[c], 0.0)
+                for i in range(d):
+                    a[i] -= W[c, i] * friction + R[c, i] * beyond
+            read = 0.0
+            for i in range(d):
+                v[i] += dt * a[i]
+                q[i] += dt * v[i]
+                read += probe[i] * q[i]
+            out[period, step] = read
     return out
 
 
