@@ -66,18 +66,16 @@ def resonance_curve(
     """A swept curve with settings that hold the height of its peak to half the accuracy.
 
     A rough sweep finds the peak, the settings are chosen there, and the curve is swept with them.
-    It is swept again where that shows a higher peak, or points where harmonics that were left out
-    move more than the accuracy allows; then with settings that are no poorer. What the highest
-    point of the curve differs by from the peak that the settings were chosen at is counted.
+    It is swept again where that shows a higher peak, or points that lack harmonics, with settings
+    that are no poorer. What its highest point differs by from the peak chosen at is counted.
 
     Args:
         settings: where the choice begins, for example those of a neighbouring load.
         band: [Hz]; round the resonances when None.
         march: what the blade keeps to after a motion, by which harmonics are chosen where most
             contacts lift off; richer balances tell them when None.
-        fixed: names that a choice at the peak may not change although they are not the user's, such
-            as modes, chosen with the reduction. Harmonics, samples and points that lift-off, folds
-            and flanks ask for are taken all the same.
+        fixed: names that the choice at the peak may not change although they are not the user's,
+            such as modes; what lift-off, folds and flanks ask for is taken all the same.
 
     Raises:
         NotSolvedError: no point converged.

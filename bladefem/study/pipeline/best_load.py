@@ -407,16 +407,34 @@ def tolerated_loads(tried: Sequence[Peak], accuracy: float) -> tuple[float, floa
     logs = np.log([peak.value for peak in tried])
     heights = np.array([peak.height for peak in tried])
     slopes = np.array([peak.slope for peak in tried])
+    if len(tried) < 2:
+        return np.nan, np.nan
+    lowest = heights.min()
+    curve = CubicHermiteSpline(logs, heights / lowest - 1 - accuracy, slopes / lowest)
+    return ends_of_range(
+        heights, accuracy, lambda last, j: np.exp(brentq(curve, logs[last], logs[j]))
+    )
+
+
+def ends_of_range(
+    heights: np.ndarray,
+    accuracy: float,
+    crossing: Callable[[int, int], float],
+) -> tuple[float, float]:
+    """Loads [N] on either side of the lowest resonance at which it has grown by the accuracy; NaN
+    on a side where none is that high.
+
+    Args:
+        heights: (k,) of ascending loads.
+        crossing: of two neighbours, one within the accuracy and one above it, the load between.
+    """
     best = int(np.argmin(heights))
     ends = [np.nan, np.nan]
-    if len(tried) < 2:
-        return ends[0], ends[1]
-    curve = CubicHermiteSpline(logs, heights / heights[best] - 1 - accuracy, slopes / heights[best])
-    for i, side in enumerate((range(best - 1, -1, -1), range(best + 1, len(tried)))):
+    for i, side in enumerate((range(best - 1, -1, -1), range(best + 1, len(heights)))):
         last = best
         for j in side:
             if heights[j] > (1 + accuracy) * heights[best]:
-                ends[i] = float(np.exp(brentq(curve, logs[last], logs[j])))
+                ends[i] = float(crossing(last, j))
                 break
             last = j
     return ends[0], ends[1]

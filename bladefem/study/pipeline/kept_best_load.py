@@ -23,7 +23,7 @@ from ...hbm.parallel import share_work
 from ...util.arrays import RealArray
 from ...util.communicator import Communicator
 from .assemble_model import LoadCase
-from .best_load import BestLoad, KeptLoad, studied_load
+from .best_load import BestLoad, KeptLoad, ends_of_range, studied_load
 from .curve import Curve
 from .loads import Search, StudiedLoads, in_order, lower_studied
 
@@ -178,16 +178,10 @@ def _tolerated_loads(loads: RealArray, heights: RealArray, accuracy: float) -> t
     chords between those studied in logarithms: the range of a curve with one minimum is no
     narrower. NaN on a side where none is that high.
     """
-    k = int(heights.argmin())
-    x, y = np.log(loads), np.log(heights / heights[k])
-    level = np.log1p(accuracy)
-    ends = [np.nan, np.nan]
-    for i, side in enumerate((range(k - 1, -1, -1), range(k + 1, len(x)))):
-        last = k
-        for j in side:
-            if y[j] > level:
-                share = (level - y[last]) / (y[j] - y[last])
-                ends[i] = float(np.exp(x[last] + share * (x[j] - x[last])))
-                break
-            last = j
-    return ends[0], ends[1]
+    x, y = np.log(loads), np.log(heights / heights.min())
+
+    def crossing(last: int, j: int) -> float:
+        share = (np.log1p(accuracy) - y[last]) / (y[j] - y[last])
+        return float(np.exp(x[last] + share * (x[j] - x[last])))
+
+    return ends_of_range(heights, accuracy, crossing)
