@@ -23,6 +23,11 @@ if TYPE_CHECKING:
 # methods of a row that gives the resonance in place of the balances of its curve
 MARCHED = "march in time"
 FOLLOWED = "followed to the stiff layer"
+# what the legend says of them
+GIVEN_INSTEAD = {
+    MARCHED: "resonance marched in time",
+    FOLLOWED: "resonance of the stiff layer",
+}
 
 
 def draw_responses(
@@ -69,6 +74,7 @@ def draw_responses(
                 zorder=5,
                 label=f"unstable ({len(unstable)})",
             )
+        explain_diamonds(ax, points)
         ax.set(
             xlabel="excitation frequency [Hz]",
             ylabel="vibration amplitude [µm]",
@@ -132,6 +138,16 @@ def draw_curve(
             mew=0.6,
             zorder=6 if apart else 4,
         )
+
+
+def explain_diamonds(ax: Axes, points: pd.DataFrame) -> None:
+    """A line of the legend for resonances that are given in place of those of the balances."""
+    if "method" not in points:
+        return
+    methods = set(points["method"])
+    words = " or ".join(text for method, text in GIVEN_INSTEAD.items() if method in methods)
+    if words:
+        ax.plot([], [], "D", color="#777777", ms=6, mec="white", mew=0.6, label=words)
 
 
 def resonance_of(curve: pd.DataFrame) -> tuple[int, bool]:

@@ -411,10 +411,14 @@ def test_the_resonance_that_is_given_is_the_one_marked(heights, verdicts, method
         }
     )
     assert resonance_of(curve) == (row, apart)
-    marks = [line for line in draw_responses(curve).axes[0].lines if len(line.get_xdata()) == 1]
+    axes = draw_responses(curve).axes[0]
+    marks = [line for line in axes.lines if len(line.get_xdata()) == 1]
     assert [line.get_marker() for line in marks if line.get_xdata()[0] == row + 1][-1] == (
         "D" if apart else "o"
     )
+    explained = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert ("resonance marched in time" in explained) == (MARCHED in methods)
+    assert ("resonance of the stiff layer" in explained) == (FOLLOWED in methods)
 
 
 def test_an_optimum_chart_shows_the_estimated_errors():
