@@ -56,7 +56,8 @@ def test_where_no_period_is_like_another_the_end_is_marched_on(folding, monkeypa
     longer = resonance_in_time(family_of(folding.model), SETTINGS, start)
     assert longer.periods == found.periods + module.CALMING_PERIODS
     assert longer.highest == pytest.approx(found.highest, rel=2e-3)
-    assert longer.error == found.error
+    # less is left to its limit
+    assert 0.9 * found.error < longer.error < found.error
 
 
 def test_a_search_that_is_not_closed_in_says_so(folding):
@@ -176,3 +177,40 @@ def test_the_resonance_of_a_stiff_layer_is_the_one_of_the_curve():
     )
     assert instead.peak_amplitude == pytest.approx(0.99e-3)
     assert instead.friction_work == pytest.approx(2.7e-3)
+
+
+def test_more_contact_points_that_change_much_have_their_own_resonance(monkeypatch):
+    """The shipped wedge under 9 N: 8 points a seat have it at 367.9 Hz, 32 keep 1.45 mm there and
+    1.7 mm at 367.6 Hz. Here it moves from 100 to 95 rad/s and becomes 10 % lower.
+    """
+    bend, height = 0.02, 0.9
+    marched = []
+
+    def settled(omega, top, most):
+        """1 / height^2 is a parabola, as that of one mode."""
+        mean = (most**-2 + bend / 2 * (omega - top) ** 2) ** -0.5
+        return module._Settled(omega, mean, mean, mean, None, True, 0.0, 0.0)
+
+    def moved(model, before, omega, work):
+        marched.append(omega)
+        return settled(omega, 95.0, height)
+
+    monkeypatch.setattr(module, "_moved", moved)
+    monkeypatch.setattr(module, "_marched_model", lambda *_: None)
+    monkeypatch.setattr(module, "_most_points", lambda *_: 63)
+    monkeypatch.setattr(module, "_error", lambda *_: 0.02)
+    top = module._Top(settled(100.0, 100.0, 1.0), settled(97.0, 100.0, 1.0), bend)
+    few = module._Told(top.best, 8, 0.3)
+    work = module._Work()
+    told = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
+    assert told.best.omega == pytest.approx(95.0, abs=1.5)
+    assert told.best.mean == pytest.approx(height, rel=module.WORTH_A_MARCH)
+    assert told.points == 32
+    assert told.error == pytest.approx(0.02 + 0.1, abs=module.WORTH_A_MARCH)
+    # towards the higher neighbour first, and no further to the other side
+    assert max(marched) == 100.0
+    # without room for a search the change at the frequency of fewer points is all that is known
+    work.operations = np.inf
+    told = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
+    assert told.best.omega == 100.0
+    assert told.error == pytest.approx(0.3 + 1 - told.best.mean)

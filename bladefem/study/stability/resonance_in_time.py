@@ -81,6 +81,8 @@ MOST_STEPS = 10
 JUMP_SHARE = 0.7
 # steps towards a jump with more contact points
 FINER_STEPS = 2
+# relative change by more contact points, above which their resonance may be at another frequency
+MOVED_BY_POINTS = 0.1
 # relative gain of height by the vertex of a parabola that is marched as well
 WORTH_A_MARCH = 0.01
 # times the contact points that judge a resonance: twice as many may change it less than all do
@@ -188,6 +190,17 @@ class _Top:
         return max(self.rise_ahead, self.rise_behind)
 
 
+@dataclass(frozen=True)
+class _Told:
+    """The resonance that is told, with the contact points of a seat (None: all) that it was marched
+    with, and its estimated relative error but for the way that is left to its limit.
+    """
+
+    best: _Settled
+    points: int | None
+    error: float
+
+
 @dataclass
 class _Work:
     """What a search has taken so far, and how it marches."""
@@ -240,18 +253,20 @@ def resonance_in_time(
             start = carried_motion(models, settings, motion, settings_here)
         work = _Work(1.0 if model.decay is None else MORE_WITH_LAW)
         top, error = _by_short_steps(model, start, work)
-        best, finer, change = _with_more_points(models, settings_here, decay, top, work)
-        finest = _marched_model(models, replace(settings_here, points=finer), decay)
-        best = _calmed(finest, best, work)
+        told = _with_more_points(
+            models, settings_here, decay, _Told(top.best, points, error), top, work
+        )
+        finest = _marched_model(models, replace(settings_here, points=told.points), decay)
+        best = _calmed(finest, told.best, work)
     except (InputError, _MarchFailedError):
         return None
-    error += change
+    error = told.error + best.left
     return ResonanceInTime(
         best.omega / (2 * np.pi),
         best.lowest,
         best.highest,
         error if error < LARGEST_ERROR else float(np.inf),
-        finer or _most_points(models, settings_here),
+        told.points or _most_points(models, settings_here),
         len(work.frequencies),
         work.periods,
         best.friction_work,
@@ -332,15 +347,20 @@ def _overdriven(model: ReducedModel, state: RingState, omega: float, work: _Work
     return _settled(model, driven_anew(model, state, Drive(omega)), work)
 
 
-def _climbed(model: ReducedModel, start: _Settled, bend: float, work: _Work) -> _Top:
+def _climbed(
+    model: ReducedModel, start: _Settled, bend: float, work: _Work, upwards: bool = True
+) -> _Top:
     """The highest motion uphill of a start, by steps of the circular frequency.
+
+    Args:
+        upwards: higher frequencies are tried first; uphill there, lower ones are not.
 
     Raises:
         _MarchFailedError: it was not closed in.
     """
     step = STEP_SHARE * np.sqrt(2 / bend) / start.mean
     known = {0: start}
-    for side in (1, -1):
+    for side in (1, -1) if upwards else (-1, 1):
         place = side
         while abs(place) <= MOST_STEPS and not work.exhausted:
             omega = start.omega + place * step
@@ -426,8 +446,8 @@ def _refined(model: ReducedModel, top: _Top, work: _Work, most: int = MOST_STEPS
 
 
 def _error(model: ReducedModel, top: _Top, above: _Settled, work: _Work) -> float:
-    """Estimated relative error of the highest amplitude, but for those by the contact points and by
-    the steps in time.
+    """Estimated relative error of the highest amplitude, but for those by the contact points, by
+    the steps in time, and by the way that is left to the limit.
 
     Args:
         above: what the climb ended on, with longer steps in time, on its way down.
@@ -443,7 +463,7 @@ def _error(model: ReducedModel, top: _Top, above: _Settled, work: _Work) -> floa
     changes = [abs(one.mean / best.mean - 1) for one in others if one.mean > JUMP_SHARE * best.mean]
     error = max([SETTLED_CHANGE, *changes])
     # single periods that are higher may come
-    return error + _half_band(best) + top.left + best.left
+    return error + _half_band(best) + top.left
 
 
 def _half_band(found: _Settled) -> float:
@@ -452,17 +472,21 @@ def _half_band(found: _Settled) -> float:
 
 
 def _with_more_points(
-    models: Family, settings: Settings, decay: RealArray | None, top: _Top, work: _Work
-) -> tuple[_Settled, int | None, float]:
-    """The resonance with MORE_POINTS times the contact points, how many these are, and what they
-    change, which is more than what is left to all of them where the change is of first order.
+    models: Family, settings: Settings, decay: RealArray | None, few: _Told, top: _Top, work: _Work
+) -> _Told:
+    """The resonance with MORE_POINTS times the contact points. What these change is more than what
+    is left to all of them where the change is of first order.
 
-    Where the blade jumps it is followed as far as these points let it. Where it does not keep the
-    motion with them the change is taken next to it, twice, and the resonance stays what it was.
+    Where they change much they have their own resonance, which is sought; where the blade jumps it
+    is followed as far as these points let it. Where it does not keep the motion with them the
+    change is taken next to it, twice, and the resonance stays what it was.
+
+    Args:
+        few: of the top, with the contact points of the settings.
     """
     points, most = settings.points, _most_points(models, settings)
     if points is None or points >= most or not top.closed_in:
-        return top.best, points, 0.0
+        return few
     finer = MORE_POINTS * points if MORE_POINTS * points < most else None
     model = _marched_model(models, replace(settings, points=finer), decay)
     if decay is None:
@@ -470,19 +494,48 @@ def _with_more_points(
     best, neighbour = top.best, top.neighbour
     found = _moved(model, best, best.omega, work)
     if found.mean > JUMP_SHARE * best.mean:
+        if not top.jump and abs(found.mean / best.mean - 1) > MOVED_BY_POINTS:
+            return _sought_anew(model, few, found, finer, top, work)
         if top.jump:
             found = _refined(model, replace(top, best=found), work, FINER_STEPS).best
-        return found, finer, abs(found.mean / best.mean - 1)
+        return _Told(found, finer, few.error + abs(found.mean / best.mean - 1))
     found = _moved(model, neighbour, neighbour.omega, work)
     if found.mean < JUMP_SHARE * neighbour.mean:
-        return best, points, float(np.inf)
+        return replace(few, error=float(np.inf))
     beside = 1 - neighbour.mean / best.mean
     change = abs(found.mean / neighbour.mean - 1)
     if decay is None:
-        return best, points, 2 * change + beside
+        return replace(few, error=few.error + 2 * change + beside)
     # few points of a layer that stiffens as it is pressed are too few for its resonance itself
     away = neighbour.omega - best.omega
-    return _followed_uphill(model, found, away, work), finer, change + beside
+    found = _followed_uphill(model, found, away, work)
+    return _Told(found, finer, few.error + change + beside)
+
+
+def _sought_anew(
+    model: ReducedModel,
+    few: _Told,
+    found: _Settled,
+    points: int | None,
+    top: _Top,
+    work: _Work,
+) -> _Told:
+    """The resonance of more contact points uphill of what they keep where fewer have theirs.
+
+    Its error is that of these points, and what they change from one resonance to the other.
+
+    Args:
+        found: at the frequency of the top.
+        points: of a seat; None for all.
+        top: of fewer points.
+    """
+    before = top.best
+    try:
+        again = _climbed(model, found, top.bend, work, top.neighbour.omega > before.omega)
+    except _MarchFailedError:
+        return _Told(found, points, few.error + abs(found.mean / before.mean - 1))
+    change = abs(again.best.mean / before.mean - 1)
+    return _Told(again.best, points, _error(model, again, again.best, work) + change)
 
 
 def _followed_uphill(
