@@ -85,6 +85,29 @@ def test_a_response_that_falls_smoothly_has_its_linear_peak():
     assert found.error < 0.05
 
 
+def settled_at(mean):
+    """What a blade keeps to at 1 rad/s, every period alike."""
+    state = SimpleNamespace(drive=SimpleNamespace(omega=1.0))
+    return module._Settled(1.0, mean, mean, mean, state, True, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("change", [0.03, -0.03])
+def test_what_shorter_steps_change_is_part_of_the_error(monkeypatch, change):
+    """Of a layer that stiffens; steps of the linear one are short enough by themselves."""
+    top = module._Top(settled_at(1.0), settled_at(0.9), 1.0)
+    shorter = {module.INSTANTS_PER_PERIOD: 1.0, 2 * module.INSTANTS_PER_PERIOD: 1 + change}
+    monkeypatch.setattr(module, "state_of_solution", lambda *_: None)
+    monkeypatch.setattr(module, "_highest", lambda *_: top)
+    monkeypatch.setattr(module, "_error", lambda *_: 0.01)
+    monkeypatch.setattr(
+        module, "_settled", lambda model, state, work, instants: settled_at(shorter[instants])
+    )
+    for decay, error in ((np.ones(1), 0.01 + abs(change)), (None, 0.01)):
+        found, told = module._by_short_steps(SimpleNamespace(decay=decay), None, module._Work())
+        assert found.best.mean == 1.0
+        assert told == pytest.approx(error)
+
+
 @pytest.mark.parametrize(
     ("heights", "settled"),
     [

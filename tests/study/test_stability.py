@@ -20,6 +20,7 @@ from bladefem.report.tables import readable_texts, units_of
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
+from bladefem.study.pipeline import loads
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stability_remarks import (
@@ -28,6 +29,7 @@ from bladefem.study.pipeline.stability_remarks import (
     unstable_sentence,
 )
 from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.resonance_in_time import ResonanceInTime
 from bladefem.study.stability.verdicts import (
     MODES_IN_TIME,
     in_one_body,
@@ -146,6 +148,26 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     assert "; the amplitude given is that of a march from there; " in unstable_sentence(
         marched, 0.05
     )
+
+
+@pytest.mark.parametrize("by_law", [True, False])
+def test_a_march_with_the_law_of_the_layer_leaves_no_error_by_it(monkeypatch, by_law):
+    """What the law changes is part of the error of marches of its tangent alone."""
+    scene = load_scene("scenes/plane.toml", ["accuracy=20 %", "study.band=1150 Hz, 1600 Hz"])
+    model = reference_model(load=30.0, points=2, modes=4, harmonics=3)
+    case = LoadCase(30.0, model.elements, np.eye(4))
+    seen = loads.curve_with_room
+
+    def with_unknown_law(*given):
+        curve, unseen, room = seen(*given)
+        return curve, replace(unseen, layer_law=np.inf), room
+
+    sought = ResonanceInTime(1300.0, 1e-6, 1e-6, 0.03, 2, 5, 300, by_law=by_law)
+    monkeypatch.setattr(loads, "curve_with_room", with_unknown_law)
+    monkeypatch.setattr(loads, "_sought_in_time", lambda *_: sought)
+    curve = curve_of(scene, case, lambda _: family_of(model), first_for(4))
+    assert np.isnan(curve.layer_law) if by_law else np.isinf(curve.layer_law)
+    assert np.isfinite(curve.error) == by_law
 
 
 def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):

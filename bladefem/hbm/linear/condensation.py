@@ -14,17 +14,25 @@ from functools import cached_property
 
 import numpy as np
 
+from ...data import RigidBody
 from ...errors import NotSolvedError
 from ...friction.fourier import to_real
 from ...util.arrays import ComplexArray, RealArray
 from ..model import ReducedModel
 from ..solver.newton_compiled import Condensed, motion_scale
-from .bodies import modal_flexibility
+from .bodies import gyroscopic_part, modal_flexibility, rigid_modes
 from .circulation import joined_circulation, mean_modal_flexibility, with_circulation
 from .condensation_compiled import linear_part, unsprung_flexibility
 from .contact_flexibility import form_matrices
 from .mean_motion import unheld_mean_motions
 from .packed_bodies import Bodies, prepared_bodies
+
+# distance to a frequency at which a free damper circles, and by how much gyroscopic forces are
+# changed there, relative: the answer changes about as much. At a hundredth of it contacts that slip
+# are so much stiffer than the damper that Newton's method stalls
+CIRCLING_SHARE = 1e-5
+# of the highest frequency, those below which are rounding
+ROUNDING_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -91,6 +99,7 @@ def condense(
         rigid = rigid[:, :0]
     if model.circulatory:
         bodies = with_circulation(bodies, model, omega, harmonics)
+    bodies = _beside_circling(model, bodies, omega, harmonics)
     try:
         modal, condensed, free, stuck = linear_part(omega, bodies, springs, harmonics)
     except (ZeroDivisionError, np.linalg.LinAlgError):
@@ -99,6 +108,40 @@ def condense(
         raise _exact_resonance(model, omega, harmonics)
     linear = Linear(omega, springs, bodies, modal, condensed, free, stuck, B, g, rigid)
     return _with_circulating_mean(model, linear) if model.circulatory else linear
+
+
+def _beside_circling(model: ReducedModel, bodies: Bodies, omega: float, harmonics: int) -> Bodies:
+    """The bodies with other gyroscopic forces on the damper where a harmonic comes closer than
+    CIRCLING_SHARE to a frequency at which it circles freely.
+
+    A damper of any mass circles with twice the speed of the frame. Its flexibility is infinite
+    there, while on its contacts it moves as it does next to that frequency.
+    """
+    circling = model.once("circling", lambda: _circling_frequencies(model))
+    ratios = omega * np.arange(1, harmonics + 1)[:, None] / circling
+    hit = ratios[abs(ratios - 1) < CIRCLING_SHARE]
+    if not len(hit):
+        return bodies
+    first = model.blades(harmonics).omega.shape[1]
+    coupled = bodies.coupled.copy()
+    coupled[:, first:, first:] *= (1 + CIRCLING_SHARE) * hit[0]
+    return bodies._replace(coupled=coupled)
+
+
+def _circling_frequencies(model: ReducedModel) -> np.ndarray:
+    """(k,) circular frequencies of a free damper's rigid motions by gyroscopic forces [rad/s]."""
+    if isinstance(model.damper, RigidBody):
+        _, coupled = rigid_modes(model.damper, model.rows)
+    else:
+        damper = model.elastic_damper(0)
+        if damper is None or damper.coupled is None:
+            return np.zeros(0)
+        rigid = damper.omega[0] == 0
+        coupled = damper.coupled[0][np.ix_(rigid, rigid)]
+    if coupled is None or not len(coupled):
+        return np.zeros(0)
+    found = np.linalg.eigvalsh(-1j * gyroscopic_part(coupled))
+    return found[found > ROUNDING_SHARE * found.max()]
 
 
 def _with_circulating_mean(model: ReducedModel, linear: Linear) -> Linear:
