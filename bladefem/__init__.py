@@ -7,7 +7,7 @@ cheap.
 
 from __future__ import annotations
 
-from .util.cache_folder import provide_cache_folder
+from .util.cache_folder import provide_cache_folder, provide_kernel_folder
 from .util.lazy import lazy_getattr
 from .util.processor import use_wide_registers
 
@@ -15,6 +15,7 @@ from .util.processor import use_wide_registers
 use_wide_registers()
 # before numba and dolfinx are loaded
 provide_cache_folder()
+provide_kernel_folder()
 
 __version__ = "0.1.0"
 

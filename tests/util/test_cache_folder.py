@@ -1,10 +1,41 @@
-"""A folder for compiled code where the user's cache cannot be written."""
+"""Folders for compiled code: of these sources, and where the user's cache cannot be written."""
 
 import os
+import sys
 import tempfile
 from pathlib import Path
 
-from bladefem.util.cache_folder import VARIABLE, provide_cache_folder
+from bladefem.util.cache_folder import (
+    KERNELS,
+    VARIABLE,
+    provide_cache_folder,
+    provide_kernel_folder,
+)
+
+
+def test_kernels_are_kept_with_the_sources_that_they_were_compiled_from(tmp_path, monkeypatch):
+    """numba itself goes on using a kernel whose neighbour, which it calls, was edited."""
+    monkeypatch.delitem(sys.modules, "numba", raising=False)
+    (tmp_path / "inner").mkdir()
+    neighbour = tmp_path / "inner" / "neighbour.py"
+    neighbour.write_text("from numba import njit\n")
+    plain = tmp_path / "plain.py"
+    plain.write_text("x = 1\n")
+
+    def folder():
+        environment = {VARIABLE: "/cache"}
+        provide_kernel_folder(environment, tmp_path)
+        return environment[KERNELS]
+
+    first = folder()
+    assert first.startswith("/cache/bladefem/")
+    plain.write_text("x = 2\n")
+    assert folder() == first
+    neighbour.write_text("from numba import njit, prange\n")
+    assert folder() != first
+    named = {VARIABLE: "/cache", KERNELS: "/own"}
+    provide_kernel_folder(named, tmp_path)
+    assert named[KERNELS] == "/own"
 
 
 def test_a_cache_that_can_be_written_stays(tmp_path, monkeypatch):
