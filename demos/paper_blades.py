@@ -42,8 +42,10 @@ band = (1050.0, 1300.0)  # Hz, mode 2
 # the seats: the damper bends, and presses near the edges of the platforms only.
 
 # %%
+seats = ["mesh.contact_size=0.6 mm"] if coarse else []
 scenes = {
-    kt: bladefem.load_scene(scenes / "plane.toml", [f"contact.kt={kt} N/m"]) for kt in (1e6, 1.44e7)
+    kt: bladefem.load_scene(scenes / "plane.toml", [f"contact.kt={kt} N/m", *seats])
+    for kt in (1e6, 1.44e7)
 }
 rows = {kt: row_of_blades(scene, comm=comm) for kt, scene in scenes.items()}
 if comm.rank:  # what follows is small: rank 0 does it, the others wait at the end

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 import gc
 import os
+import pickle
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -17,6 +19,8 @@ RANK = int(os.environ.get("OMPI_COMM_WORLD_RANK", os.environ.get("PMI_RANK", 0))
 LONG_FILES = frozenset(
     {
         "test_demos.py",
+        # shares its wheel with the next one
+        "test_mistuned_in_time.py",
         "test_mistuned_scene.py",
         "test_paper_demos.py",
         "test_scatter_on_ranks.py",
@@ -76,6 +80,38 @@ def pytest_make_collect_report(collector):
     """A file that skips itself fails."""
     outcome = yield
     _refuse_skip(outcome.get_result())
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _meshes_drawn_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A mesh that several tests begin with is drawn once, for all workers.
+
+    Drawing one takes a process and a second of CPU or more. That a mesh hangs on nothing but its
+    key is what `tests/io/test_stage_inputs.py` shows; tests of the drawing itself call
+    `build_isolated` or `build_here`, which they have imported by now.
+    """
+    from bladefem.study.pipeline.stage_inputs import stage_key
+    from geometry import isolated_process
+
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "drawn_meshes"
+    folder.mkdir(exist_ok=True)
+    draw = isolated_process.build_isolated
+
+    def drawn_once(scene):
+        file = folder / stage_key("mesh", scene)
+        if file.exists():
+            return pickle.loads(file.read_bytes())
+        mesh = draw(scene)
+        # the other worker may draw the same one
+        part = file.with_suffix(f".{os.getpid()}")
+        part.write_bytes(pickle.dumps(mesh, pickle.HIGHEST_PROTOCOL))
+        part.replace(file)
+        return mesh
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(isolated_process, "build_isolated", drawn_once)
+        yield
 
 
 @pytest.fixture(autouse=SIZE > 1)

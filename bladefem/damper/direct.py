@@ -74,6 +74,7 @@ def newmark_march(
         system.damping,
         system.W,
         system.V,
+        np.ascontiguousarray(system.W.T),
         system.kt,
         system.mu,
         S,
@@ -83,7 +84,7 @@ def newmark_march(
     inputs = tuple(sample_fourier(a, steps) for a in (system.force, system.drive, system.normal))
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
-        y = np.r_[state.q, state.v, state.z]
+        y = np.concatenate([state.q, state.v, state.z])
         q, w, force, code = _newmark_step(arrays, y, inputs, h)
         if code:
             raise NotSolvedError(
@@ -112,18 +113,24 @@ def contact_step(trial, load, kG, H, mu, f):
     """
     n = len(trial)
     slip = np.zeros(n)
-    size = np.abs(trial).max() + np.abs(mu * load).max() + 1e-300
+    largest = 0.0
+    limit = 0.0
+    for i in range(n):
+        largest = max(largest, abs(trial[i]))
+        limit = max(limit, abs(mu[i] * load[i]))
+    size = largest + limit + 1e-300
+    A = np.empty((n, n))
+    b = np.empty(n)
     for _ in range(30):
-        A = np.eye(n)
-        b = np.zeros(n)
         for i in range(n):
-            if slip[i] == 0.0:
-                A[i] += kG[i]
-                b[i] = trial[i]
-            elif abs(slip[i]) == 1.0:
-                A[i] += slip[i] * mu[i] * H[i]
-                b[i] = slip[i] * mu[i] * load[i]
-        f[:] = np.linalg.solve(A, b)
+            share = slip[i] * mu[i] if abs(slip[i]) == 1.0 else 0.0
+            for k in range(n):
+                A[i, k] = kG[i, k] if slip[i] == 0.0 else share * H[i, k]
+            A[i, i] += 1.0
+            b[i] = trial[i] if slip[i] == 0.0 else share * load[i]
+        found = np.linalg.solve(A, b)
+        for i in range(n):
+            f[i] = found[i]
         changed = False
         for i in range(n):
             N = load[i]
@@ -153,46 +160,76 @@ def contact_step(trial, load, kG, H, mu, f):
     return False
 
 
+# in loops: expressions of small arrays take five times as long to compile
+@njit(cache=True)
+def _add_product(total, sign, A, x):
+    """total (m,) plus a factor times A (m, k) x (k,)."""
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            total[i] += sign * A[i, k] * x[k]
+
+
 @njit(cache=True)
 def _newmark_step(arrays, y, inputs, h):
     p, g, n0 = inputs
-    L, D, W, V, kt, mu, S, G, H = arrays
+    L, D, W, V, Wt, kt, mu, S, G, H = arrays
     n, d = W.shape
     steps = p.shape[0] - 1
     Q = np.empty((steps, d))
     R = np.empty((steps, n))
     F = np.empty((steps, n))
-    q = y[:d].copy()
-    v = y[d : 2 * d].copy()
-    z = y[2 * d :]
+    q, v, z = y[:d], y[d : 2 * d], y[2 * d :]
     kG = np.empty((n, n))
     for i in range(n):
-        kG[i] = kt[i] * G[i]
-    f = np.empty(n)
-    w = g[0] + W @ q
-    N = n0[0] + V @ q
-    for i in range(n):
-        f[i] = _friction_law(kt[i] * (w[i] - z[i]), mu[i] * max(N[i], 0.0))
-        z[i] = w[i] - f[i] / kt[i]
-    a = p[0] - L * q - D @ v - W.T @ f
-    for m in range(1, steps + 1):
-        q0 = q + h * v + h * h / 4 * a
-        v0 = v + h / 2 * a
-        free = S @ (p[m] - L * q0 - D @ v0)
-        qf = q0 + h * h / 4 * free
-        wf = g[m] + W @ qf
-        Nf = n0[m] + V @ qf
-        if not contact_step(kt * (wf - z), Nf, kG, H, mu, f):
+        for k in range(n):
+            kG[i, k] = kt[i] * G[i, k]
+    w, N, f, trial = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    # accelerations, those without contact forces, and motion ahead by half of the old ones
+    a, free, q0, v0, rate = np.empty(d), np.empty(d), np.empty(d), np.empty(d), np.empty(d)
+    for m in range(steps + 1):
+        for k in range(d):
+            q0[k] = q[k] + h * v[k] + h * h / 4 * a[k] if m > 0 else q[k]
+            v0[k] = v[k] + h / 2 * a[k] if m > 0 else v[k]
+            rate[k] = p[m, k] - L[k] * q0[k]
+            free[k] = 0.0
+        _add_product(rate, -1.0, D, v0)
+        if m > 0:
+            _add_product(free, 1.0, S, rate)
+            for k in range(d):
+                q[k] = q0[k] + h * h / 4 * free[k]
+        for i in range(n):
+            w[i] = g[m, i]
+            N[i] = n0[m, i]
+        _add_product(w, 1.0, W, q)
+        _add_product(N, 1.0, V, q)
+        for i in range(n):
+            trial[i] = kt[i] * (w[i] - z[i])
+        if m == 0:
+            for i in range(n):
+                f[i] = _friction_law(trial[i], mu[i] * max(N[i], 0.0))
+        elif not contact_step(trial, N, kG, H, mu, f):
             return Q, R, F, m + 1
-        a = free - S @ (W.T @ f)
-        q = q0 + h * h / 4 * a
-        v = v0 + h / 2 * a
-        w = g[m] + W @ q
-        z[:] = w - f / kt
-        row = m % steps
-        Q[row] = q
-        R[row] = w
-        F[row] = f
-    y[:d] = q
-    y[d : 2 * d] = v
+        if m == 0:
+            # the first acceleration holds the equation of motion itself
+            _add_product(rate, -1.0, Wt, f)
+            for k in range(d):
+                a[k] = rate[k]
+        else:
+            for k in range(d):
+                rate[k] = 0.0
+                a[k] = free[k]
+            _add_product(rate, 1.0, Wt, f)
+            _add_product(a, -1.0, S, rate)
+            for i in range(n):
+                w[i] = g[m, i]
+            for k in range(d):
+                q[k] = q0[k] + h * h / 4 * a[k]
+                v[k] = v0[k] + h / 2 * a[k]
+                Q[m % steps, k] = q[k]
+            _add_product(w, 1.0, W, q)
+        for i in range(n):
+            z[i] = w[i] - f[i] / kt[i]
+            if m > 0:
+                R[m % steps, i] = w[i]
+                F[m % steps, i] = f[i]
     return Q, R, F, 0

@@ -102,9 +102,10 @@ def march_to_periodic(
     while residual >= tolerance and period < most:
         period += 1
         state, q, w, force = march(state)
+        swings = q - q.mean(axis=0), force - force.mean(axis=0)
         if last is not None:
-            residual = max(_relative_change(q, last[0]), _relative_change(force, last[1]))
-        last = (q, force)
+            residual = max(map(_relative_change, swings, last))
+        last = swings
         if not np.isfinite(q[-1]).all():
             return Cycle(q, force, w, state, np.inf, period, "the motion grew beyond all bounds")
     reason = (
@@ -148,7 +149,7 @@ def explicit_march(
     )
 
     def march(state: State) -> tuple[State, np.ndarray, np.ndarray, np.ndarray]:
-        y = np.r_[state.q, state.v, state.z]
+        y = np.concatenate([state.q, state.v, state.z])
         q, w, force = _leapfrog_period(arrays, y, inputs, 2 * np.pi / omega / steps)
         return State(y[:d].copy(), y[d : 2 * d].copy(), y[2 * d :].copy()), q, w, force
 
@@ -172,10 +173,8 @@ def sample_fourier(coefficients: np.ndarray, steps: int) -> np.ndarray:
 
 
 def _relative_change(now: np.ndarray, then: np.ndarray) -> float:
-    swing = np.abs(now - now.mean(axis=0)).max()
-    return float(
-        np.abs((now - now.mean(axis=0)) - (then - then.mean(axis=0))).max() / max(swing, 1e-300)
-    )
+    """Largest change from one period (s, n) to the next, each about its mean, over the swing."""
+    return float(np.abs(now - then).max() / max(np.abs(now).max(), 1e-300))
 
 
 @njit(cache=True)

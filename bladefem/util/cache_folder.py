@@ -1,5 +1,5 @@
-"""Where compiled code is kept: numba's kernels in a folder of these sources, and all of it among the
-temporary files if the user's cache cannot be written.
+"""Where compiled code is kept: numba's kernels in a folder of these sources, and all of it among
+the temporary files if the user's cache cannot be written.
 
 numba looks at the file of a kernel alone, and would go on using one whose neighbour was edited. In
 a container whose user has no home numba and dolfinx would end with an error of their own.

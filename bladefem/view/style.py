@@ -85,12 +85,15 @@ def canvas(
         grid: rows and columns of a new figure; more than one cell yields an array of axes.
         subplots: passed to ``Figure.subplots``.
     """
+    own_figure = ax is None
     with matplotlib.rc_context(STYLE):
         if ax is None:
             ax = Figure(figsize=size, layout="constrained").subplots(*grid, **subplots)
         yield ax
         figure = np.ravel(ax)[0].figure
-        take_words_as_they_are(figure)
+        # of a given place the rest of the figure is the caller's
+        for drawn in [figure] if own_figure else np.ravel(ax):
+            take_words_as_they_are(drawn)
         if file is not None:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
             _settle_layout(figure)
@@ -126,17 +129,18 @@ def _fit_photographs(figure: Any) -> None:
             image.set_interpolation("nearest")
 
 
-def take_words_as_they_are(figure: Any) -> None:
-    """Titles, labels and legends hold the user's own words: a dollar sign in one is no formula.
+def take_words_as_they_are(drawn: Any) -> None:
+    """Titles, labels and legends of a figure, or of axes, hold the user's own words: a dollar sign
+    in one is no formula.
 
     Numbers along logarithmic axes are formulas of matplotlib's own and stay so.
     """
-    suspects = [text for text in _texts(figure) if "$" in text.get_text()]
+    suspects = [text for text in _texts(drawn) if "$" in text.get_text()]
     if not suspects:
         return
     numbers = {
         id(label)
-        for ax in figure.axes
+        for ax in np.ravel(drawn.axes)
         for axis in (ax.xaxis, ax.yaxis)
         for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
         for label in (tick.label1, tick.label2)

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from models import bouncing
+from numba import njit
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
@@ -31,27 +32,58 @@ def marched_by_law(model, modal, omega, periods, steps=2000, decay=DECAY[0]):
     contact forces, in semi-implicit Euler steps; the slider starts where friction is none.
     """
     body, e = model.sides[0], model.elements
-    kt, kn, mu, n0 = (float(x[0]) for x in (e.kt, e.kn, e.mu, e.n0))
+    contact = np.array([float(x[0]) for x in (e.kt, e.kn, e.mu, e.n0)])
     U, push = body.shapes[body.ports["contact"]], body.shapes[body.ports["load"]].T
     push = push @ model.loads(1)[1]
     free = push / (body.omega**2 - omega**2 + 1j * omega * body.damping)
-    q, v = modal.reshape(2, -1) + [free.real, (1j * omega * free).real]
+    start = modal.reshape(2, -1) + [free.real, (1j * omega * free).real]
+    drive = (push * np.exp(2j * np.pi / steps * np.arange(steps)[:, None])).real
+    modes = np.array([body.omega**2, body.damping])
+    seen = march_in_loops(
+        start, modes, U, contact, drive, 2 * np.pi / omega / steps, periods, decay
+    )
+    return (seen @ body.shapes[body.ports["probe"]][0]).reshape(periods, steps)
+
+
+@njit(cache=True)
+def march_in_loops(start, modes, U, contact, drive, dt, periods, decay):
+    """Modal displacements (periods * steps, m).
+
+    Args:
+        start: (2, m) modal displacements and velocities.
+        modes: (2, m) squared frequencies and damping.
+        U: (3, m) displacements of the contact.
+        contact: kt, kn, mu, n0.
+        drive: (steps, m) modal forces of a period.
+    """
+    kt, kn, mu, n0 = contact
+    m = U.shape[1]
     touch = decay * kn - n0
-    friction, before = np.zeros(2), (U @ q)[1:]
-    dt = 2 * np.pi / omega / steps
-    seen = np.empty((periods, steps))
-    for k in range(periods * steps):
-        seen[k // steps, k % steps] = body.shapes[body.ports["probe"]][0] @ q
-        w = U @ q
+    seen = np.empty((periods * len(drive), m))
+    q, v = start[0].copy(), start[1].copy()
+    force, w, before = np.zeros(3), np.zeros(3), np.zeros(3)
+    for step in range(len(seen)):
+        for a in range(3):
+            w[a] = 0.0
+            for i in range(m):
+                w[a] += U[a, i] * q[i]
         growth = np.exp(w[0] / decay)
         normal = max((touch + n0) * growth - touch, 0.0)
-        friction = friction + growth * kt * (w[1:] - before)
-        friction *= min(1.0, mu * normal / max(np.hypot(*friction), 1e-300))
-        before = w[1:]
-        drive = (push * np.exp(1j * omega * k * dt)).real
-        rate = drive - body.omega**2 * q - body.damping * v - U.T @ [normal - n0, *friction]
-        v = v + dt * rate
-        q = q + dt * v
+        if step > 0:
+            force[1] += growth * kt * (w[1] - before[1])
+            force[2] += growth * kt * (w[2] - before[2])
+        held = min(1.0, mu * normal / max(np.hypot(force[1], force[2]), 1e-300))
+        force[0] = normal - n0
+        for a in range(3):
+            force[a] *= held if a > 0 else 1.0
+            before[a] = w[a]
+        for i in range(m):
+            seen[step, i] = q[i]
+            rate = drive[step % len(drive), i] - modes[0, i] * q[i] - modes[1, i] * v[i]
+            for a in range(3):
+                rate -= U[a, i] * force[a]
+            v[i] += dt * rate
+            q[i] += dt * v[i]
     return seen
 
 

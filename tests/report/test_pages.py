@@ -7,11 +7,13 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
 
 from bladefem.data import ModeSet
+from bladefem.report import chart as report_chart
 from bladefem.report.captions import caption_of
 from bladefem.report.chart import write_chart
 from bladefem.report.modes import _numbers
@@ -24,7 +26,12 @@ from bladefem.study.modes.stress import Strength
 sys.path.insert(0, str(Path(__file__).parents[1] / "view"))
 
 
-def test_chart_page_names_the_automatic_choice(tmp_path):
+def test_chart_page_names_the_automatic_choice(tmp_path, monkeypatch):
+    # tests/study/test_chart.py is about the pictures
+    for draw in ("draw_chart", "draw_errors"):
+        monkeypatch.setattr(
+            report_chart, draw, lambda tables, file, **_: plt.imsave(file, np.zeros((2, 2)))
+        )
     table = pd.DataFrame(
         {
             "name": ["H 3", "H 7", "H 31"],

@@ -1,5 +1,6 @@
 """The shipped mistuned wheel on a mesh that a test can afford, and one of fewer blades."""
 
+from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
@@ -35,7 +36,7 @@ SMALL_MISTUNED = (
     f"excitation.engine_order={ORDER}",
     f"mistuning.pattern={Path(__file__).parent / 'mistuned_pattern.csv'}",
 )
-# On elements half as large again, for what takes whole runs.
+# On elements half as large again.
 ROUGH_MISTUNED = (*SMALL_MISTUNED, "mesh.scale=1.5")
 
 
@@ -50,6 +51,7 @@ class ReducedWheel(NamedTuple):
     settings: Settings
 
 
+@cache
 def reduced_wheel(overrides: tuple[str, ...]) -> ReducedWheel:
     """Six modes of the sector in every nodal diameter, three blade-alone families."""
     scene = load_scene(MISTUNED, overrides)

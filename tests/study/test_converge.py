@@ -14,6 +14,7 @@ from structured import box, sector
 from wheels import bodies
 
 from bladefem.errors import InputError
+from bladefem.fem import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.loads import body_mass
@@ -244,6 +245,10 @@ def test_a_rigid_mode_has_no_error():
     assert row["error"] == 0 and row["reason"].startswith("a rigid mode")
 
 
+# [Hz] of `sector(9, (18, 12, 5))` of the default material, clamped, in nodal diameter 2: 15 s of CPU
+FINER_RING = np.array([1167.10699252, 6440.94387528, 6541.04586956])
+
+
 def test_a_mesh_of_a_file_is_halved(tmp_path):
     """The error that the given mesh is said to have holds the change to much finer ones."""
     write_msh(sector(9, (3, 2, 1), "tetra10"), tmp_path / "a.msh")
@@ -257,11 +262,8 @@ def test_a_mesh_of_a_file_is_halved(tmp_path):
     assert default_sizes(scene) == []
     found = mesh_convergence(scene, [], [2], count=3)
     assert sorted(found.points["cells"].unique()) == [36, 288, 2304]
-    finer = modes(
-        constrain(assemble(sector(9, (18, 12, 5)), "blade", Material()), "clamp", 2), 3
-    ).frequencies
     row = found.summary
-    true = abs(row["given"] / finer - 1)
+    true = abs(row["given"] / FINER_RING - 1)
     assert (true > 1e-3).all() and (true < 1.2 * row["given_error"]).all()
     assert (row["given_error"] < 4 * true).all()
     assert (row["error"] < row["given_error"]).all()
@@ -291,10 +293,12 @@ def test_the_elastic_modes_of_a_free_body_are_studied(tmp_path):
     assert first.what == "mode 7, " and "nan" not in first.uncertainty
 
 
-def test_cells_of_mixed_shapes_are_halved(tmp_path):
+def test_cells_of_mixed_shapes_are_halved(tmp_path, monkeypatch):
     """As what they are: the finest mesh has CalculiX's frequencies on the same nodes (C3D15 and
     C3D20, ``python benchmarks/fem_decks.py``).
     """
+    # those show that no mode is lost, as another factorisation of the finest mesh would
+    monkeypatch.setattr(all_diameters, "lost_modes", lambda *_: {})
     model = decks.model("c3d15_c3d20", (4, 3, 2))
     tip = np.flatnonzero(np.hypot(*model.points[:, :2].T) > 0.2499)
     model.node_sets["tip"] = tip

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from mistuned import ORDER, SECTORS, SMALL_MISTUNED, reduced_wheel
+from mistuned import ORDER, ROUGH_MISTUNED, SECTORS, reduced_wheel
 
 from bladefem.hbm.solver.newton import Options
 from bladefem.study.mistuning.whole_wheel import whole_wheel
@@ -26,7 +26,7 @@ OPTIONS = Options(tolerance=1e-6)
 
 @pytest.fixture(scope="module")
 def wheel():
-    scene, run, patches, sector, case, settings = reduced_wheel(SMALL_MISTUNED)
+    scene, run, patches, sector, case, settings = reduced_wheel(ROUGH_MISTUNED)
     # two modes: what the others do without inertia is in the residual flexibility
     settings = replace(settings, modes=2)
     made = whole_wheel(scene, run.mesh, sector, patches, case, settings)

@@ -14,7 +14,13 @@ from processes import run_on_ranks
 from bladefem.cli.main import main
 from bladefem.study.mistuning import drawn_wheels
 
-FEW_WHEELS = [*ROUGH_MISTUNED, "mistuning.wheels=3", "mistuning.families=1"]
+FEW_WHEELS = [
+    *ROUGH_MISTUNED,
+    "mistuning.wheels=3",
+    "mistuning.families=1",
+    "model.harmonics=1",
+    "model.samples=64",
+]
 WHEELS = "stages/scatter_80N_wheels"
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from numba import njit
 from scipy import linalg
 
 from bladefem.wheel.lumped import (
@@ -62,27 +63,58 @@ def march(omega, deviation, orders, limit, wanted, periods=PERIODS, steps=STEPS)
     left = linalg.inv(np.diag(mass) / dt**2 + C / (2 * dt))
     now_matrix = left @ (2 * np.diag(mass) / dt**2 - K)
     old_matrix = -left @ (np.diag(mass) / dt**2 - C / (2 * dt))
-    x = np.zeros(3 * COUNT)
-    old = np.zeros(3 * COUNT)
-    slider = np.zeros(COUNT)
-    harmonics = np.zeros((COUNT, len(wanted)), dtype=complex)
-    work = np.zeros(COUNT)
-    for step in range(steps * periods):
-        w = x[platform] - x[np.roll(platform, -1)]
-        before = slider
-        slider = np.clip(slider, w - limit / KT, w + limit / KT)
-        f = KT * (w - slider)
-        angle = omega * step * dt
-        load = np.zeros(3 * COUNT)
-        for h, (order, force, phase) in orders.items():
-            load[tip] += force * np.cos(h * angle + order * around + phase)
-        load[platform] -= f
-        load[np.roll(platform, -1)] += f
-        if step >= steps * (periods - 1):
-            harmonics += 2 / steps * x[tip, None] * np.exp(-1j * angle * np.array(wanted))
-            work += limit * abs(slider - before)
-        x, old = now_matrix @ x + old_matrix @ old + left @ load, x
-    return harmonics, work
+    step_matrix = np.hstack([now_matrix, old_matrix, left])
+    ends = np.array([platform, np.roll(platform, -1)])
+    angle = omega * dt * np.arange(steps * periods)[:, None]
+    drive = np.zeros((len(angle), COUNT))
+    for h, (order, force, phase) in orders.items():
+        drive += force * np.cos(h * angle + order * around + phase)
+    tips, slid = march_in_loops(step_matrix, ends, tip, drive, limit / KT, steps)
+    turns = np.exp(-1j * angle[-steps:] * np.array(wanted))
+    return 2 / steps * tips.T @ turns, limit * slid
+
+
+@njit(cache=True)
+def march_in_loops(step_matrix, ends, tip, drive, reach, steps):
+    """Tips (steps, N) and how far each slider goes (N,) in the last period.
+
+    Args:
+        step_matrix: (m, 3m) the next displacements from the present ones, those before and loads.
+        ends: (2, N) coordinates between which each element is.
+        drive: (periods * steps, N) forces on the tips.
+    """
+    count, m = len(tip), len(step_matrix)
+    # displacements now and before, and loads
+    state = np.zeros(3 * m)
+    moved = np.zeros(m)
+    slider = np.zeros(count)
+    slid = np.zeros(count)
+    tips = np.zeros((steps, count))
+    for step in range(len(drive)):
+        for i in range(m):
+            state[2 * m + i] = 0.0
+        for s in range(count):
+            state[2 * m + tip[s]] = drive[step, s]
+            # the last period remains
+            tips[step % steps, s] = state[tip[s]]
+        for s in range(count):
+            w = state[ends[0, s]] - state[ends[1, s]]
+            before = slider[s]
+            slider[s] = min(max(before, w - reach), w + reach)
+            if step >= len(drive) - steps:
+                slid[s] += abs(slider[s] - before)
+            f = KT * (w - slider[s])
+            state[2 * m + ends[0, s]] -= f
+            state[2 * m + ends[1, s]] += f
+        for i in range(m):
+            total = 0.0
+            for k in range(3 * m):
+                total += step_matrix[i, k] * state[k]
+            moved[i] = total
+        for i in range(m):
+            state[m + i] = state[i]
+            state[i] = moved[i]
+    return tips, slid
 
 
 @pytest.mark.parametrize("limit", [3.0])

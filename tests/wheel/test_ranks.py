@@ -47,11 +47,16 @@ def statistics_on(ranks, folder):
     return np.load(file)
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """What one rank finds."""
+    return dict(statistics_on(1, tmp_path_factory.mktemp("alone")))
+
+
 @pytest.mark.parametrize("ranks", [2, 4])
-def test_statistics_are_those_of_one_rank(ranks, tmp_path):
-    alone = statistics_on(1, tmp_path)
+def test_statistics_are_those_of_one_rank(alone, ranks, tmp_path):
     shared = statistics_on(ranks, tmp_path)
     assert alone["peak"].shape == (2, 3) and (alone["peak"] > 0).all()
     assert not alone["unsolved"].any()
-    for name in alone.files:
+    for name in alone:
         np.testing.assert_array_equal(shared[name], alone[name], err_msg=name)

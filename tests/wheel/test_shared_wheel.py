@@ -50,11 +50,16 @@ def motion_on(ranks, folder):
     return np.load(file)
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """What one rank finds."""
+    return dict(motion_on(1, tmp_path_factory.mktemp("alone")))
+
+
 @pytest.mark.parametrize("ranks", [2, 4, 5])
-def test_motion_is_that_of_one_rank(ranks, tmp_path):
-    alone = motion_on(1, tmp_path)
+def test_motion_is_that_of_one_rank(alone, ranks, tmp_path):
     shared = motion_on(ranks, tmp_path)
-    for name in alone.files:
+    for name in alone:
         size = abs(alone[name]).max()
         np.testing.assert_allclose(
             shared[name], alone[name], rtol=0, atol=1e-11 * size, err_msg=name

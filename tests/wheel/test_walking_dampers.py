@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import njit
 from scipy import linalg
 from test_marching import ring_matrices
 
@@ -93,29 +94,65 @@ def march(omega, deviation, limits, periods=80, steps=1000, phase=PHASE):
     left = linalg.inv(np.diag(mass) / dt**2 + C / (2 * dt))
     now_matrix = left @ (2 * np.diag(mass) / dt**2 - K)
     old_matrix = -left @ (np.diag(mass) / dt**2 - C / (2 * dt))
-    x, old = np.zeros((2, 3 * COUNT))
-    y, before = np.zeros((2, COUNT))
-    slider = np.zeros((2, COUNT))
-    harmonics = np.zeros((COUNT, 4), dtype=complex)
-    places = []
-    for step in range(steps * periods):
-        w = np.array([x[platform], x[following]]) - y
-        slider = np.clip(slider, w - limits / KT, w + limits / KT)
-        f = KT * (w - slider)
-        angle = omega * step * dt
-        load = np.zeros(3 * COUNT)
-        load[tip] = FORCES[0] * np.cos(angle + around)
-        load[tip] += FORCES[1] * np.cos(2 * (angle + around) + phase)
-        load[platform] -= f[0]
-        load[following] -= f[1]
-        if step >= steps * (periods - 1):
-            turn = np.exp(-1j * angle * np.arange(1, 5))
-            harmonics += 2 / steps * x[tip, None] * turn
-        if step % steps == 0:
-            places.append(y)
-        x, old = now_matrix @ x + old_matrix @ old + left @ load, x
-        y, before = 2 * y - before + dt**2 / MASS * f.sum(axis=0), y
-    return harmonics, places[-1] - places[-2]
+    step_matrix = np.hstack([now_matrix, old_matrix, left])
+    limits = np.array(np.broadcast_to(limits, (2, COUNT)))
+    instants = omega * dt * np.arange(steps * periods)[:, None]
+    drive = FORCES[0] * np.cos(instants + around)
+    drive += FORCES[1] * np.cos(2 * (instants + around) + phase)
+    contacts = np.array([platform, following])
+    tips, places = march_in_loops(step_matrix, contacts, tip, drive, limits, dt, steps)
+    turns = np.exp(-1j * instants[-steps:] * np.arange(1, 5))
+    return 2 / steps * tips.T @ turns, places[-1] - places[-2]
+
+
+@njit(cache=True)
+def march_in_loops(step_matrix, contacts, tip, drive, limits, dt, steps):
+    """Tips (steps, N) in the last period, and where the dampers are when each begins (periods, N).
+
+    Args:
+        step_matrix: (m, 3m) the next displacements from the present ones, those before and loads.
+        contacts: (2, N) coordinates that the two contacts of each damper are at.
+        drive: (periods * steps, N) forces on the tips.
+    """
+    count, m = len(tip), len(step_matrix)
+    # displacements now and before, and loads
+    state = np.zeros(3 * m)
+    moved = np.zeros(m)
+    y, before = np.zeros(count), np.zeros(count)
+    slider = np.zeros((2, count))
+    tips = np.zeros((steps, count))
+    places = np.zeros((len(drive) // steps, count))
+    for step in range(len(drive)):
+        for i in range(m):
+            state[2 * m + i] = 0.0
+        for s in range(count):
+            state[2 * m + tip[s]] = drive[step, s]
+            # the last period remains
+            tips[step % steps, s] = state[tip[s]]
+            if step % steps == 0:
+                places[step // steps, s] = y[s]
+        for s in range(count):
+            push = 0.0
+            for side in range(2):
+                at = contacts[side, s]
+                w = state[at] - y[s]
+                reach = limits[side, s] / KT
+                slider[side, s] = min(max(slider[side, s], w - reach), w + reach)
+                f = KT * (w - slider[side, s])
+                state[2 * m + at] -= f
+                push += f
+            next_place = 2 * y[s] - before[s] + dt * dt / MASS * push
+            before[s] = y[s]
+            y[s] = next_place
+        for i in range(m):
+            total = 0.0
+            for k in range(3 * m):
+                total += step_matrix[i, k] * state[k]
+            moved[i] = total
+        for i in range(m):
+            state[m + i] = state[i]
+            state[i] = moved[i]
+    return tips, places
 
 
 def test_tuned_wheel_walks_as_its_sector():
