@@ -5,7 +5,7 @@ without a window.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -86,16 +86,11 @@ def canvas(
         subplots: passed to ``Figure.subplots``.
     """
     with matplotlib.rc_context(STYLE):
-        others: list[Axes] = []
         if ax is None:
             ax = Figure(figsize=size, layout="constrained").subplots(*grid, **subplots)
-        else:
-            # one of many panels: who made the figure looks at all of them
-            own = list(np.ravel(ax))
-            others = [one for one in own[0].figure.axes if one not in own]
         yield ax
         figure = np.ravel(ax)[0].figure
-        take_words_as_they_are(figure, others)
+        take_words_as_they_are(figure)
         if file is not None:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
             _settle_layout(figure)
@@ -131,16 +126,12 @@ def _fit_photographs(figure: Any) -> None:
             image.set_interpolation("nearest")
 
 
-def take_words_as_they_are(figure: Any, left_out: Sequence[Axes] = ()) -> None:
+def take_words_as_they_are(figure: Any) -> None:
     """Titles, labels and legends hold the user's own words: a dollar sign in one is no formula.
 
     Numbers along logarithmic axes are formulas of matplotlib's own and stay so.
-
-    Args:
-        left_out: axes that were there before.
     """
-    parts = [part for part in figure.get_children() if part not in left_out]
-    suspects = [text for part in parts for text in _texts(part) if "$" in text.get_text()]
+    suspects = [text for text in _texts(figure) if "$" in text.get_text()]
     if not suspects:
         return
     numbers = {
