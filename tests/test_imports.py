@@ -25,6 +25,7 @@ ROOT = Path(__file__).parents[1]
         ("bladefem.cli.main", ["gmsh", "dolfinx", "mpi4py"]),
         ("bladefem.io.stage_cache", ["dolfinx", "mpi4py", "h5py"]),
         ("bladefem.friction", ["dolfinx", "gmsh"]),
+        ("bladefem.report.run, bladefem.study.fit_intervals", ["scipy.stats"]),
     ],
 )
 def test_an_import_loads_no_more_than_it_needs(module, absent):

@@ -235,6 +235,12 @@ def inner_products(
     return comm.allreduce(np.ascontiguousarray(part)) if comm.size > 1 else part
 
 
+def column_norms(comm: MPI.Comm, X: np.ndarray) -> np.ndarray:
+    """(k,) lengths of the columns (n_own, k) over all ranks."""
+    squares = (X.real**2 + X.imag**2).sum(0) if np.iscomplexobj(X) else (X**2).sum(0)
+    return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)
+
+
 def subtract_product(
     W: np.ndarray,
     V: list[np.ndarray],

@@ -16,7 +16,6 @@ import numpy as np
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from ..util.lockstep import run_together
-from .compat import MPI
 from .constraint import Constrained, expand_to_mesh, restrict_load
 from .cyclic_schur import count_negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
@@ -25,6 +24,7 @@ from .lanczos import lowest_eigenpairs
 from .linalg import (
     Folded,
     apply_block,
+    column_norms,
     combined,
     inertia,
     inner_products,
@@ -192,15 +192,15 @@ def certificate(
         return np.zeros(0)
     KX = apply_block(con.K, X)
     comm = con.body.comm
-    size = _column_norms(comm, KX)
+    size = column_norms(comm, KX)
     scale = size.max() if (lam > 0).any() else _stiffness_scale(con, X)
     KX -= apply_block(con.M, X) * lam
-    return _column_norms(comm, KX) / np.where(lam > 0, size, scale)
+    return column_norms(comm, KX) / np.where(lam > 0, size, scale)
 
 
 def _stiffness_scale(con: Constrained, X: np.ndarray) -> float:
     """A force to measure |K x| of rigid motions by."""
-    return mean_diagonal(con.K) * _column_norms(con.body.comm, X).max()
+    return mean_diagonal(con.K) * column_norms(con.body.comm, X).max()
 
 
 def elastic_pairs(
@@ -303,8 +303,3 @@ def _counting_shift(lam: np.ndarray) -> tuple[float, int]:
     if gap is None:
         return lam[-1] * (1 + MIN_GAP), len(lam)
     return lam[gap - 1] + GAP_SHARE * (lam[gap] - lam[gap - 1]), gap
-
-
-def _column_norms(comm: MPI.Comm, X: np.ndarray) -> np.ndarray:
-    squares = (X.real**2 + X.imag**2).sum(0) if np.iscomplexobj(X) else (X**2).sum(0)
-    return np.sqrt(comm.allreduce(squares) if comm.size > 1 else squares)

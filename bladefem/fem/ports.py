@@ -5,8 +5,9 @@ Both come from the one factorisation that also gives the modes.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -26,6 +27,8 @@ from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_
 from .open_sector import Opened
 from .separators import reduce_load, separator_solve
 
+# work and items to items with their results
+Deal: TypeAlias = Callable[[Callable[[int], Any], Sequence[int]], Iterable[tuple[int, Any]]]
 # ports in one sweep
 PORTS_PER_SOLVE = 64
 REDUCTION_KINDS = ("rubin", "craig-bampton")
@@ -102,6 +105,7 @@ def port_models(
     kept: KeptPairs | None = None,
     spin: Spin | None = None,
     seen: Callable[[Eigenpairs], None] | None = None,
+    interior: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Iterator[tuple[int, PortModel]]:
     """``port_model`` in several nodal diameters, as they are solved, with all work shared that does
     not depend on them.
@@ -114,12 +118,11 @@ def port_models(
         kept: modes of the same body that are known; they are used up.
         spin: as for :func:`port_model`.
         seen: is shown the modes of each nodal diameter.
+        interior: what ``interior_flexibility`` gives, where it is known.
     """
-    shared = (
-        _interior_flexibility(t.opened, P, static_load)
-        if t.opened is not None and kind == "rubin"
-        else None
-    )
+    shared = interior
+    if shared is None and t.opened is not None and kind == "rubin":
+        shared = interior_flexibility(t.opened, P, static_load)
     model = _Ports(P, names, count, static_load, kind, solver, shared, spin, seen)
     if kept is not None and kept.serves(diameters, count):
         for n in diameters:
@@ -133,6 +136,11 @@ def port_models(
         yield n, _port_model(model, found_again(t, n, count, truth, DIRECTION_TOLERANCE))
 
 
+def deal_to_one(work: Callable[[int], Any], items: Sequence[int]) -> Iterator[tuple[int, Any]]:
+    """Items with the results of work on them, one by one."""
+    return ((item, work(item)) for item in items)
+
+
 @dataclass(frozen=True)
 class _Ports:
     """Ports and number of modes with which every nodal diameter is reduced."""
@@ -143,7 +151,7 @@ class _Ports:
     static_load: np.ndarray | None
     kind: str
     solver: Eigensolver
-    # see ``_interior_flexibility``
+    # see ``interior_flexibility``
     shared: tuple[np.ndarray, np.ndarray] | None
     spin: Spin | None
     seen: Callable[[Eigenpairs], None] | None
@@ -204,24 +212,32 @@ def _check_ports(con: Constrained, P: sp.spmatrix) -> None:
         )
 
 
-def _interior_flexibility(
+def interior_flexibility(
     opened: Opened,
     P: sp.spmatrix,
-    load: np.ndarray | None,
+    load: np.ndarray | None = None,
+    deal: Deal = deal_to_one,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(p, p) flexibility of an open sector's interior at the ports [m/N], and (nb, p) the ports'
     loads as the rim feels them; a static load is the last column.
+
+    Args:
+        deal: shares some ports each over ranks that have the same open sector for themselves.
     """
     columns = [P] if load is None else [P, sp.csc_matrix(load.reshape(-1, 1))]
     F = sp.csc_matrix(opened.T.T @ sp.hstack(columns))
     inside = F[opened.core.inner]
     rim = F[opened.core.rim].toarray()
+
+    def solved(first: int) -> tuple[np.ndarray, np.ndarray]:
+        Y = inner_solve(opened.core, inside[:, first : first + PORTS_PER_SOLVE].toarray())
+        return inside.T @ Y, opened.core.coupling @ Y
+
     G = np.empty((F.shape[1], F.shape[1]))
-    for first in range(0, F.shape[1], PORTS_PER_SOLVE):
+    for first, (own, felt) in deal(solved, range(0, F.shape[1], PORTS_PER_SOLVE)):
         part = slice(first, first + PORTS_PER_SOLVE)
-        Y = inner_solve(opened.core, inside[:, part].toarray())
-        G[:, part] = inside.T @ Y
-        rim[:, part] -= opened.core.coupling @ Y
+        G[:, part] = own
+        rim[:, part] -= felt
     separators = opened.core.separators
     if separators is None:
         return G, rim

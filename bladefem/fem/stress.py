@@ -302,6 +302,14 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     return np.sqrt(np.maximum(mean + swing, 0.0) / 2)
 
 
+def mises_vector(stress: np.ndarray) -> np.ndarray:
+    """(..., 6) linear in the stress (..., 6) [Pa]; of real ones its length is the von Mises
+    stress.
+    """
+    normal = (stress[..., [0, 1, 2]] - stress[..., [1, 2, 0]]) / np.sqrt(2)
+    return np.concatenate([normal, np.sqrt(3) * stress[..., 3:]], axis=-1)
+
+
 def principal_stresses(stress: np.ndarray) -> np.ndarray:
     """(..., 3) principal stresses, descending [Pa]; of complex amplitudes the largest of each in a
     period.

@@ -153,23 +153,29 @@ def recombine_contact(body: PortModel, selection: np.ndarray) -> PortModel:
     rows = np.arange(len(body.residual))
     ports = {}
     start = 0
-    blocks = []
     for name, part in body.ports.items():
-        blocks.append(
-            selection @ np.eye(len(rows))[rows[part]]
-            if name == "contact"
-            else np.eye(len(rows))[rows[part]]
-        )
-        ports[name] = slice(start, start := start + len(blocks[-1]))
-    T = np.vstack(blocks)
+        count = len(selection) if name == "contact" else len(rows[part])
+        ports[name] = slice(start, start := start + count)
+    T = np.zeros((start, len(rows)))
+    for name, part in body.ports.items():
+        T[ports[name], rows[part]] = selection if name == "contact" else np.eye(len(rows[part]))
     offset = None if body.static_offset is None else T @ body.static_offset
     return replace(
         body,
-        shapes=T @ body.shapes,
-        residual=T @ body.residual @ T.conj().T,
+        shapes=_real_times(T, body.shapes),
+        residual=_real_times(T, _real_times(T, body.residual).T).T,
         ports=ports,
         static_offset=offset,
     )
+
+
+def _real_times(T: np.ndarray, A: np.ndarray) -> np.ndarray:
+    """T A of a real T (k, n) and a complex or real A (n, m), which a product of two complex ones
+    would take twice the operations for.
+    """
+    if not np.iscomplexobj(A):
+        return T @ A
+    return (T @ np.ascontiguousarray(A).view(float)).view(complex)
 
 
 def _damping_matrix(body: PortModel) -> np.ndarray:

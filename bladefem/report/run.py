@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -19,7 +20,6 @@ from ..scene.tables import Scene
 from ..study.mistuning.stage import with_whole_wheel
 from ..study.mistuning.validate import check_mistuning, is_mistuned
 from ..study.pipeline import pipeline
-from ..study.pipeline.contact_cycle import ContactCycle
 from ..study.pipeline.run_records import SolvedRun, folder_of
 from ..util.communicator import Communicator
 from ..util.progress import Progress, without_progress
@@ -34,8 +34,10 @@ from .run_tables import run_tables
 from .wheel import pattern_headlines
 from .write import Page, write_report
 
+# the figures to hover over and rotate, which go into the page
+LIVE = "live figures"
 # what takes a second or more
-SLOWEST_TO_WRITE = ("modes/first_modes", "mesh/mesh", "modes/mode_on_the_wheel", MODE_SHAPES)
+SLOWEST_TO_WRITE = (LIVE, "modes/first_modes", "mesh/mesh", "modes/mode_on_the_wheel", MODE_SHAPES)
 
 
 def report_run(
@@ -73,35 +75,38 @@ def write_run(
     drawings = run_drawings(result, tables, cycles)
     figures = {name: folder / f"{name.split('/')[1]}.png" for name in drawings}
     jobs: dict[str, Callable[[], object]] = {
+        LIVE: partial(live_figures, result, tables, cycles),
         **{name: partial(draw, figures[name]) for name, draw in drawings.items()},
         **file_writers(result, tables, cycles),
     }
     # the longest first: what follows goes to the rank that is free
     order = sorted(jobs, key=lambda name: name not in SLOWEST_TO_WRITE)
-    share_work(
-        lambda name: _finished(jobs[name]),
+    found = share_work(
+        lambda name: _finished(name, jobs[name]),
         order,
         comm,
         lambda items: progress(items, "pictures and files"),
         on_demand=True,
     )
     messages = [*filter(None, [moved]), *run_messages(result, cycles)]
-    on_root(comm, lambda: _write_page(result, tables, cycles, figures, messages))
+    live = found[order.index(LIVE)]
+    on_root(comm, lambda: _write_page(result, tables, figures, live, messages))
     return replace(
         result, timings={**result.timings, "pictures and report": time.perf_counter() - start}
     )
 
 
-def _finished(job: Callable[[], object]) -> None:
-    """What a job returns is of no use to other ranks."""
-    job()
+def _finished(name: str, job: Callable[[], object]) -> Any:
+    """What a job returns, which but for the live figures is of no use to other ranks."""
+    done = job()
+    return done if name == LIVE else None
 
 
 def _write_page(
     result: SolvedRun,
     tables: dict[str, pd.DataFrame],
-    cycles: list[ContactCycle],
     figures: dict[str, Path],
+    live: dict[str, dict[str, Any]],
     messages: list[str],
 ) -> None:
     """The report, once its pictures are there."""
@@ -113,7 +118,7 @@ def _write_page(
         messages,
         result.timings,
         page=Page(
-            live_figures(result, tables, cycles),
+            live,
             more=[*flow_headlines(result), *_wheel_headlines(result)],
         ),
     )

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy import stats
 
 from ..util.arrays import BooleanArray, RealArray
 
@@ -206,6 +205,9 @@ def _directions(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _quantile(J: np.ndarray, misfit: np.ndarray) -> float:
     """Half width of an interval over the standard deviation by the stated errors."""
+    # slow to load, and all commands load this module
+    from scipy.stats import t
+
     freedom = max(len(misfit) - J.shape[1], 1)
     scatter = max(1.0, float(np.sum(misfit**2)) / freedom)
-    return float(stats.t.ppf(0.975, freedom) * np.sqrt(scatter))
+    return float(t.ppf(0.975, freedom) * np.sqrt(scatter))

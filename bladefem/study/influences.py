@@ -233,13 +233,15 @@ def _solved_again(
     study: _Study, found: Sequence[Influence], base: Peak, comm: Communicator | None
 ) -> list[Influence]:
     """Influences whose predictions at both ends of the range are compared with another search."""
-    ends = [(one, i) for one in found for i in (0, 1)]
-    again = share_work(lambda end: study.solved_again(*end, base), ends, comm)
+    # the low end of a range often takes less than the high one: in turns, both on each of two ranks
+    ends = [(k, i if k % 2 == 0 else 1 - i) for k in range(len(found)) for i in (0, 1)]
+    again = share_work(lambda end: study.solved_again(found[end[0]], end[1], base), ends, comm)
+    by_end = dict(zip(ends, again, strict=True))
     return [
         replace(
             one,
-            solved=np.array([row for row, _ in again[2 * k : 2 * k + 2]]),
-            reason="; ".join(reason for _, reason in again[2 * k : 2 * k + 2] if reason),
+            solved=np.array([by_end[k, i][0] for i in (0, 1)]),
+            reason="; ".join(by_end[k, i][1] for i in (0, 1) if by_end[k, i][1]),
         )
         for k, one in enumerate(found)
     ]

@@ -65,6 +65,11 @@ def amplitude_of(motion: ComplexArray) -> RealArray:
 def extreme_phase(motion: ComplexArray) -> float:
     """The phase of harmonic 1 [rad] at which some node is displaced most."""
     phases = np.linspace(0.0, 2 * np.pi, PHASES_PER_PERIOD, endpoint=False)
+    # no node is displaced by more than its amplitudes together: many never are by as much as some
+    # node is at phase 0
+    bound = np.linalg.norm(motion, axis=2).sum(axis=0)
+    first = np.linalg.norm(displaced(motion, 0.0), axis=1).max(initial=0.0)
+    motion = motion[:, bound >= (1 - 1e-9) * first]
     largest = [np.linalg.norm(displaced(motion, phase), axis=1).max() for phase in phases]
     return float(phases[int(np.argmax(largest))])
 

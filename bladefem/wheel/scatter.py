@@ -8,7 +8,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from ..errors import InputError
 from ..util.arrays import RealArray
@@ -174,6 +173,9 @@ def _uniform_sample(
     seed: int,
 ) -> np.ndarray:
     """(wheels, columns) between 0 and 1, spread evenly."""
+    # slow to load, and all commands load this module
+    from scipy.stats import qmc
+
     sequence = qmc.Sobol(columns, scramble=True, seed=seed)
     power = int(np.ceil(np.log2(max(wheels, 2))))
     return sequence.random_base2(power)[:wheels]
@@ -181,5 +183,7 @@ def _uniform_sample(
 
 def _cut_normal(uniform: np.ndarray) -> np.ndarray:
     """Uniform numbers as those of the normal distribution, cut off."""
+    from scipy.stats import norm
+
     low = norm.cdf(-MAX_DEVIATIONS)
     return norm.ppf(low + (1 - 2 * low) * uniform)

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
-from scipy import stats
 
 from ..errors import InputError
 from ..hbm.linear.bodies import modal_flexibility
@@ -183,11 +182,14 @@ def quantile_interval(
     falls between them (David and Nagaraja, Order Statistics, 2003, Sect. 7.1). Where the sample is
     too small for the wanted confidence the interval ends are the extremes, or infinite.
     """
+    # slow to load, and all commands load this module
+    from scipy.stats import binom
+
     ordered = np.sort(np.asarray(sample, dtype=float))
     n = len(ordered)
     tail = (1 - confidence) / 2
-    low = int(stats.binom.ppf(tail, n, share))
-    high = int(stats.binom.ppf(1 - tail, n, share)) + 1
+    low = int(binom.ppf(tail, n, share))
+    high = int(binom.ppf(1 - tail, n, share)) + 1
     value = float(np.quantile(ordered, share))
     return Quantile(
         value,

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from scipy import io, linalg
+from scipy.linalg import block_diag
 
+from bladefem.data import PortModel
 from bladefem.errors import InputError
 from bladefem.reduction.assemble import (
     folded_diameter,
@@ -305,3 +307,25 @@ def test_unsymmetric_stiffness_is_asked_for_and_leaves_rigid_and_massless_motion
         np.testing.assert_allclose(receptance(body, w), exact, rtol=0, atol=1e-11)
     symmetric = port_model_from_matrices(M, chain(ground=1.0), ports, unsymmetric=True)
     assert symmetric.circulatory is None
+
+
+@pytest.mark.parametrize("turn", [1.0, np.exp(0.7j)])
+def test_other_contacts_are_a_congruence(turn):
+    """Real and complex bodies, contact before and after another port."""
+    draw = np.random.default_rng(3).standard_normal
+    phase = np.array([1, turn, turn, 1, 1])
+    half = draw((5, 5))
+    body = PortModel(
+        np.arange(1.0, 4.0),
+        phase[:, None] * draw((5, 3)),
+        phase[:, None] * (half @ half.T) * phase.conj(),
+        {"load": slice(0, 1), "contact": slice(1, 4), "probe": slice(4, 5)},
+        static_offset=draw(5),
+    )
+    selection = draw((2, 3))
+    T = block_diag(1.0, selection, 1.0)
+    other = recombine_contact(body, selection)
+    assert other.ports == {"load": slice(0, 1), "contact": slice(1, 3), "probe": slice(3, 4)}
+    np.testing.assert_allclose(other.shapes, T @ body.shapes, rtol=1e-13)
+    np.testing.assert_allclose(other.residual, T @ body.residual @ T.T, rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(other.static_offset, T @ body.static_offset, rtol=1e-13)

@@ -6,11 +6,13 @@ import pytest
 from bladefem import load_scene
 from bladefem.fem.compat import MPI
 from bladefem.reduction.other_diameters import spanned_models
+from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies, on_one_rank
 from bladefem.study.pipeline.damper_contact import contact_patches
 from bladefem.study.pipeline.normal_modes import KEPT_MODES, find_modes
 from bladefem.study.pipeline.reduced_sector import reduce_sector
 from bladefem.study.pipeline.scene_mesh import build_mesh
+from bladefem.study.pipeline.stage_runner import StageClock, StageOfOneRank, StageRunner
 
 pytestmark = pytest.mark.mpi
 COARSE = ["mesh.size=14 mm", "mesh.scale=1.5", "mesh.seat_elements=2", "aerofoil.fillet=0 mm"]
@@ -34,6 +36,9 @@ def test_a_sector_is_reduced_with_the_modes_that_each_rank_has():
         np.testing.assert_allclose(a.frequencies, b.frequencies, rtol=1e-10)
     for n in (0, 9, 18):
         np.testing.assert_allclose(joined.sector[n].omega, single.sector[n].omega, rtol=1e-10)
+        left, right = joined.sector[n].residual, single.sector[n].residual
+        # modes are known to a direction, the flexibility that they leave to its square
+        assert abs(left - right).max() < 1e-9 * abs(right).max()
     assert joined.mass == single.mass
     # also what they tell of the diameters left out
     left_out = [
@@ -63,3 +68,36 @@ def test_ranks_that_share_a_blade_give_the_factors_of_its_rest_back():
         norms.append(bodies.blade.K.norm())
         assert ("still" in vars(bodies)) == (comm.size == 1)
     assert norms[0] == pytest.approx(norms[1], rel=1e-12)
+
+
+def test_stages_of_one_rank_are_computed_side_by_side():
+    """Each by another rank and once; all ranks find each where its turn comes."""
+    scene = load_scene("scenes/wedge.toml", COARSE)
+    bodies = Bodies(scene, build_mesh(scene, MPI.COMM_WORLD), MPI.COMM_WORLD)
+    keep = StageRunner(None, MPI.COMM_WORLD, StageClock({}, []))
+    stages = [
+        StageOfOneRank(name, name, lambda some: (MPI.COMM_WORLD.rank, some.comm.size))
+        for name in ("contact", "mode_errors")
+    ]
+    keep.compute_ahead(stages, bodies)
+    found = [keep.of_one_rank(stage, bodies) for stage in stages]
+    assert found == [(0, 1), (min(1, MPI.COMM_WORLD.size - 1), 1)]
+    # asked again they are computed again, by rank 0
+    assert keep.of_one_rank(stages[1], bodies)[0] == 0
+
+
+def test_contact_and_mesh_error_do_not_depend_on_the_rank_that_found_them():
+    given = ["model.modes=4", "model.harmonics=1", "model.samples=64", "model.damper=rigid"]
+    scene = load_scene("scenes/wedge.toml", [*COARSE, *given, "contact.points=4"])
+    ranks, alone = (
+        pipeline.run(scene, None, until="reduction", comm=comm)
+        for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
+    )
+    np.testing.assert_allclose(
+        ranks.mode_errors.energies, alone.mode_errors.energies, rtol=1e-6, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        ranks.contact.problem.flexibility, alone.contact.problem.flexibility, rtol=1e-9
+    )
+    np.testing.assert_allclose(ranks.clamped.frequencies, alone.clamped.frequencies, rtol=1e-10)
+    assert ranks.strength.steady == pytest.approx(alone.strength.steady, rel=1e-9)

@@ -40,7 +40,13 @@ from bladefem.view.modes import (
     moving_bodies,
     save_modes_vtu,
 )
-from bladefem.view.motion import amplitude_of, draw_motion, extreme_phase
+from bladefem.view.motion import (
+    PHASES_PER_PERIOD,
+    amplitude_of,
+    displaced,
+    draw_motion,
+    extreme_phase,
+)
 from bladefem.view.optimum import draw_optimum
 from bladefem.view.response import FOLLOWED, MARCHED, draw_responses, resonance_of, smooth_curve
 from bladefem.view.skin import row_keys, skin, wheel_skin
@@ -471,6 +477,17 @@ def test_a_motion_is_drawn_where_it_is_largest(sector, plane_row, folder):
         assert amplitude_of(motion).max() == pytest.approx(largest)
         draw_motion(mesh, 1e-4 * motion, folder / "motion.png", title="80 N per seat")
         assert ink(folder / "motion.png") > 0.02
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_phase_of_the_largest_displacement_is_that_of_all_nodes(seed):
+    """Nodes that cannot have it are left out."""
+    draw = np.random.default_rng(seed).standard_normal
+    size = np.exp(2 * draw((1, 400, 1)))
+    motion = size * (draw((4, 400, 3)) + 1j * draw((4, 400, 3)))
+    phases = 2 * np.pi * np.arange(PHASES_PER_PERIOD) / PHASES_PER_PERIOD
+    largest = [np.linalg.norm(displaced(motion, phase), axis=1).max() for phase in phases]
+    assert extreme_phase(motion) == pytest.approx(phases[int(np.argmax(largest))], abs=1e-12)
 
 
 def test_a_motion_on_a_page_keeps_the_harmonics_that_are_seen(sector):

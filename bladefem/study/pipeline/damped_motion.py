@@ -93,39 +93,85 @@ def damped_motion(
             when left out.
 
     """
+    parts = [
+        motion_in_diameter(bodies, patches, modes, i, case, solution, points, factorised)
+        for i in range(len(modes))
+    ]
+    return sum_of_parts(bodies, patches, solution, parts)
+
+
+@dataclass(frozen=True)
+class MotionPart:
+    """The harmonics of a motion that are in one nodal diameter."""
+
+    # (k,) indices of the harmonics, 0 for harmonic 1
+    harmonics: list[int]
+    # (k, n_points, dim) complex displacements [m]
+    fields: ComplexArray
+
+
+def motion_in_diameter(
+    bodies: Bodies,
+    patches: Sequence[Patch],
+    modes: Sequence[ModeSet],
+    number: int,
+    case: LoadCase,
+    solution: Solution,
+    points: int | None = None,
+    factorised: Callable[[int], Any] | None = None,
+) -> MotionPart:
+    """What `damped_motion`, which has the other arguments, needs of one nodal diameter.
+
+    Args:
+        number: of the modes of that diameter.
+    """
     from ...fem.forced_motion import forced_motion
 
     scene = bodies.scene
     mesh = bodies.mesh
     ports = blade_ports(mesh, list(patches), scene.excitation)
     loads = blade_loads(bodies, patches, case, solution, points)
-    seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     waves = [_diameter(bodies, h) for h in range(1, solution.harmonics + 1)]
     flow = scene_flow(scene, sector_of(mesh).count if is_wheel(mesh) else 0)
-    numbers = family_modes(ports, modes, flow)
+    found = modes[number]
+    highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
+    own = [
+        h
+        for h, (n, _) in enumerate(waves)
+        if _nearest(modes, n) is found and (h + 1) * solution.omega < highest
+    ]
+    fields = np.zeros((len(own), len(mesh.points), mesh.dimension), complex)
+    if not own:
+        return MotionPart(own, fields)
+    damping = response_damping(bodies, modes)[number]
+    n = found.nodal_diameter or 0
+    family = family_modes(ports, modes, flow).get(n, 0)
+    flex = (factorised or bodies.factorised)(n)
+    # harmonics of the same nodal diameter together, but for what a flow does to each wave
+    every = list(range(len(own)))
+    for rows in [every] if flow is None else [[row] for row in every]:
+        group = [own[row] for row in rows]
+        mirrored = np.array([waves[h][1] for h in group])
+        # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
+        omega = (np.array(group) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
+        seen_loads = np.where(mirrored, loads[group].conj().T, loads[group].T)
+        wave = (group[0] + 1) * scene.excitation.engine_order
+        part = flowing_modes(flow, found, damping, scene.operation.damping, wave, family)
+        u = forced_motion(flex, part[0], seen_loads, omega, part[1]).displacement
+        fields[rows] = np.where(mirrored, u.conj(), u).transpose(2, 0, 1)
+    return MotionPart(own, fields)
+
+
+def sum_of_parts(
+    bodies: Bodies, patches: Sequence[Patch], solution: Solution, parts: Sequence[MotionPart]
+) -> DampedMotion:
+    """The motion at a solved point from its parts in all nodal diameters."""
+    mesh = bodies.mesh
+    ports = blade_ports(mesh, list(patches), bodies.scene.excitation)
+    seen = ports.matrix[:, ports.names["probe"]].toarray()[:, 0]
     fields = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
-    for found, damping in zip(modes, response_damping(bodies, modes), strict=True):
-        highest = MAX_FREQUENCY_RATIO * 2 * np.pi * found.frequencies[-1]
-        own = [
-            h
-            for h, (n, _) in enumerate(waves)
-            if _nearest(modes, n) is found and (h + 1) * solution.omega < highest
-        ]
-        if not own:
-            continue
-        n = found.nodal_diameter or 0
-        flex = (factorised or bodies.factorised)(n)
-        # harmonics of the same nodal diameter together, but for what a flow does to each wave
-        for group in [own] if flow is None else [[h] for h in own]:
-            mirrored = np.array([waves[h][1] for h in group])
-            # a wave of diameter -n is the conjugate of one of diameter n at the negative frequency
-            omega = (np.array(group) + 1) * solution.omega * np.where(mirrored, -1.0, 1.0)
-            seen_loads = np.where(mirrored, loads[group].conj().T, loads[group].T)
-            wave = (group[0] + 1) * scene.excitation.engine_order
-            ratio = scene.operation.damping
-            part = flowing_modes(flow, found, damping, ratio, wave, numbers.get(n, 0))
-            u = forced_motion(flex, part[0], seen_loads, omega, part[1]).displacement
-            fields[group] = np.where(mirrored, u.conj(), u).transpose(2, 0, 1)
+    for part in parts:
+        fields[part.harmonics] = part.fields
     probe = np.array([seen @ u.reshape(-1) for u in fields])
     known = solution.probe[1:, 0]
     mismatch = float(abs(probe - known).max() / max(abs(known).max(), np.finfo(float).tiny))

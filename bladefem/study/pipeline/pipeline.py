@@ -4,12 +4,13 @@ by the next run.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal, overload
 
 from ...contact.peak_pressure import peak_remarks
-from ...data import Patch
+from ...data import ModeSet, Patch
 from ...errors import InputError, suggestion
 from ...scene.aerodynamics import has_flow, refuse_flow
 from ...scene.tables import Scene
@@ -22,7 +23,7 @@ from ..adaptive.contact_mesh import coarse_sentence
 from ..adaptive.settings import first_settings
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import mode_strength
-from .bodies import Bodies, on_one_rank
+from .bodies import Bodies
 from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, reduced_sector
 from .flutter import find_flutter, flutter_sentences, with_best_load
@@ -31,9 +32,9 @@ from .normal_modes import excited_modes, find_modes, responding_diameters
 from .response_stage import run_response
 from .run_records import ModalRun, ReducedRun, Run, SeatedRun, SolvedRun
 from .scene_mesh import build_mesh
-from .seated_loads import seat_every_load
+from .seated_loads import condensed_stage, seat_every_load
 from .stage_inputs import stage_key
-from .stage_runner import Folder, StageClock, StageRunner
+from .stage_runner import Folder, StageClock, StageOfOneRank, StageRunner
 from .validate_mesh import check_blade, found_patches
 
 STAGES = ("mesh", "modes", "contact", "reduction", "response")
@@ -126,7 +127,7 @@ def run(
     if patches:
         refuse_jamming(scene, meshed.mesh, patches)
     bodies = Bodies(scene, meshed.mesh, comm, progress)
-    modal = _run_modes(meshed, bodies, keep, responds)
+    modal = _run_modes(meshed, bodies, patches, keep, responds)
     if until == "modes":
         return modal
     seated = _run_contact(modal, bodies, patches, keep)
@@ -167,11 +168,17 @@ def _run_mesh(scene: Scene, keep: StageRunner) -> Run:
 def _run_modes(
     before: Run,
     bodies: Bodies,
+    patches: list[Patch],
     keep: StageRunner,
     responds: bool,
 ) -> ModalRun:
+    """Modes without damper; where ranks have the bodies for themselves, side by side what follows
+    from them by one rank alone.
+
+    Args:
+        patches: of the contact, where its stage follows.
+    """
     scene = before.scene
-    key = stage_key("modes", scene)
     # the reduction needs more modes of the same pencils
     reduced = judged_modes(scene, first_settings(scene)) if responds else 0
     diameters = responding_diameters(scene, before.mesh) if responds else None
@@ -181,9 +188,27 @@ def _run_modes(
             stage_key("modes", scene, *(diameters or ())),
             lambda: find_modes(bodies, diameters, reduced=reduced),
         )
-        clamped = keep("clamped", key, lambda: on_one_rank(bodies, clamped_blade))
+    clamped = StageOfOneRank("clamped", stage_key("modes", scene), clamped_blade)
+    if patches:
+        beside = [condensed_stage(scene, patches)]
+        if responds:
+            beside.append(_mode_errors_stage(before, modes, patches))
+        with keep.clock("contact"):
+            keep.compute_ahead([*beside, clamped], bodies)
+    with keep.clock("modes"):
+        blade_alone = keep.of_one_rank(clamped, bodies)
     keep.clock.messages.extend(bodies.storage_remarks)
-    return ModalRun(**vars(before), modes=modes, clamped=clamped)
+    return ModalRun(**vars(before), modes=modes, clamped=blade_alone)
+
+
+def _mode_errors_stage(run: Run, modes: Sequence[ModeSet], patches: list[Patch]) -> StageOfOneRank:
+    """The error of the stiffness by the mesh, in the modes that are excited."""
+    excited = excited_modes(run.scene, run.mesh, modes)
+    return StageOfOneRank(
+        "mode_errors",
+        stage_key("mode errors", run.scene),
+        lambda some: mode_errors(some, patches, excited),
+    )
 
 
 def _run_contact(
@@ -212,22 +237,17 @@ def _run_reduction(
 ) -> ReducedRun:
     scene = before.scene
     mesh = before.mesh
+    excited = excited_modes(scene, mesh, before.modes)
+    strength = StageOfOneRank(
+        "strength", stage_key("stress", scene), lambda some: mode_strength(some, excited)
+    )
     with keep.clock("stresses"):
-        excited = excited_modes(scene, mesh, before.modes)
-        stressed = keep(
-            "strength",
-            stage_key("stress", scene),
-            lambda: on_one_rank(bodies, lambda some: mode_strength(some, excited)),
-        )
+        stressed = keep.of_one_rank(strength, bodies)
     cases = load_cases(scene, mesh, before.contact)
     middle = cases[len(cases) // 2]
     with keep.clock("reduction"):
         settings, reduced = reduced_sector(scene, bodies, middle, patches, keep)
-        errors = keep(
-            "mode_errors",
-            stage_key("mode errors", scene),
-            lambda: on_one_rank(bodies, lambda some: mode_errors(some, patches, excited)),
-        )
+        errors = keep.of_one_rank(_mode_errors_stage(before, before.modes, patches), bodies)
     return ReducedRun(
         **vars(before),
         strength=stressed,

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from geometry.mesh import sector_of
 
 from ...data import Patch, PortModel, SectorSpan
+from ...hbm.parallel import share_work
 from ...hbm.parameters import scale_density
 from ...io.stage_cache import on_root
 from ...util.arrays import RealOrComplex
@@ -179,6 +181,12 @@ def _reduced_diameters(
 
     seen = keep_vectors if spanned else None
 
+    wanted = sorted(set(diameters))
+    size = bodies.ranks_of_sector
+    interior = None
+    if scene.model.reduction == "rubin" and size == 1 and 1 < comm.size <= len(wanted):
+        interior = _interior_of_ranks(bodies, ports)
+
     def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
         steps = port_models(
             some_bodies.frame,
@@ -191,11 +199,10 @@ def _reduced_diameters(
             kept=some_bodies.kept.pop(KEPT_MODES, None),
             spin=rotation_of(some_bodies),
             seen=seen,
+            interior=interior,
         )
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
 
-    wanted = sorted(set(diameters))
-    size = bodies.ranks_of_sector
     if size == comm.size:
         whole = solved(bodies, wanted)
         every = [block for _, block in sorted(blocks.items())]
@@ -209,6 +216,28 @@ def _reduced_diameters(
     models = shared_out(comm, wanted, size, of_some, cost)
     span = _span_of_ranks(bodies, blocks, wanted, ports) if spanned and size == 1 else None
     return dict(zip(wanted, models, strict=True)), span
+
+
+def _interior_of_ranks(bodies: Bodies, ports: Ports) -> tuple[np.ndarray, np.ndarray] | None:
+    """`fem.ports.interior_flexibility` of ranks that each have the sector for themselves, a part of
+    the ports by each (collective); None without an open sector.
+    """
+    from ...fem.ports import interior_flexibility
+
+    def eliminate(_: int) -> None:
+        if bodies.alone.frame.opened is not None:
+            bodies.alone.frame.opened.elimination.core()
+
+    # a rank that fails is heard of by the others
+    share_work(eliminate, range(bodies.comm.size if bodies.comm else 1), bodies.comm)
+    opened = bodies.alone.frame.opened
+    if opened is None:
+        return None
+
+    def deal(work: Callable[[int], Any], items: Sequence[int]) -> Iterable[tuple[int, Any]]:
+        return zip(items, share_work(work, items, bodies.comm), strict=True)
+
+    return interior_flexibility(opened, ports.matrix, deal=deal)
 
 
 def _span_of_ranks(

@@ -16,6 +16,7 @@ from ...scene.aerodynamics import has_flow
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
 from ...scene.validate_contact import is_frictionless
+from ...util.communicator import Communicator
 from ...util.message import method
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
@@ -27,7 +28,14 @@ from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
 from .changed_cases import cases_of, changed_cases
 from .curve import Curve, load_of
-from .damped_motion import DampedStress, damped_stress
+from .damped_motion import (
+    DampedStress,
+    MotionPart,
+    damper_motion,
+    motion_in_diameter,
+    stress_of_motion,
+    sum_of_parts,
+)
 from .history import FRICTIONLESS
 from .kept_best_load import study_kept_loads
 from .linear_limits import Limit, judged_limits
@@ -140,36 +148,46 @@ def _stresses(
     response: Response,
     cases: Sequence[LoadCase],
 ) -> dict[int, DampedStress]:
-    """The stress under the best load and under the damper's own one, by number of the curve: one on
-    each rank where a rank has the bodies for itself, which share one factorisation over the nodal
-    diameters; else both on rank 0.
+    """The stress under the best load and under the damper's own one, by number of the curve.
+
+    Where a rank has the bodies for itself, nodal diameters and loads are dealt over the ranks: the
+    many harmonics of the best load take most of the time. Else all on rank 0.
     """
     own = before.contact.own
     curves = response.curves
     wanted = {response.best_curve}
     if own is not None:
         wanted.add(own_curve(curves, own, before.contact.problem.mass))
+    numbers = sorted(wanted)
     factorised = lru_cache(maxsize=None)(lambda n: bodies.alone.factorised(n))
 
-    def stress(k: int) -> DampedStress:
-        settings = curves[k].settings
-        reduced = with_damper_mass(before.reduced, cases[k].mass)
-        return damped_stress(
-            bodies.alone,
-            patches,
-            before.modes,
-            cases[k],
-            curves[k].peak,
-            settings.points,
-            factorised,
-            rigid_body(before.scene, before.mesh, reduced, patches, settings.damper),
+    def part(of: tuple[int, int]) -> MotionPart:
+        k, i = of
+        peak, points = curves[k].peak, curves[k].settings.points
+        return motion_in_diameter(
+            bodies.alone, patches, before.modes, i, cases[k], peak, points, factorised
         )
 
-    numbers = sorted(wanted)
+    def stress(k: int, parts: Sequence[MotionPart]) -> DampedStress:
+        settings, peak = curves[k].settings, curves[k].peak
+        reduced = with_damper_mass(before.reduced, cases[k].mass)
+        body = rigid_body(before.scene, before.mesh, reduced, patches, settings.damper)
+        motion = sum_of_parts(bodies.alone, patches, peak, parts)
+        moved = damper_motion(before.mesh, patches, cases[k], peak, body, settings.points)
+        return stress_of_motion(bodies.alone, cases[k], motion, motion.harmonics + moved)
+
+    def stresses(comm: Communicator | None) -> list[DampedStress]:
+        pieces = [(k, i) for k in numbers for i in range(len(before.modes))]
+        parts = share_work(part, pieces, comm)
+        of_load = {
+            k: [x for x, (n, _) in zip(parts, pieces, strict=True) if n == k] for k in numbers
+        }
+        return share_work(lambda k: stress(k, of_load[k]), numbers, comm)
+
     if bodies.ranks_of_sector == 1:
-        found = share_work(stress, numbers, bodies.comm)
+        found = stresses(bodies.comm)
     else:
-        found = on_root(bodies.comm, lambda: [stress(k) for k in numbers])
+        found = on_root(bodies.comm, lambda: stresses(None))
     return dict(zip(numbers, found, strict=True))
 
 

@@ -15,7 +15,7 @@ from ...errors import InputError, NotSolvedError
 from ...scene.tables import Scene
 from ...scene.units import newtons, show
 from ...util.message import warning
-from .bodies import Bodies, on_one_rank
+from .bodies import Bodies
 from .damper_contact import condense_contact, on_layer
 from .history import (
     FRICTIONLESS,
@@ -28,7 +28,7 @@ from .history import (
 from .loads import default_loads
 from .run_records import Seating
 from .stage_inputs import stage_key
-from .stage_runner import StageClock, StageRunner
+from .stage_runner import StageClock, StageOfOneRank, StageRunner
 
 
 def seat_every_load(
@@ -39,22 +39,23 @@ def seat_every_load(
     clock: StageClock,
 ) -> Seating:
     """The damper on its seats under every load, without friction or after the scene's history."""
-    key = stage_key("contact", scene)
-    name = seating_stage(scene)
-    rough = None
-    if scene.contact.history == FRICTIONLESS:
-        bare = keep(
-            name, key, lambda: on_one_rank(bodies, lambda some: condense_contact(some, patches))
-        )
-    else:
-        rough = keep(
-            name, key, lambda: on_one_rank(bodies, lambda some: condense_friction(some, patches))
-        )
-        bare = normal_part(rough)
+    condensed = keep.of_one_rank(condensed_stage(scene, patches), bodies)
+    rough = None if scene.contact.history == FRICTIONLESS else condensed
+    bare = condensed if rough is None else normal_part(rough)
     problem = on_layer(scene, bare)
     own = _own_load(scene, problem, rough, clock.messages)
     return seat_at_loads(
         scene, Seating(problem, {}, own, rough=rough), studied_loads(scene, own), clock
+    )
+
+
+def condensed_stage(scene: Scene, patches: list[Patch]) -> StageOfOneRank:
+    """What takes finite elements of the contact: a ContactProblem, or a FrictionalProblem where the
+    seating has a history.
+    """
+    condense = condense_contact if scene.contact.history == FRICTIONLESS else condense_friction
+    return StageOfOneRank(
+        seating_stage(scene), stage_key("contact", scene), lambda some: condense(some, patches)
     )
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TypeAlias, TypeVar
+from typing import Any, TypeAlias, TypeVar
 
+from ...hbm.parallel import share_work
 from ...io.stage_cache import cached_stage, found_remark
 from ...util.communicator import Communicator
 from ...util.progress import Progress, without_progress
+from .bodies import Bodies, on_one_rank
 
 Folder: TypeAlias = str | Path | None
 Result = TypeVar("Result")
@@ -37,6 +39,15 @@ class StageClock:
 
 
 @dataclass(frozen=True)
+class StageOfOneRank:
+    """A stage that one rank computes with its own bodies."""
+
+    name: str
+    key: str
+    compute: Callable[[Bodies], Any]
+
+
+@dataclass(frozen=True)
 class StageRunner:
     """Computes a stage, or reads it from the run folder and reports that."""
 
@@ -44,6 +55,8 @@ class StageRunner:
     folder: Folder
     comm: Communicator | None
     clock: StageClock
+    # stages computed before their call: name to what `cached_stage` gives
+    ahead: dict[str, tuple[Any, float | None]] = field(default_factory=dict)
 
     def __call__(
         self,
@@ -52,6 +65,26 @@ class StageRunner:
         compute: Callable[[], Result],
     ) -> Result:
         return self._reported(name, *cached_stage(self.folder, name, key, compute, self.comm))
+
+    def of_one_rank(self, stage: StageOfOneRank, bodies: Bodies) -> Any:
+        """The result of a stage that rank 0 computes, or that was computed ahead (collective)."""
+        known = self.ahead.pop(stage.name, None)
+        if known is not None:
+            return self._reported(stage.name, *known)
+        return self(stage.name, stage.key, lambda: on_one_rank(bodies, stage.compute))
+
+    def compute_ahead(self, stages: Sequence[StageOfOneRank], bodies: Bodies) -> None:
+        """Stages that do not need each other, each on another rank where ranks have the bodies for
+        themselves: the call for one of them finds its result (collective).
+        """
+        if self.comm is None or self.comm.size == 1 or bodies.ranks_of_sector > 1:
+            return
+
+        def result_of(one: StageOfOneRank) -> tuple[Any, float | None]:
+            return cached_stage(self.folder, one.name, one.key, lambda: one.compute(bodies.alone))
+
+        found = share_work(result_of, stages, self.comm)
+        self.ahead.update(zip([one.name for one in stages], found, strict=True))
 
     def alone(
         self,
