@@ -102,7 +102,7 @@ def main(first: int, last: int) -> None:
     missed = []
     history = []
     lost = 0
-    told = 0
+    reported = 0
     spent = {"library": 0.0, "march": 0.0}
     for seed in range(first, last):
         case = random_case(seed)
@@ -113,7 +113,7 @@ def main(first: int, last: int) -> None:
         clock = time.process_time()
         marched = marched_peak(case)
         spent["march"] += time.process_time() - clock
-        told += bool(notes)
+        reported += bool(notes)
         lost += marched.height == 0.0
         if marched.height <= (1 + MISSED) * found:
             continue
@@ -128,7 +128,7 @@ def main(first: int, last: int) -> None:
         )
     print(f"missed peaks: {len(missed)} of {last - first} {missed}; no steady march in {lost}")
     print(f"higher by another loading history: {len(history)} {history}")
-    print(f"searches that report something left open: {told}")
+    print(f"searches that report something left open: {reported}")
     print(f"CPU: library {spent['library']:.0f} s, march {spent['march']:.0f} s")
 
 

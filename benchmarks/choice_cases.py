@@ -64,7 +64,7 @@ class Outcome:
 
     settings: Settings
     accepted: bool
-    told: float  # estimated error
+    reported: float  # estimated error
     true: float  # error against the truth
     seconds: float  # of CPU, search and solution
 
@@ -200,8 +200,8 @@ def main(every: int = 1) -> None:
             outcomes.append(automatic(case, family, truth.probe[1, 0], accuracy))
             o = outcomes[-1]
             print(
-                f"{case.name:58s} {accuracy:6g} {'ok ' if o.accepted else 'NO '} told "
-                f"{o.told:8.1e} true {o.true:8.1e} H {o.settings.harmonics:2d} Nt "
+                f"{case.name:58s} {accuracy:6g} {'ok ' if o.accepted else 'NO '} reported "
+                f"{o.reported:8.1e} true {o.true:8.1e} H {o.settings.harmonics:2d} Nt "
                 f"{o.settings.samples:4d} modes {o.settings.modes:2d} points {o.settings.points} "
                 f"{1e3 * o.seconds:7.1f} ms"
             )

@@ -165,18 +165,18 @@ def main(first: int, last: int, accuracy: float) -> None:
             long_ratios.append(cheap / expensive)
         truth = true_height(case.model, peak_of(rich))
         error = abs(bf.size(peak_of(found.points)) / truth - 1)
-        told = found.settings.error
-        if told is None or not np.isfinite(told):
+        reported = found.settings.error
+        if reported is None or not np.isfinite(reported):
             unknown.append(seed)
-            told = np.inf
-        bad = error > accuracy >= told
+            reported = np.inf
+        bad = error > accuracy >= reported
         slow = cheap > SLOWER * expensive
         wrong += [seed] * bad
         slower += [seed] * slow
-        unsure += [seed] * (told < error / 2 and error > accuracy / SEARCHED)
-        if bad or slow or not np.isfinite(told):
+        unsure += [seed] * (reported < error / 2 and error > accuracy / SEARCHED)
+        if bad or slow or not np.isfinite(reported):
             print(
-                f"seed {seed}, {case.name}: error {error:.2%}, estimated {told:.2%}, "
+                f"seed {seed}, {case.name}: error {error:.2%}, estimated {reported:.2%}, "
                 f"H {found.settings.harmonics}, CPU {cheap:.3f} s against {expensive:.3f} s",
                 flush=True,
             )

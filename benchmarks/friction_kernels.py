@@ -60,7 +60,7 @@ Tried, and slower or no faster:
   elsewhere.
 - Leaps as long as the number of stretches of slip stays, not all states: half the periods, but a
   wrong limit at times.
-- References to arrays counted in the inner functions, as Numba does unless told: a fifth of the
+- References to arrays counted in the inner functions, as Numba does unless reported: a fifth of the
   time.
 - Both tangents in one pass of the sums over time: a fiftieth less at H 3, a tenth more at H 5 for
   want of registers.

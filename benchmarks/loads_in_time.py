@@ -12,11 +12,11 @@ scene.toml tells the scene and summary.csv loads, frequencies, amplitudes, frict
 estimated errors. Taken from the package are the reduced sector (modes and residual flexibility in
 the nodal diameters that repeat), the preload of the seats and the layer. Residual flexibility has
 no inertia: its stiffest part is left out, the rest becomes modes at RESIDUAL_FREQUENCY. Where the
-blade, from rest, keeps to less than half of the amplitude told, it is driven STRONG times as hard
-first: where contacts lift off there are several motions. With --around, frequencies so many percent
-below and above are passed upwards and downwards as well, each from the motion before. With --law a
-layer that stiffens with pressure does so in the march; without it its stiffness at rest stays, as
-in the balance.
+blade, from rest, keeps to less than half of the amplitude reported, it is driven STRONG times as
+hard first: where contacts lift off there are several motions. With --around, frequencies so many
+percent below and above are passed upwards and downwards as well, each from the motion before. With
+--law a layer that stiffens with pressure does so in the march; without it its stiffness at rest
+stays, as in the balance.
 """
 
 from __future__ import annotations
@@ -491,12 +491,12 @@ def has_enough_steps(
 
 
 def print_load(
-    ring: Ring, layer: Layer, load: float, told: pd.Series, steps: int, around: Sequence[float]
+    ring: Ring, layer: Layer, load: float, reported: pd.Series, steps: int, around: Sequence[float]
 ) -> None:
     """One row of the table."""
     begin = time.process_time()
-    frequency = told["peak_frequency [Hz]"]
-    amplitude = told["peak_amplitude [m]"]
+    frequency = reported["peak_frequency [Hz]"]
+    amplitude = reported["peak_amplitude [m]"]
     state = start_at_rest(ring, layer)
     if not has_enough_steps(ring, layer, state, load, frequency, steps):
         return
@@ -519,10 +519,10 @@ def print_load(
         beside = f"{1e6 * height:.4g} at {place:.2f}"
     seconds = time.process_time() - begin
     print(
-        f"| {load:g} | {frequency:.2f} | {1e6 * amplitude:.4g} | {100 * told['error']:.1f} | "
+        f"| {load:g} | {frequency:.2f} | {1e6 * amplitude:.4g} | {100 * reported['error']:.1f} | "
         f"{1e6 * found.low:.4g} to {1e6 * found.high:.4g} | "
         f"{100 * (amplitude / found.high - 1):+.1f} | {beside} | "
-        f"{1e3 * told['dissipated [J]']:.4g} / {1e3 * found.work:.4g} | "
+        f"{1e3 * reported['dissipated [J]']:.4g} / {1e3 * found.work:.4g} | "
         f"{100 * found.slip:.0f}, {100 * found.open:.0f} | {words} | "
         f"{found.periods}{'' if found.steady else ' (not steady)'} | {seconds:.0f} |",
         flush=True,
@@ -548,12 +548,12 @@ def main() -> None:
     heads = [
         "load [N]",
         "at [Hz]",
-        "told [um]",
+        "reported [um]",
         "estimated error [%]",
         "marched [um]",
-        "told over marched [%]",
+        "reported over marched [%]",
         "highest around [um]",
-        "friction work told / marched [mJ]",
+        "friction work reported / marched [mJ]",
         "slip, open [%]",
         "from",
         "periods",

@@ -67,13 +67,13 @@ def outcome(case: Case, point: bf.Solution) -> str:
 
 def verdicts(case: Case, rough: bf.Solution, point: bf.Solution) -> dict[str, tuple[str, str]]:
     """Verdict and what is known of it, of the motion with 15 harmonics and as a run judges."""
-    told = stability_verdict(case.model, point)
+    reported = stability_verdict(case.model, point)
     richer = [RicherModel(case.model, harmonics, samples) for harmonics, samples in CONFIRMING]
     run = stability_of(case.model, [rough], richer)
     return {
         "15 harmonics": (
-            told.verdict,
-            f"{told.multiplier:.5f} {told.bifurcation} {told.reason}",
+            reported.verdict,
+            f"{reported.multiplier:.5f} {reported.bifurcation} {reported.reason}",
         ),
         "as in a run": (
             str(run.verdict[0]),
@@ -95,14 +95,14 @@ def main(first: int, last: int) -> None:
                 table["", "", "not converged", ""] += 1
                 continue
             clock = time.process_time()
-            told = verdicts(case, rough, point)
+            reported = verdicts(case, rough, point)
             spent["verdict"] += time.process_time() - clock
             seen = outcome(case, point)
             own = rough if abs(bf.size(rough) / bf.size(point) - 1) > SAME else point
-            marched = dict.fromkeys(told, seen)
+            marched = dict.fromkeys(reported, seen)
             if own is rough:
                 marched["as in a run"] = outcome(case, rough)
-            for way, (verdict, known) in told.items():
+            for way, (verdict, known) in reported.items():
                 seen = marched[way]
                 judged = own if way == "as in a run" else point
                 contacts = "lift-off" if judged.states["lift"] else "closed"

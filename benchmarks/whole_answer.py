@@ -236,9 +236,9 @@ def by_choice(known: Prepared, k: int) -> Answer:
     curve = curve_of(known.scene, case, lambda _: family, start, known.softer)
     s = curve.settings
     model = family_member(family, s).model
-    told = np.nan if curve.error is None else curve.error
+    reported = np.nan if curve.error is None else curve.error
     ask = asking(model, s, curve.peak)
-    return Answer(curve.peak_amplitude, curve.peak_frequency, ask, told, s, curve.peak)
+    return Answer(curve.peak_amplitude, curve.peak_frequency, ask, reported, s, curve.peak)
 
 
 def by_settings(settings: Settings, known: Prepared, k: int) -> Answer:

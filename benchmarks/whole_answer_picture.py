@@ -110,12 +110,12 @@ def answer_table(rows: pd.DataFrame) -> str:
     for _, row in rows.sort_values("time").iterrows():
         if row["converged"]:
             numbers = [row[f"error_{of}"] for of in ("amplitude", "frequency", "phasor")]
-            told = [_percent(x) for x in (*numbers, row["median"])]
+            reported = [_percent(x) for x in (*numbers, row["median"])]
         else:
             lost = str(row["reason"]).startswith("left out")
-            told = ["left out" if lost else "not solved", "", "", ""]
+            reported = ["left out" if lost else "not solved", "", "", ""]
         name = f"**{row['name']}**" if row["chosen"] else row["name"]
-        lines.append(f"| {' | '.join([name, *told])} | {row['time']:.3g} s |")
+        lines.append(f"| {' | '.join([name, *reported])} | {row['time']:.3g} s |")
     return "\n".join(lines)
 
 

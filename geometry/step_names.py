@@ -2,7 +2,7 @@
 of them is.
 
 A STEP file (ISO 10303-21) numbers its records as it likes, and the library reads solids in an order
-of its own: they are told by their corners. Faces of a solid are read in the order of its shells.
+of its own: they are given by their corners. Faces of a solid are read in the order of its shells.
 """
 
 from __future__ import annotations

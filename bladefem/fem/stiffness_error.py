@@ -46,7 +46,7 @@ from .temperature import density_at, point_temperatures, strain_tensor_at
 # shapes, 1.5 to 2 at clamps, 2.3 at re-entrant corners and up to 2.6 in cells as long as a wave; of
 # first order 0.9 to 1.3 (`benchmarks/stiffness_error.py`)
 FACTORS = {1: 1.3, 2: 2.0}
-# of the stiffness: larger errors are told as this
+# of the stiffness: larger errors are reported as this
 LARGEST_SHARE = 0.9
 # energy that a step of the conjugate gradients adds, over that found, at which they end
 TOLERANCE = 0.01

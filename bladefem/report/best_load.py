@@ -74,7 +74,7 @@ def lowest_of_response(response: Response) -> LowestResonance:
 def best_load_table(found: Sequence[BestLoad], curves: Sequence[Curve] = ()) -> pd.DataFrame:
     """One row a mass of the damper, SI units; no rows where nothing was searched.
 
-    The search compares balances. What the blade does under the load that it found is told by the
+    The search compares balances. What the blade does under the load that it found is given by the
     response there, as under every other load.
 
     Args:

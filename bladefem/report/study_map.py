@@ -105,7 +105,7 @@ def _robust_numbers(band: pd.DataFrame, samples: int) -> list[Headline]:
     shares = "amplitude_90" in band
     robust = band.loc[band["amplitude_90" if shares else "largest_amplitude"].idxmin()]
     every = f"{1e6 * robust['smallest_amplitude']:.4g} to {1e6 * robust['largest_amplitude']:.4g}"
-    few = f"{samples} samples, of which no shares are told: that takes {LEAST_FOR_SHARES}"
+    few = f"{samples} samples, of which no shares are reported: that takes {LEAST_FOR_SHARES}"
     return [
         Headline(
             "most robust load",

@@ -149,6 +149,7 @@ COLUMNS = {
     "imbalance": Column("energy imbalance", "1", digits=2),
     "slipping": Column("slipping elements"),
     "drift": Column("walk of the damper", "m/s", "µm/s", 1e6),
+    "harmonics": Column("harmonics"),
     "points": Column("points"),
     "unconverged": Column("not converged"),
     "nodal_diameter": Column("nodal diameter"),

@@ -95,9 +95,9 @@ _NUMBER = re.compile(
 _POWER = re.compile(r"(.+?)\^?(-?\d)?")
 # letters of a unit text: longer ones are no units
 LONGEST_UNIT = 60
-# [N] from which forces are told in kN
+# [N] from which forces are reported in kN
 FIRST_KILONEWTONS = 1e4
-# from which a plain number is told by a power of ten
+# from which a plain number is given by a power of ten
 FIRST_POWER_OF_TEN = 1e7
 
 

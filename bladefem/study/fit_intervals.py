@@ -14,7 +14,7 @@ from ..util.arrays import BooleanArray, RealArray
 
 # half width of the 95 % interval of a logarithm from which a parameter counts as unknown: times 2
 UNKNOWN_LOG_HALF_WIDTH = np.log(2.0)
-# widest interval that is told
+# widest interval that is reported
 MAX_LOG_HALF_WIDTH = 50.0
 # of the size of the best seen direction: below it the data are blind
 BLIND_SHARE = 1e-12
@@ -66,7 +66,7 @@ class Knowledge:
         by = abs(shifts).sum(axis=0)
         half = np.minimum(self.half + by, MAX_LOG_HALF_WIDTH)
         ends = self.intervals * np.exp(np.outer(np.minimum(by, MAX_LOG_HALF_WIDTH), SIDES))
-        # beyond what is told nothing is known on either side
+        # beyond what is reported nothing is known on either side
         ends[half >= MAX_LOG_HALF_WIDTH] = 0.0, np.inf
         products = (
             replace(one, half=one.half + float(abs(shifts @ _both(one.names, names)).sum()))

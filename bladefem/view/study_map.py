@@ -13,7 +13,7 @@ from ..util.percent import percent
 from .study import MARKS
 from .style import COLOURS, MICRO, canvas, log_axis
 
-# samples from which shares of them are told
+# samples from which shares of them are reported
 LEAST_FOR_SHARES = 10
 # luminance below which white letters are read better
 DARK_LUMINANCE = 0.5

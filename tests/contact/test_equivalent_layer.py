@@ -315,7 +315,7 @@ def test_lengths_of_the_elements_are_those_of_the_layer(problem):
 @pytest.mark.parametrize(("decay", "unknown"), [(None, False), (np.inf, False), (DECAY, True)])
 def test_the_law_is_unknown_where_a_march_with_tangents_tells_the_error(decay, unknown):
     """A balance that is not followed to more harmonics is not followed to the law either: the error
-    of a resonance sought in time did not contain it, and was told as if the layer were linear.
+    of a resonance sought in time did not contain it, and was reported as if the layer were linear.
     """
     model = sliding_mass(16.0, 30.0j)
     lengths = None if decay is None else np.array([decay])

@@ -94,7 +94,7 @@ def test_skewed_top_pressure_moves_the_resultant_and_turns_the_mass():
 
 @pytest.mark.parametrize(("along", "phase"), [((0.0, 0.005), 0.0), ((0.003, 0.004), 0.0)])
 def test_loops_and_amplitude_do_not_depend_on_the_axes(along, phase):
-    """Friction on one point knows no direction: what is told along y, or aslant, is that along x."""
+    """Friction on one point knows no direction: what is reported along y, or aslant, is that along x."""
     body = MassOnFoundation(footprint=Footprint(np.zeros((1, 2)), np.ones(1)))
     drives = [
         FoundationMotion(Fraction(1, 2), amplitude=a, phase=phase) for a in ((0.005, 0.0), along)

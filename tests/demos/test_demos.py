@@ -97,9 +97,9 @@ def final_numbers(name: str, ranks: int) -> tuple[float, float]:
 
 def _check_written(lines: list[str], start: float) -> None:
     """The files that a demo tells, once whatever the ranks, are as young as its run."""
-    told = [line.partition(": ")[2] for line in lines if line.startswith("written: ")]
-    assert len(told) <= 1
-    for file in told[0].split(", ") if told else []:
+    reported = [line.partition(": ")[2] for line in lines if line.startswith("written: ")]
+    assert len(reported) <= 1
+    for file in reported[0].split(", ") if reported else []:
         # clocks of file systems are coarser than the system's
         assert (HERE / file).stat().st_mtime > start - 1.0
 

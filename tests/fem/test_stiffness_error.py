@@ -185,11 +185,11 @@ def test_energies_between_modes_tell_how_responses_change():
     energies = stiffness_error(body, found.shapes, squares)
     softer, vectors = np.linalg.eigh(np.diag(squares) - energies)
     before = heights(squares, seen)
-    told = heights(softer, vectors.T @ seen) / before - 1
+    reported = heights(softer, vectors.T @ seen) / before - 1
     alone = heights(squares - energies.diagonal(), seen) / before - 1
     _, _, fine, fine_seen = solved((8, 2, 2))
     true = heights(fine, fine_seen) / before - 1
-    assert ((told / true > 0.5) & (told / true < 2)).all()
+    assert ((reported / true > 0.5) & (reported / true < 2)).all()
     assert (alone / true)[[1, 3]].max() < 0
 
 

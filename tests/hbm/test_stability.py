@@ -40,11 +40,11 @@ def test_multipliers_are_those_of_the_event_exact_flow():
         )
     ]
     system = time_system(model, 1)
-    told = []
+    reported = []
     errors = []
     for point in path[20::12]:
         found = stability_verdict(model, point)
-        told.append(found.verdict)
+        reported.append(found.verdict)
         if point.states["stick"] == len(point.w):
             continue
         shot = periodic_solution(system, point.omega, state_of(point, system), most=8)
@@ -54,7 +54,7 @@ def test_multipliers_are_those_of_the_event_exact_flow():
             errors.append(abs(found.multiplier - exact))
             assert found.verdict == (UNSTABLE if exact > 1.001 else STABLE)
             assert found.bifurcation == ("fold" if exact > 1.001 else "")
-    assert {STABLE, UNSTABLE} <= set(told) and len(errors) > 5
+    assert {STABLE, UNSTABLE} <= set(reported) and len(errors) > 5
     assert max(errors) < 1e-3
 
 
@@ -184,7 +184,7 @@ def test_a_wave_is_judged_on_the_blades_after_which_it_repeats():
 
 
 def test_uncoupled_blades_in_a_wave_have_the_multipliers_of_one():
-    """Modes may carry any phase: four blades without coupling, told as a wave, are one blade."""
+    """Modes may carry any phase: four blades without coupling, reported as a wave, are one blade."""
     alone = bouncing()
     body = alone.sides[0]
     sides = tuple(replace(body, shapes=body.shapes * np.exp(0.5j * np.pi * h)) for h in range(8))

@@ -60,20 +60,20 @@ def test_what_is_put_away_is_told_before_it_is(tmp_path):
     names = [f"{letter}.csv" for letter in "abcde"]
     for name in names:
         (tmp_path / name).write_text("first")
-    told = []
+    reported = []
 
     def tell(sentence):
-        told.append(sentence)
+        reported.append(sentence)
         assert {name for name in names if (tmp_path / name).exists()} == set(names)
 
     other = vary(Scene(), mistuning__friction=0.07)
     assert "5 files moved" in take_folder(tmp_path, other, None, tell)
-    (sentence,) = told
+    (sentence,) = reported
     assert "differs in mistuning.friction: a.csv, b.csv, c.csv and 2 more" in sentence
     assert "stages stay" in sentence and "-o" in sentence
     # nothing is left to be told of
     take_folder(tmp_path, Scene(), None, tell)
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_files_of_a_mesh_stay_while_it_is_the_same(tmp_path):
@@ -190,12 +190,12 @@ def test_what_results_replace_is_gone_after_the_command(tmp_path):
 
 def command(folder, scene, **files):
     """What a command does: it takes the folder, and writes files of its own."""
-    told = []
-    with lock_run_folder(folder, told.append):
+    reported = []
+    with lock_run_folder(folder, reported.append):
         moved = take_folder(folder, scene)
         for name, text in files.items():
             (folder / f"{name}.md").write_text(text)
-    return moved, told
+    return moved, reported
 
 
 def test_files_of_the_user_stay_through_any_number_of_commands(tmp_path):
@@ -205,8 +205,8 @@ def test_files_of_the_user_stay_through_any_number_of_commands(tmp_path):
     (tmp_path / "earlier").mkdir()
     (tmp_path / "earlier" / "older.csv").write_text("mine too")
     for number, scene in enumerate((OTHER, Scene(), OTHER)):
-        moved, told = command(tmp_path, scene, report=f"run {number}")
-        assert "1 file moved" in moved and told == []
+        moved, reported = command(tmp_path, scene, report=f"run {number}")
+        assert "1 file moved" in moved and reported == []
     assert (tmp_path / "notes.txt").read_text() == "mine"
     assert (tmp_path / "earlier" / "older.csv").read_text() == "mine too"
     assert (tmp_path / "earlier" / "report.md").read_text() == "run 1"
@@ -215,8 +215,8 @@ def test_files_of_the_user_stay_through_any_number_of_commands(tmp_path):
 def test_a_file_of_the_user_that_is_overwritten_is_kept(tmp_path):
     """In a folder that is no run folder yet, twice, and one that was edited after it was written."""
     (tmp_path / "report.md").write_text("mine")
-    _, told = command(tmp_path, Scene(), report="first")
-    assert "report.md" in told[0] and "not_from_bladefem" in told[0]
+    _, reported = command(tmp_path, Scene(), report="first")
+    assert "report.md" in reported[0] and "not_from_bladefem" in reported[0]
     assert (tmp_path / "report.md").read_text() == "first"
     (tmp_path / "report.md").write_text("first, with my remarks")
     command(tmp_path, Scene(), report="second")

@@ -1,4 +1,4 @@
-"""Matrices written as DMIG in all three kinds of fields come back; what cannot be read is told."""
+"""Matrices written as DMIG in all three kinds of fields come back; what cannot be read is reported."""
 
 import doctest
 import sys
@@ -133,9 +133,9 @@ def test_a_full_file_comes_without_its_constrained_freedoms(tmp_path, monkeypatc
 def test_broken_files_are_told_in_one_sentence(tmp_path, name, word):
     if name != "b.npz":
         (tmp_path / name).write_bytes(b"\xff\xfe rubbish")
-    with pytest.raises(InputError, match=word) as told:
+    with pytest.raises(InputError, match=word) as reported:
         read_matrices(tmp_path / name)
-    assert name in str(told.value)
+    assert name in str(reported.value)
 
 
 def test_the_example_in_the_docstring():

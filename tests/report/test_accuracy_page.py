@@ -36,11 +36,11 @@ def test_whole_answers_are_copied_from_their_tables():
         rows = pd.read_csv(FIGURES / f"answer_{scene}.csv")
         loads = pd.read_csv(FIGURES / f"answer_{scene}_loads.csv")
         begin, end = f"<!-- answer of {scene} -->", f"<!-- end of {scene} -->"
-        told = PAGE.split(begin)[1].split(end)[0]
-        assert answer_table(rows) in told
-        assert what_was_solved(rows, loads)[1:] in told
-        assert (FIGURES / f"answer_{scene}.txt").read_text(encoding="utf-8") in told
-        assert f"figures/answer_{scene}.png" in told
+        reported = PAGE.split(begin)[1].split(end)[0]
+        assert answer_table(rows) in reported
+        assert what_was_solved(rows, loads)[1:] in reported
+        assert (FIGURES / f"answer_{scene}.txt").read_text(encoding="utf-8") in reported
+        assert f"figures/answer_{scene}.png" in reported
 
 
 def test_the_line_to_paste_is_that_of_the_cheapest_way_that_is_a_setting(tmp_path):
@@ -88,5 +88,5 @@ def test_the_reference_blade_is_that_of_its_table(row):
     amplitude, phasor, seconds = (x.strip() for x in line.strip("|").split("|")[1:])
     assert float(amplitude) == pytest.approx(found["error"], rel=0.06)
     assert float(phasor) == pytest.approx(found["error_phasor"], rel=0.06)
-    told = float(seconds.removesuffix(" ms")) / 1e3
-    assert told == pytest.approx(found["time [s]"], rel=0.06)
+    reported = float(seconds.removesuffix(" ms")) / 1e3
+    assert reported == pytest.approx(found["time [s]"], rel=0.06)

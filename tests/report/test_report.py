@@ -197,7 +197,7 @@ def test_a_searched_optimum_says_how_flat_it_is(low, high, said):
 
 
 def test_the_error_of_a_searched_optimum_has_that_of_the_mesh():
-    """The search has one mesh: what finer ones change is told by the nearest load studied, not by
+    """The search has one mesh: what finer ones change is given by the nearest load studied, not by
     the blade without damper, however far that load is.
     """
     rows = {"load": [0.0, 500.0, 3000.0, np.inf], "peak_amplitude": [1e-3, 1e-5, 9e-5, 9e-4]}
@@ -469,8 +469,8 @@ def test_next_steps_name_the_mass_to_try():
     finite = meshes[(meshes["load"] > 0) & np.isfinite(meshes["load"])]
     lightest = finite.loc[finite["load"].idxmin()]
     there = pd.DataFrame({"load": [lightest["load"]], "amplitude": [1e-6], "frequency": [800.0]})
-    told = next_steps(Scene(), [], meshes, own, None, there)[-1]
-    assert f"changes the amplitude by {100 * lightest['body_mesh']:.2g} %" in told
+    reported = next_steps(Scene(), [], meshes, own, None, there)[-1]
+    assert f"changes the amplitude by {100 * lightest['body_mesh']:.2g} %" in reported
     # a stress that the mesh leaves uncertain is not one to sign
     for error, said in ((0.26, True), (0.1, False), (np.nan, False)):
         asked = next_steps(Scene(), [], summary.assign(stress_error=error), own)
@@ -483,12 +483,14 @@ def test_next_steps_name_the_mass_to_try():
 def test_an_assumed_contact_stiffness_is_told():
     """Whichever of the stiffnesses is given, for both seats or for each, nothing is assumed."""
     pressed = pd.DataFrame({"mean_pressure": [3.3e5, 3.3e6]})
-    (told,) = assumed_stiffness(Scene(), pressed)
+    (reported,) = assumed_stiffness(Scene(), pressed)
     # (1 + 0.01) MPa over 0.4 sqrt(2) 1.25 0.8 um
-    assert "Ra 0.8 um on each face (ground seats)" in told and "1785 N/mm^3 at 1 MPa" in told
-    assert "601 to 5851 N/mm^3 at the mean pressures" in told and "Persson" in told
-    (told,) = assumed_stiffness(Scene(contact=Contact(roughness=1.6e-6)))
-    assert "Ra 1.6 um" in told and "893 N/mm^3 at 1 MPa" in told
+    assert (
+        "Ra 0.8 um on each face (ground seats)" in reported and "1785 N/mm^3 at 1 MPa" in reported
+    )
+    assert "601 to 5851 N/mm^3 at the mean pressures" in reported and "Persson" in reported
+    (reported,) = assumed_stiffness(Scene(contact=Contact(roughness=1.6e-6)))
+    assert "Ra 1.6 um" in reported and "893 N/mm^3 at 1 MPa" in reported
     seats = Contact(left=Seat(kn=1e7), right=Seat(kt_area=1e12))
     for given in (Contact(kt_area=4e10), Contact(kn=1e7), Contact(stiffness="map"), seats):
         assert assumed_stiffness(Scene(contact=given)) == []
@@ -514,8 +516,8 @@ def test_loads_on_both_sides_share_a_unit():
 
 def test_what_is_not_determined_has_no_bracket():
     summary = synthetic.summary().assign(error=0.01)
-    told = ResponseAnswer([("optimum normal load per seat", "not determined", "why")], [])
-    (found,) = headlines(told, summary, None)
+    reported = ResponseAnswer([("optimum normal load per seat", "not determined", "why")], [])
+    (found,) = headlines(reported, summary, None)
     assert found.uncertainty == "see what to do next"
 
 

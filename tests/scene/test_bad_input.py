@@ -37,7 +37,7 @@ REFUSED = [
     ("mesh.order=3", "mesh.order = 3: expected 1 or 2"),
     ("temperature.uniform=-300 degC", "temperature.uniform = -300 degC: expected 0 K to 5000 K"),
     ("disc.sectors=36 mm", "expected a plain number"),
-    # a share is told as it was written, and so are its limits
+    # a share is reported as it was written, and so are its limits
     ("operation.damping=200 %", "operation.damping = 200 %: expected 0 % to 50 %"),
     ("contact.mu=300percent", "contact.mu = 300percent: expected 0 % to 200 %"),
     ("model.harmonics=-300 %", "model.harmonics = -300 %: expected 100 % to 9900 %"),

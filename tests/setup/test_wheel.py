@@ -60,8 +60,8 @@ def run_from(installed: Path, *words: str) -> subprocess.CompletedProcess[str]:
 def test_check_and_mesh_work_from_the_wheel(installed):
     """The mesh is made in a process of its own, by module name."""
     scene = str(ROOT / "scenes" / "plane.toml")
-    told = run_from(installed, "check", scene)
-    assert told.returncode == 0, told.stderr
+    reported = run_from(installed, "check", scene)
+    assert reported.returncode == 0, reported.stderr
     made = run_from(installed, "mesh", scene, "--set", "mesh.size=8 mm", "-o", "out")
     assert made.returncode == 0, made.stderr
     assert "body blade, cells" in made.stdout

@@ -74,10 +74,10 @@ def test_F19_points_are_compared_with_the_finest():
         HZ * 1385.7 * 1.01,
     )
     first = replace(first_for(5), points=3)
-    told = indicate_errors(
+    reported = indicate_errors(
         family_of(model), first, solve(family_member(family_of(model), first).model, omega, 1, 64)
     )
-    assert told.errors["points"] > 0.4
+    assert reported.errors["points"] > 0.4
     _, point, found = chosen(model, omega, first, 0.02)
     assert found.total < 0.01
     assert abs(point.probe[1, 0] / solve(model, omega, 15, 1024).probe[1, 0] - 1) < 0.02
@@ -111,8 +111,8 @@ def test_F21_slip_between_two_samples():
     missed = abs(blind.probe[1, 0] / true.probe[1, 0] - 1)
     assert missed > 5e-4
     assert not sticks_safely(model, blind)
-    told = indicate_errors(family_of(model), first_for(2), blind).total
-    assert told == pytest.approx(missed, rel=0.3)
+    reported = indicate_errors(family_of(model), first_for(2), blind).total
+    assert reported == pytest.approx(missed, rel=0.3)
 
 
 def test_F22_an_indicator_beside_the_peak():
@@ -130,7 +130,7 @@ def test_F22_an_indicator_beside_the_peak():
         first.samples,
     )
     there, _, found = choose_settings(family, first, beside, 0.02)
-    assert found.total <= 0.01  # told 0.1 %
+    assert found.total <= 0.01  # reported 0.1 %
     top = peak_of(covered_band(family_member(family, there).model, there, band, 1, 0.02))
     assert off(model, top) > 0.02
     curve = resonance_curve(family, first, band, 1, 0.02)
@@ -158,10 +158,10 @@ def test_F23_one_newton_step_as_an_indicator():
     end = newton(balance, match_harmonics(point.w, other.harmonics), Options(iterations=1))
     step = as_solution(balance, Attempt("one step", end), 1, "")
     assert abs(step.probe[1, 0] / point.probe[1, 0] - 1) > 0.1
-    told = indicate_errors(family, settings, point).errors["harmonics"]
+    reported = indicate_errors(family, settings, point).errors["harmonics"]
     true = abs(solve(model, omega, 15, 512, start=point).probe[1, 0] / point.probe[1, 0] - 1)
-    assert told < 2e-3
-    assert told == pytest.approx(true, rel=0.5)
+    assert reported < 2e-3
+    assert reported == pytest.approx(true, rel=0.5)
 
 
 def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
@@ -195,10 +195,10 @@ def test_F24_a_point_that_is_not_solved_asks_for_nothing(monkeypatch):
 def test_F24_the_curve_says_where_nothing_is_known():
     point = solve(reference_model(load=3.0, points=4), HZ * 1300, 1, 64)
     points = [replace(point, omega=HZ * f, converged=f != 1200) for f in (1100, 1200, 1300, 1400)]
-    told = estimated_errors(
+    reported = estimated_errors(
         CheckedCurve(first_for(10), points, {HZ * 1300: 0.01, HZ * 1400: np.inf})
     )
-    np.testing.assert_array_equal(told, [0.01, np.inf, 0.01, np.inf])
+    np.testing.assert_array_equal(reported, [0.01, np.inf, 0.01, np.inf])
 
 
 def test_F25_a_sweep_that_follows_one_of_two_peaks():
@@ -229,16 +229,16 @@ def test_F26_a_curve_checked_by_height_alone(monkeypatch):
             family_of(model, (1, 1)), omegas, first_for(len(model.side(1).omega)), accuracy
         )
         top = max(size(p) for p in curve.points)
-        told = max(
+        reported = max(
             curve.errors[p.omega] * size(p) / top for p in curve.points if p.omega in curve.errors
         )
         pairs = zip(curve.points[::6], truth, strict=True)
-        return told, max(abs(p.probe[1, 0] - q.probe[1, 0]) / top for p, q in pairs)
+        return reported, max(abs(p.probe[1, 0] - q.probe[1, 0]) / top for p, q in pairs)
 
     assert worst()[1] < 1e-3  # measured 2e-4, with 15 harmonics
     monkeypatch.setattr(watched, "MAX_CHECKED_PEAKS", 0)
-    told, true = worst()
-    assert told < 5e-4 and true > 1e-2
+    reported, true = worst()
+    assert reported < 5e-4 and true > 1e-2
 
 
 def test_F28_internal_resonances_between_the_checks(monkeypatch):

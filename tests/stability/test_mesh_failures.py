@@ -31,7 +31,7 @@ def run(scene):
 
 
 def test_F27_the_finest_patch_is_itself_too_coarse():
-    """63 N, ten elements on each seat: 0.15 % told, 30 % off, since 6 nodes press; with forty 21
+    """63 N, ten elements on each seat: 0.15 % reported, 30 % off, since 6 nodes press; with forty 21
     press, and 0.7 %.
 
     Half as many contact points change the amplitude by 9.8 and 2.9 %.

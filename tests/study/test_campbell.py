@@ -35,7 +35,7 @@ def wheel():
 
 def test_lines_equal_solves_at_each_speed(wheel):
     """Measured 2e-10 without and 7e-8 with Coriolis forces, of frequencies that the rotation moves
-    by some per cent; with the lowest modes alone it was 3e-5. The error told holds.
+    by some per cent; with the lowest modes alone it was 3e-5. The error reported holds.
     """
     speeds = [0.0, 900.0, 2500.0, 3000.0]
     table = campbell_table(wheel, speeds, [0, 2], 4)

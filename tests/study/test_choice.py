@@ -66,14 +66,14 @@ def test_accepted_settings_keep_the_accuracy(kt, mass, phase, points, load, shar
 def test_a_curve_tells_its_error_at_every_point():
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
     curve = resonance_curve(family_of(model), first_for(20), (1150.0, 1600.0), 2, 0.02)
-    told = estimated_errors(curve)
+    reported = estimated_errors(curve)
     true = np.array(
         [abs(size(p) / size(solve(model, p.omega, 31, 2048)) - 1) for p in curve.points]
     )
     # measured 1.9 times the true error at its largest, 2.1 % on a flank, and 0.26 % at the peak
-    assert (told > true / 2)[true > 0.2 * 0.02].all()
+    assert (reported > true / 2)[true > 0.2 * 0.02].all()
     assert true[curve.points.index(peak_of(curve.points))] < 0.01
-    assert len(told) == len(curve.points) and np.isfinite(told).all()
+    assert len(reported) == len(curve.points) and np.isfinite(reported).all()
     assert 3 <= checked_points(curve).sum() <= 8
     assert curve.settings.error <= 0.01
 

@@ -146,9 +146,9 @@ def test_all_points_change_a_peak_as_two_peaks_say():
     few = find_peak(family.build(replace(settings, harmonics=1)).model, 2 * np.pi * 1320, 1, 64)
     every = replace(settings, harmonics=1, points=4096)
     rich = find_peak(family.build(every).model, few.omega, 1, 64)
-    told = choice_in_time._change_with_all_points(family, settings, few, 0.01)
-    assert told == pytest.approx(abs(few.height / rich.height - 1), abs=2e-3)
-    assert told > 0.02
+    reported = choice_in_time._change_with_all_points(family, settings, few, 0.01)
+    assert reported == pytest.approx(abs(few.height / rich.height - 1), abs=2e-3)
+    assert reported > 0.02
     given = replace(settings, chosen=("harmonics",))
     assert choice_in_time._change_with_all_points(family, given, few, 0.01) == 0.0
 

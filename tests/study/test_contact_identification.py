@@ -146,7 +146,7 @@ def test_a_richer_model_that_is_not_solved_leaves_the_contact_open(readings, mon
 
 
 def test_a_constant_normal_load_and_friction_are_known_by_their_product():
-    """Two factors on one limit, told as such; the stiffness is known."""
+    """Two factors on one limit, reported as such; the stiffness is known."""
     true, force = single_mass(kt=1.0, limit=0.5), 1.0
     omegas = np.array([1.1, 1.2, 1.25, 1.3, 1.4])
     amplitude = [np.linalg.norm(solve(true, w, 5, 128).probe[1:, 0]) for w in omegas]

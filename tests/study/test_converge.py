@@ -77,7 +77,7 @@ def test_more_meshes_are_fitted_and_their_scatter_told():
 @pytest.mark.parametrize("divisions", [(6, 9, 12), (6, 7, 8, 10, 12)])
 def test_cantilever_has_the_order_of_its_elements(cell_type, order, divisions):
     """Extension of a clamped bar at nu = 0 is f = (2k - 1) c / 4L: order 2 and 4, and a limit far
-    nearer to it. The error is never told below half, whatever the order.
+    nearer to it. The error is never reported below half, whatever the order.
     """
     material = Material(nu=0.0)
     exact = np.sqrt(material.E / material.rho) / 4
@@ -170,9 +170,9 @@ def test_meshes_that_are_not_finer_where_their_sizes_are():
 
 def test_estimated_errors_are_scaled_by_what_the_meshes_changed():
     x = np.array([0.04, 0.02, 0.01])
-    for scale, told in ((2.0, 2.0), (0.5, 1.0), (5.0, 3.0)):
+    for scale, reported in ((2.0, 2.0), (0.5, 1.0), (5.0, 3.0)):
         f = 100 / (1 - scale * x)
-        assert scaled_error(f, x) == pytest.approx(told * 0.01, rel=0.15)
+        assert scaled_error(f, x) == pytest.approx(reported * 0.01, rel=0.15)
     # no line
     assert scaled_error(np.array([101.0, 100.0]), np.array([0.011, 0.01])) == 0.0125
 

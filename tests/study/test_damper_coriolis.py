@@ -136,7 +136,7 @@ def test_shift_and_softening_are_those_of_full_matrices(wedge, stuck, mode):
     assert found.coriolis > 1e-3
     assert found.amplitude == pytest.approx(amplitude, rel=0.2)
     assert 0.7 * softer < found.softening < 1.1 * softer
-    # in proportion to the frequency it is told too high, not too low
+    # in proportion to the frequency it is reported too high, not too low
     assert 0.8 * of_soft < found.softening_amplitude < 2.0 * of_soft
 
 

@@ -117,8 +117,8 @@ def test_marches_that_are_not_known_are_told(curve, marks, kept):
     assert found.point is curve.points[3] and kept[1] == [3.0, 2.0]
     kept[0][3.0] = (np.nan, np.nan)
     assert flank_motions(MARCHES, curve, marks, 1.0).point is None
-    told = unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure=found.reason)])
-    assert "4 N (a march takes too many operations)" in told
+    reported = unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure=found.reason)])
+    assert "4 N (a march takes too many operations)" in reported
     assert unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure="")]) == ""
 
 
@@ -186,9 +186,9 @@ def test_a_doubled_period_beside_a_resonance_is_found():
     settings = replace(first_for(1), harmonics=15, samples=1024, points=None)
     lasting = point_at(2.0, 1.05 * size(solve(model, 3.0, 15, 1024)))
     doubled = solve(model, 3.0, 15, 1024)
-    told = stability_verdict(model, doubled)
-    assert told.verdict == UNSTABLE
-    marks = Stability(np.array([STABLE, UNSTABLE]), np.array([1.0, told.multiplier]))
+    reported = stability_verdict(model, doubled)
+    assert reported.verdict == UNSTABLE
+    marks = Stability(np.array([STABLE, UNSTABLE]), np.array([1.0, reported.multiplier]))
     curve = SimpleNamespace(points=[lasting, doubled], settings=settings)
     found = flank_motions(Marches(family), curve, marks, size(lasting))
     assert found.point is doubled and found.highest > 3.5 * size(lasting)

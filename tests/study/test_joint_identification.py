@@ -1,4 +1,4 @@
-"""A joint's friction from measured levels: known parameters come back, and what cannot be told is
+"""A joint's friction from measured levels: known parameters come back, and what cannot be reported is
 said; the measured bolted beam as the documentation says.
 """
 

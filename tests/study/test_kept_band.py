@@ -581,12 +581,12 @@ def test_stability_is_asked_of_all_contact_points_and_of_the_fewest_that_tell(mo
     asked = []
 
     def judged(needed):
-        def told(_models, _settings, _point, some):
+        def reported(_models, _settings, _point, some):
             asked.append(some.points)
             verdict = UNSTABLE if some.points is None or some.points >= needed else STABLE
             return FinerMotion(some, point, Verdict(verdict, 1.1))
 
-        return told
+        return reported
 
     monkeypatch.setattr(finer_contacts, "_judged", judged(8))
     found = unstable_with_more_points(models, settings, point, STABLE)

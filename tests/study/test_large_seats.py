@@ -63,17 +63,17 @@ def test_seats_move_as_the_whole_balance_says(heat):
     force = np.concatenate([m.force for m in maps])
     P, Q = (port_matrix(patches, bodies.mesh, side)[:, ports] for side in ("blade", "damper"))
     C_damper, _ = condense_body(bodies.damper, Q, np.zeros(Q.shape[0]))
-    told = -(speed**2) * problem.blade_swell - (problem.flexibility - C_damper) @ force
-    told += P.T @ bodies.warm_displacement.ravel()
+    reported = -(speed**2) * problem.blade_swell - (problem.flexibility - C_damper) @ force
+    reported += P.T @ bodies.warm_displacement.ravel()
     whole = P.T @ balanced(bodies, -(P @ force)[:, None]).ravel()
-    np.testing.assert_allclose(told, whole, atol=1e-10)
+    np.testing.assert_allclose(reported, whole, atol=1e-10)
     rough = condense_friction(bodies, patches)
     np.testing.assert_allclose(rough.blade_swell[ports], problem.blade_swell, rtol=1e-12)
     np.testing.assert_allclose(rough.clearance, problem.clearance, atol=1e-15)
 
 
 def test_a_sector_between_its_cut_faces_has_the_wheels_nonlinear_state():
-    """What a blade of another shape is told its mean stress by, here of the same shape. With the
+    """What gives the mean stress of a blade of another shape, here of the same shape. With the
     linear balance inside it is 1.2 of 5.6 mm off.
     """
     ring = wheel_bodies(speed=6000.0, divisions=(2, 2, 1), bump=0.9)

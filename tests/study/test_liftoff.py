@@ -40,12 +40,14 @@ def test_travel_of_the_seats_is_that_of_the_mode():
 def test_failures_name_the_load(load, lifts):
     case, model = case_of(load, 1e6)
     with (
-        pytest.raises(NotSolvedError, match=r"study\.loads = .*N: .*line search stalled") as told,
+        pytest.raises(
+            NotSolvedError, match=r"study\.loads = .*N: .*line search stalled"
+        ) as reported,
         naming_the_load(case, model, 1, FORCE),
     ):
         raise NotSolvedError("line search stalled")
-    assert ("lifts off" in str(told.value)) == lifts
-    assert ("expected a larger load" in str(told.value)) == lifts
+    assert ("lifts off" in str(reported.value)) == lifts
+    assert ("expected a larger load" in str(reported.value)) == lifts
 
 
 @pytest.mark.parametrize(("band", "beside"), [((1.0, 2.0), True), ((150.0, 170.0), False)])
@@ -53,10 +55,10 @@ def test_a_band_without_the_resonance_is_named(band, beside):
     """The only resonance without damper is at 1000 rad/s = 159.15 Hz; the load is not to blame."""
     case, model = case_of(1e-3, 1e6)
     with (
-        pytest.raises(NotSolvedError, match="search found no maximum") as told,
+        pytest.raises(NotSolvedError, match="search found no maximum") as reported,
         naming_the_load(case, model, 1, FORCE, band),
     ):
         raise NotSolvedError("search found no maximum")
-    said = str(told.value)
+    said = str(reported.value)
     assert ("study.band = 1 Hz, 2 Hz" in said and "159.15 Hz without damper" in said) == beside
     assert ("lifts off" in said) != beside

@@ -294,9 +294,9 @@ def test_a_second_run_finds_the_wheel(folder):
     # any blade within the estimated error of the highest may be that
     (response,) = again.wheel
     second = np.sort(response.peak.by_blade)[-2] / response.peak.height
-    for error, told in ((1.01 * (1 - second), True), (0.99 * (1 - second), False)):
+    for error, reported in ((1.01 * (1 - second), True), (0.99 * (1 - second), False)):
         sentence = pattern_sentences([replace(response, truncation=error)], False)[0]
-        assert ("within that error of the highest: blade" in sentence) == told
+        assert ("within that error of the highest: blade" in sentence) == reported
     numbers = pattern_headlines(again.wheel, worst_utilisation(again))
     assert [number.value for number in numbers][1] == f"{worst.value:.3g}"
     # another pattern is another response of the same sector

@@ -227,14 +227,14 @@ def test_a_richer_model_of_the_same_equations_tells_no_error(monkeypatch):
 
 
 def test_harmonics_that_lift_off_has_changed_are_judged_again(monkeypatch):
-    """An error that could not be told with one harmonic is none of the seven that most contacts in
+    """An error that could not be reported with one harmonic is none of the seven that most contacts in
     the air asked for (seed 57 of benchmarks/choice_random.py).
     """
     model = reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31)
     family = family_of(model)
     judged = []
 
-    def told(family, settings, peak, accuracy, known):
+    def reported(family, settings, peak, accuracy, known):
         judged.append((settings.harmonics, dict(known)))
         far = {"harmonics": np.inf, "samples": 1.0} if len(judged) == 1 else {"samples": 0.0}
         changes = dict.fromkeys(DIRECTIONS, 0.0) | far
@@ -244,7 +244,7 @@ def test_harmonics_that_lift_off_has_changed_are_judged_again(monkeypatch):
     lifted = {"stick": 0, "slip": 0, "lift": 16, "open": 0}
     shape = SimpleNamespace(w=np.zeros((16, 1, 3)), states=closed)
     top = KnownPeak(1.0, 100.0, shape)
-    monkeypatch.setattr(resonance_choice, "peak_errors", told)
+    monkeypatch.setattr(resonance_choice, "peak_errors", reported)
     monkeypatch.setattr(
         resonance_choice,
         "peak_from",
@@ -336,11 +336,11 @@ def test_a_choice_for_a_fine_accuracy_begins_with_what_it_mostly_ends_at(monkeyp
     family = family_of(model)
     begun = []
 
-    def told(family, settings, peak, accuracy, known):
+    def reported(family, settings, peak, accuracy, known):
         begun.append(settings)
         return peak_errors.PeakErrors(*[dict.fromkeys(DIRECTIONS, 0.0)] * 2)
 
-    monkeypatch.setattr(resonance_choice, "peak_errors", told)
+    monkeypatch.setattr(resonance_choice, "peak_errors", reported)
     search_by(monkeypatch, lambda *given, **options: peak_with(1, 1.0))
     monkeypatch.setattr(resonance_choice, "sticks_safely", lambda model, point: False)
     first = first_for(family.modes)

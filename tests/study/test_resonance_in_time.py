@@ -103,9 +103,9 @@ def test_what_shorter_steps_change_is_part_of_the_error(monkeypatch, change):
         module, "_settled", lambda model, state, work, instants: settled_at(shorter[instants])
     )
     for decay, error in ((np.ones(1), 0.01 + abs(change)), (None, 0.01)):
-        found, told = module._by_short_steps(SimpleNamespace(decay=decay), None, module._Work())
+        found, reported = module._by_short_steps(SimpleNamespace(decay=decay), None, module._Work())
         assert found.best.mean == 1.0
-        assert told == pytest.approx(error)
+        assert reported == pytest.approx(error)
 
 
 @pytest.mark.parametrize(
@@ -223,17 +223,17 @@ def test_more_contact_points_that_change_much_have_their_own_resonance(monkeypat
     monkeypatch.setattr(module, "_most_points", lambda *_: 63)
     monkeypatch.setattr(module, "_error", lambda *_: 0.02)
     top = module._Top(settled(100.0, 100.0, 1.0), settled(97.0, 100.0, 1.0), bend)
-    few = module._Told(top.best, 8, 0.3)
+    few = module._Reported(top.best, 8, 0.3)
     work = module._Work()
-    told = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
-    assert told.best.omega == pytest.approx(95.0, abs=1.5)
-    assert told.best.mean == pytest.approx(height, rel=module.WORTH_A_MARCH)
-    assert told.points == 32
-    assert told.error == pytest.approx(0.02 + 0.1, abs=module.WORTH_A_MARCH)
+    reported = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
+    assert reported.best.omega == pytest.approx(95.0, abs=1.5)
+    assert reported.best.mean == pytest.approx(height, rel=module.WORTH_A_MARCH)
+    assert reported.points == 32
+    assert reported.error == pytest.approx(0.02 + 0.1, abs=module.WORTH_A_MARCH)
     # towards the higher neighbour first, and no further to the other side
     assert max(marched) == 100.0
     # without room for a search the change at the frequency of fewer points is all that is known
     work.operations = np.inf
-    told = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
-    assert told.best.omega == 100.0
-    assert told.error == pytest.approx(0.3 + 1 - told.best.mean)
+    reported = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
+    assert reported.best.omega == 100.0
+    assert reported.error == pytest.approx(0.3 + 1 - reported.best.mean)

@@ -95,16 +95,16 @@ def test_an_error_by_the_mesh_of_the_bodies_says_so():
 
 def test_an_error_from_a_march_says_so():
     band = KeptBand(369.8, 640e-6, 662e-6, 200, points=16)
-    told, above = resonance_warnings([curve(36.0, 0.08, error_march=band)], 0.05)
-    assert "error of the resonance amplitude, 656 um; it is estimated from a march" in told
-    assert "with 16 contact points a seat, which keeps between 640 and 662 um" in told
+    reported, above = resonance_warnings([curve(36.0, 0.08, error_march=band)], 0.05)
+    assert "error of the resonance amplitude, 656 um; it is estimated from a march" in reported
+    assert "with 16 contact points a seat, which keeps between 640 and 662 um" in reported
     assert above.endswith("above the wanted 5 %: 36 N 8 %")
 
 
 def test_a_resonance_next_to_an_unsolved_point_is_told():
     curves = [curve(18.0, 0.01, mass=0.02, converged=False), curve(36.0, None)]
-    (told,) = resonance_warnings(curves, 0.05)
-    assert told.startswith("under 18 N of 20 g the highest point that was solved lies next to")
+    (reported,) = resonance_warnings(curves, 0.05)
+    assert reported.startswith("under 18 N of 20 g the highest point that was solved lies next to")
 
 
 def test_points_beyond_their_tolerance_are_counted_for_each_load():
@@ -114,8 +114,8 @@ def test_points_beyond_their_tolerance_are_counted_for_each_load():
         curve(18.0, 0.0, estimated=(0.0, 0.2, 0.0)),
         curve(36.0, 0.0, estimated=(0.2, 0.0, 0.0)),
     ]
-    told = beyond_tolerance(curves)
-    assert "9 N (2 of 3 points), 36 N (1 of 3 points); columns" in told
+    reported = beyond_tolerance(curves)
+    assert "9 N (2 of 3 points), 36 N (1 of 3 points); columns" in reported
     assert beyond_tolerance(curves[1:2]) == ""
 
 

@@ -51,7 +51,7 @@ def test_slender_blade_without_contraction():
 
 
 def test_a_leaning_blade_under_a_nonlinear_preload():
-    """It straightens, and where the stress is told largest it is that of the forces beyond: pull
+    """It straightens, and where the stress is reported largest it is that of the forces beyond: pull
     over area and moment over section of the deformed blade.
 
     The linear state moves the tip by 68 mm, where it leans by 20 mm from its radius, and gave 2.2

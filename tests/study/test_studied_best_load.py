@@ -228,7 +228,7 @@ def test_balances_that_the_blade_keeps_need_no_further_loads():
 
 
 def test_a_resonance_that_falls_to_the_end_of_all_loads_has_no_best():
-    """Looked for outwards, and then refused rather than told."""
+    """Looked for outwards, and then refused rather than reported."""
     found = studied_by_kept_motions((36.0, 79.68), best(79.68), amplitude=lambda load: 1e-2 / load)
     assert len(found.curves) == 2 + MAX_ADDED_LOADS and found.best[0].kept is None
 

@@ -83,9 +83,13 @@ def test_a_point_of_one_harmonic_is_judged_by_its_motion_with_more():
     model = bouncing()
     rough = solve(model, 1.2, 1, 64)
     fine = solve(model, 1.2, 7, 128, start=rough)
-    told = stability_of(model, [rough])
-    assert told.multiplier[0] == pytest.approx(stability_verdict(model, fine).multiplier, rel=1e-9)
-    assert told.multiplier[0] != pytest.approx(stability_verdict(model, rough).multiplier, rel=1e-6)
+    reported = stability_of(model, [rough])
+    assert reported.multiplier[0] == pytest.approx(
+        stability_verdict(model, fine).multiplier, rel=1e-9
+    )
+    assert reported.multiplier[0] != pytest.approx(
+        stability_verdict(model, rough).multiplier, rel=1e-6
+    )
 
 
 def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(monkeypatch):
@@ -123,10 +127,10 @@ def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
 
     monkeypatch.setattr(stability, "stability_verdict", verdict)
     monkeypatch.setattr(stability, "CONFIRMED_MOTIONS", 1)
-    told = stability_of(model, points, [RicherModel(model, 15, 256)])
+    reported = stability_of(model, points, [RicherModel(model, 15, 256)])
     assert asked == [points[i].omega for i in order[:2]]
-    assert told.verdict[order[0]] == STABLE
-    assert [told.verdict[i] for i in (order[1], order[2], 3)] == [UNSTABLE] * 3
+    assert reported.verdict[order[0]] == STABLE
+    assert [reported.verdict[i] for i in (order[1], order[2], 3)] == [UNSTABLE] * 3
     assert list(stability_of(model, points).verdict) == [UNSTABLE] * 4
 
 
@@ -150,9 +154,9 @@ def test_the_highest_motion_that_is_not_unstable_is_judged_again_too(monkeypatch
 
     monkeypatch.setattr(stability, "stability_verdict", verdict)
     richer = [RicherModel(model, 15, 256), RicherModel(model, 31, 512)]
-    told = judged_above(model, points, richer, stability_of(model, points, richer), 0.0)
-    assert told.verdict[order[0]] == UNSTABLE and told.multiplier[order[0]] == 1.1
-    assert [told.verdict[i] for i in order[1:]] == [STABLE] * 2
+    reported = judged_above(model, points, richer, stability_of(model, points, richer), 0.0)
+    assert reported.verdict[order[0]] == UNSTABLE and reported.multiplier[order[0]] == 1.1
+    assert [reported.verdict[i] for i in order[1:]] == [STABLE] * 2
     # the richest motion decides, and lower points are left as they are
     assert [a for a in asked if a[1] > 7] == [(points[i].omega, 31) for i in order[:2]]
     asked.clear()
@@ -173,11 +177,13 @@ def test_the_richest_motion_that_is_found_decides(monkeypatch):
 
     monkeypatch.setattr(stability, "solve_near", near)
     richer = [RicherModel(model, h, 16 * (h + 1)) for h in (15, 31, 23)]
-    told, spent = stability.judged_again(Verdict(UNSTABLE, 1.2), point, richer)
+    reported, spent = stability.judged_again(Verdict(UNSTABLE, 1.2), point, richer)
     # each starts from the richest before that was found
     assert starts == [7, 15, 15]
     exact = solved(model, point.omega, 23, 16 * 24, point)
-    assert told.multiplier == pytest.approx(stability_verdict(model, exact).multiplier, rel=1e-4)
+    assert reported.multiplier == pytest.approx(
+        stability_verdict(model, exact).multiplier, rel=1e-4
+    )
     assert spent > 0
 
 
@@ -258,14 +264,16 @@ def test_no_motion_is_taken_to_last_that_was_not_judged(monkeypatch):
     monkeypatch.setattr(stability, "stability_verdict", verdict)
     monkeypatch.setattr(stability, "CURVE_OPERATIONS", 0.0)
     alone = stability_of(model, points)
-    told = judged_above(model, points, [], alone, 0.0)
-    top = highest_lasting(heights, told.verdict)
+    reported = judged_above(model, points, [], alone, 0.0)
+    top = highest_lasting(heights, reported.verdict)
     assert heights[top] == heights[heights < limit].max()
-    assert (told.verdict != UNKNOWN).sum() <= 12
+    assert (reported.verdict != UNKNOWN).sum() <= 12
     # one that the blade is known to keep beside them: nothing lower is asked for
     least = np.sort(heights)[-10]
-    told = judged_above(model, points, [], alone, least)
-    assert (told.verdict != UNKNOWN).sum() <= 7 and highest_lasting(heights, told.verdict) is None
+    reported = judged_above(model, points, [], alone, least)
+    assert (reported.verdict != UNKNOWN).sum() <= 7 and highest_lasting(
+        heights, reported.verdict
+    ) is None
 
 
 def test_a_motion_that_was_not_judged_is_no_lasting_one():

@@ -308,13 +308,13 @@ def methods(folder: Path) -> Iterator[Claim]:
     table = count_outcomes(rows.to_dict("records"))
     points = sum(next(iter(table.values())).values())
     others = sum(counts.get("false", 0) for method, counts in table.items() if method != "paper")
-    told = "; ".join(
+    reported = "; ".join(
         f"{m}: {c.get('converged', 0)} right, {c.get('false', 0)} false" for m, c in table.items()
     )
     yield Claim(
         "Abstract",
         "the method does not suffer convergence problems",
-        f"{points} points, {told}",
+        f"{points} points, {reported}",
         verdict(table["paper"].get("converged", 0) == points),
         ("map_load_frequency.png",),
         "Each method over normal load and frequency, reference blade. Blue: converged, darker "

@@ -117,13 +117,13 @@ def finite_elements(folder: Path) -> Iterator[Claim]:
 def phases() -> Claim:
     """Eq. 32: the inter-blade phase."""
     row, scene = row_and_scene("soft")
-    told = []
+    reported = []
     heights = []
     for phase, name in ((0.0, "0"), (np.pi / 2, "90°"), (np.pi, "180°")):
         turned = vary(scene, excitation__phase=phase)
         found = [peak(paper_model(turned, row, load), BANDS["soft", 2]) for load in (6.0, 200.0)]
         heights.append([p.amplitude for p in found])
-        told.append(
+        reported.append(
             f"{name}: "
             + ", ".join(f"{p.frequency:.1f} Hz {1e6 * p.amplitude:.1f} µm" for p in found)
         )
@@ -131,7 +131,7 @@ def phases() -> Claim:
     return Claim(
         "Eq. 32",
         "the forces on both sides of the damper follow from one blade alone",
-        "for inter-blade phase 0 only. Resonances at 6 and 200 N by phase: " + "; ".join(told),
+        "for inter-blade phase 0 only. Resonances at 6 and 200 N by phase: " + "; ".join(reported),
         verdict(apart.max() < 0.02, True),
     )
 

@@ -80,14 +80,14 @@ def _converges(
     rows: dict[str, dict[float, Iterated]], errors: dict[str, dict[float, float]], folder: Path
 ) -> Claim:
     """Eq. 34, 35 at 2 %, and the picture of the steps."""
-    told = {}
+    reported = {}
     worst = {}
     lines = {}
     for how, name in WAYS.items():
         good = {load: r for load, r in rows[how].items() if r.converged}
         worst[how] = max(errors[how][load] for load in good)
         turns = [r.iterations for r in good.values()]
-        told[how] = (
+        reported[how] = (
             f"{len(good)} of {len(LOADS)} accepted after {min(turns)} to {max(turns)} turns, at "
             f"worst {100 * worst[how]:.2f} % off"
         )
@@ -100,7 +100,7 @@ def _converges(
     return Claim(
         "Fig. 14, Eq. 34, 35",
         "the loop converges and 2 % of step is 2 % of accuracy",
-        f"damper integrated from rest: {told['march']}; damper solved exactly: {told['shooting']}",
+        f"damper integrated from rest: {reported['march']}; damper solved exactly: {reported['shooting']}",
         verdict(whole, worst["march"] < 5 * WANTED),
         ("fig_14.png",),
         "Steps of the loop of Fig. 14 (left side of Eq. 35 over the motion) against its turns, to "

@@ -139,7 +139,7 @@ def _ratios(body: MassOnFoundation) -> Claim:
     rows = ratio_table(body, RATIOS, 1000)
     kept = sum(bool(row["rule"]) for row in rows)
     broken, even = ({x: _exceptions(b, x) for x in STROKES} for b in (body, MassOnFoundation()))
-    told = "; ".join(f"{MILLI * x:g} mm {', '.join(broken[x]) or 'none'}" for x in STROKES[1:])
+    reported = "; ".join(f"{MILLI * x:g} mm {', '.join(broken[x]) or 'none'}" for x in STROKES[1:])
     apart = "; ".join(
         f"{MILLI * x:g} mm {', '.join(r for r in even[x] if r not in broken[x])}"
         for x in STROKES
@@ -149,7 +149,7 @@ def _ratios(body: MassOnFoundation) -> Claim:
         "Sect. 4.2",
         "open loops = denominator of the reduced frequency ratio",
         f"{kept} of {len(rows)} ratios at Table 1, where inertia is 4.6 times the friction limit; "
-        f"exceptions with smaller strokes, where the mass sticks part of the time: {told}. They "
+        f"exceptions with smaller strokes, where the mass sticks part of the time: {reported}. They "
         "depend on the pressure: with the same load on all of 40 points other exceptions are "
         f"{apart}",
         verdict(kept == len(rows) and not any(broken.values()), kept == len(rows)),

@@ -168,7 +168,7 @@ def _narrow(tables: Mapping[Key, np.ndarray]) -> Iterator[Claim]:
         wide = {(mode, m): _range(tables[contact, mode, m]) for mode in (1, 2) for m in MASSES}
         light = [all(wide[mode, a] < wide[mode, b] for a, b in pairwise(MASSES)) for mode in (1, 2)]
         slow = [wide[1, m] < wide[2, m] for m in MASSES]
-        told = "; ".join(
+        reported = "; ".join(
             f"mode {mode} " + ", ".join(f"{wide[mode, m]:.1f}" for m in MASSES) for mode in (1, 2)
         )
         yield Claim(
@@ -176,7 +176,7 @@ def _narrow(tables: Mapping[Key, np.ndarray]) -> Iterator[Claim]:
             "the less inertia (low frequency, light damper), the narrower the range of loads from "
             f"slip to stick ({contact} contact)",
             "load at which the points slip a quarter of the time over that with three quarters, "
-            f"{', '.join(f'{1e3 * m:.0f}' for m in MASSES)} g: {told}",
+            f"{', '.join(f'{1e3 * m:.0f}' for m in MASSES)} g: {reported}",
             verdict(all(light) and all(slow), all(light) or all(slow)),
         )
 

@@ -72,7 +72,7 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
     open.
     """
     row, scene = row_and_scene("soft")
-    told = []
+    reported = []
     worst = 0.0
     largest = 0.0
     for load in loads:
@@ -100,7 +100,7 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
         off = f"{abs(found.probe[1, 0] / marched - 1):.0e} from explicit steps from rest, {settled}"
         end = _afterwards(system, cycle, found) if multiplier > UNSTABLE else off
         closed = "" if exact.converged else f" (closed to {exact.residual:.0e} only)"
-        told.append(
+        reported.append(
             f"{load:g} N at {top.frequency:.1f} Hz {error:.0e} from the exact flow{closed}, "
             f"largest multiplier {multiplier:.4f}, {end}"
         )
@@ -108,7 +108,7 @@ def following(loads: tuple[float, ...] = (4.0, 20.0, 100.0)) -> Iterator[Claim]:
         "Fig. 13, 14",
         "the same where the damper moves in its plane and the normal load follows",
         "balance with 9 harmonics: "
-        + "; ".join(told)
+        + "; ".join(reported)
         + ". Points that always stick may carry any mean force "
         "that they can hold, so that not all digits need to agree",
         "fails" if worst > 0.01 else "holds in part" if largest > UNSTABLE else "holds",
@@ -143,14 +143,14 @@ def two_motions(folder: Path) -> Iterator[Claim]:
     model = in_one_body(whole_model(scene, row, load))
     frequency = np.linspace(1125, 1175, 51)
     ways = {}
-    told = []
+    reported = []
     for name, points in _both_ways(model, frequency).items():
         heights = np.array([size(s) for s in points])
         largest = np.array(
             [stability_verdict(model, judged_motion(model, s)).multiplier for s in points]
         )
         ways[name] = heights, largest
-        told.append(
+        reported.append(
             f"{name} it reaches {1e6 * heights.max():.1f} µm, {int((largest > UNSTABLE).sum())} of "
             f"{len(points)} points unstable, {int(np.isnan(largest).sum())} not judged, "
             f"largest multiplier {np.nanmax(largest):.3f}"
@@ -167,7 +167,7 @@ def two_motions(folder: Path) -> Iterator[Claim]:
         "Fig. 15",
         "one response for a frequency",
         f"plane blades, {load:g} N, rigid damper whose normal load follows: sweeps up and down {where}; "
-        + "; ".join(told)
+        + "; ".join(reported)
         + "; with the paper's constant loads they agree to "
         f"{np.abs(plain[0] / plain[1] - 1).max():.0e}",
         verdict(not len(apart)),

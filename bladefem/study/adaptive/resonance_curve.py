@@ -106,7 +106,7 @@ def resonance_curve(
             # the flanks of a peak that is far from right need no look of their own
             return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
-        # what harmonics leave out a march has told
+        # what harmonics leave out a march has reported
         significant = {} if in_time else _checked_significant(family, used, points, top, accuracy)
         found = significant | _checked_flanks(family, used, points, top, errors)
         missed = _harmonics_missed(used, points, top, significant, accuracy)

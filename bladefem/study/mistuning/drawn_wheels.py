@@ -40,8 +40,8 @@ from .peak_choice import (
 from .sector_comparison import SectorComparison, compared_with_sector, with_comparison
 from .validate import LAW_LEVEL, scene_scatter
 
-# harmonics of the engine order that many wheels take at most: what these leave is told, and most of
-# it is the tuned wheel's too, over which amplifications are counted
+# harmonics of the engine order that many wheels take at most: what these leave is reported, and
+# most of it is the tuned wheel's too, over which amplifications are counted
 SCATTER_HARMONICS = 3
 Result = TypeVar("Result")
 

@@ -14,7 +14,7 @@ from .other_blades import other_blade_sentences
 from .pattern_response import PatternResponse
 from .sector_comparison import comparison_words
 
-# relative change of the highest amplitude by free means from which both amplitudes are told
+# relative change of the highest amplitude by free means from which both amplitudes are reported
 NOTICEABLE_CHANGE = 0.005
 
 

@@ -40,7 +40,7 @@ SIZE_RATIOS = (2.0, 1.7, 1.4, 1.2, 1.0)
 SPARE_MODES = 3
 # a mesh of a file and its halves
 MAX_HALVED_MESHES = 3
-# elastic modes whose error is told
+# elastic modes whose error is reported
 MODES_STUDIED = 5
 # beyond which halving once more takes too long
 MAX_DOFS_HALVED_AGAIN = 60_000

@@ -1,7 +1,7 @@
 """Coriolis forces of the damper in responses: counted where they change frequency or amplitude of
 the mode studied by more than a share of the accuracy asked for, or where the scene says so.
 
-Both are told by the mode with all contacts sticking. With w the tangential motion of the contacts
+Both are given by the mode with all contacts sticking. With w the tangential motion of the contacts
 for one unit a of the blade's, friction does most against the excitation where k_t |w| a is some two
 times its limit; its work is then in proportion to k_t |w|^2 a^2, that of the excitation to a: the
 amplitude goes with 1 / |w|^2. It is some 25 times as sensitive as the frequency, as little of the

@@ -17,7 +17,7 @@ from ...util.arrays import ComplexArray
 from ...wheel.aerodynamics import with_flow
 from .ports import Ports
 
-# by which the modes of a family are told
+# by which the modes of a family are reported
 PORTS = ("contact", "load", "probe")
 
 

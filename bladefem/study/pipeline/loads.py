@@ -224,7 +224,7 @@ def _sought_in_time(
     if curve.settings.softened or not mostly_lifts_off(top):
         return None
     found = resonance_in_time(models, curve.settings, top, case.decay)
-    # what the law changes is then told by the balances, if it is
+    # what the law changes is then given by the balances, if it is
     return found or resonance_in_time(models, curve.settings, top)
 
 

@@ -242,7 +242,7 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
             f"under {', '.join(unknown)} the error of the resonance amplitude is unknown: "
             "neither richer models of it nor a march tell it; nothing was refined because of that"
         )
-    # as it is told, with two digits: no estimate is known better
+    # as it is reported, with two digits: no estimate is known better
     above = [
         c for c in curves if c.error is not None and accuracy < float(f"{c.error:.2g}") < np.inf
     ]

@@ -64,8 +64,8 @@ def curve_with_room(
     leaves to them.
 
     Where the curve's own error is beyond what is left, it is made again with that: harmonics,
-    contact points and meshes keep the accuracy together. A STEP blade under its best load is told
-    to 4.7 % where 6.5 % were left, 3.4 % of them by the mesh.
+    contact points and meshes keep the accuracy together. The error of a STEP blade under its best
+    load is 4.7 % so, where 6.5 % were left, 3.4 % of them by the mesh.
 
     Args:
         softer: the body less the error of its stiffness.
@@ -96,7 +96,7 @@ def curve_with_room(
         try:
             curve, unseen = solved(room)
         except NotSolvedError:
-            # richer models of the peak are not solved: its error is told
+            # richer models of the peak are not solved: its error is reported
             pass
     return curve, unseen, room
 

@@ -191,9 +191,9 @@ class _Top:
 
 
 @dataclass(frozen=True)
-class _Told:
-    """The resonance that is told, with the contact points of a seat (None: all) that it was marched
-    with, and its estimated relative error but for the way that is left to its limit.
+class _Reported:
+    """The resonance that is reported, with the contact points of a seat (None: all) that it was
+    marched with, and its estimated relative error but for the way that is left to its limit.
     """
 
     best: _Settled
@@ -208,7 +208,7 @@ class _Work:
     # times MOST_OPERATIONS and MOST_OF_ONE_MARCH that it may take
     allowance: float = 1.0
     instants: int = CLIMBING_INSTANTS
-    # of the motion that is told
+    # of the motion that is reported
     final_instants: int = INSTANTS_PER_PERIOD
     operations: float = 0.0
     periods: int = 0
@@ -253,20 +253,20 @@ def resonance_in_time(
             start = carried_motion(models, settings, motion, settings_here)
         work = _Work(1.0 if model.decay is None else MORE_WITH_LAW)
         top, error = _by_short_steps(model, start, work)
-        told = _with_more_points(
-            models, settings_here, decay, _Told(top.best, points, error), top, work
+        reported = _with_more_points(
+            models, settings_here, decay, _Reported(top.best, points, error), top, work
         )
-        finest = _marched_model(models, replace(settings_here, points=told.points), decay)
-        best = _calmed(finest, told.best, work)
+        finest = _marched_model(models, replace(settings_here, points=reported.points), decay)
+        best = _calmed(finest, reported.best, work)
     except (InputError, _MarchFailedError):
         return None
-    error = told.error + best.left
+    error = reported.error + best.left
     return ResonanceInTime(
         best.omega / (2 * np.pi),
         best.lowest,
         best.highest,
         error if error < LARGEST_ERROR else float(np.inf),
-        told.points or _most_points(models, settings_here),
+        reported.points or _most_points(models, settings_here),
         len(work.frequencies),
         work.periods,
         best.friction_work,
@@ -472,8 +472,13 @@ def _half_band(found: _Settled) -> float:
 
 
 def _with_more_points(
-    models: Family, settings: Settings, decay: RealArray | None, few: _Told, top: _Top, work: _Work
-) -> _Told:
+    models: Family,
+    settings: Settings,
+    decay: RealArray | None,
+    few: _Reported,
+    top: _Top,
+    work: _Work,
+) -> _Reported:
     """The resonance with MORE_POINTS times the contact points. What these change is more than what
     is left to all of them where the change is of first order.
 
@@ -498,7 +503,7 @@ def _with_more_points(
             return _sought_anew(model, few, found, finer, top, work)
         if top.jump:
             found = _refined(model, replace(top, best=found), work, FINER_STEPS).best
-        return _Told(found, finer, few.error + abs(found.mean / best.mean - 1))
+        return _Reported(found, finer, few.error + abs(found.mean / best.mean - 1))
     found = _moved(model, neighbour, neighbour.omega, work)
     if found.mean < JUMP_SHARE * neighbour.mean:
         return replace(few, error=float(np.inf))
@@ -509,17 +514,17 @@ def _with_more_points(
     # few points of a layer that stiffens as it is pressed are too few for its resonance itself
     away = neighbour.omega - best.omega
     found = _followed_uphill(model, found, away, work)
-    return _Told(found, finer, few.error + change + beside)
+    return _Reported(found, finer, few.error + change + beside)
 
 
 def _sought_anew(
     model: ReducedModel,
-    few: _Told,
+    few: _Reported,
     found: _Settled,
     points: int | None,
     top: _Top,
     work: _Work,
-) -> _Told:
+) -> _Reported:
     """The resonance of more contact points uphill of what they keep where fewer have theirs.
 
     Its error is that of these points, and what they change from one resonance to the other.
@@ -533,9 +538,9 @@ def _sought_anew(
     try:
         again = _climbed(model, found, top.bend, work, top.neighbour.omega > before.omega)
     except _MarchFailedError:
-        return _Told(found, points, few.error + abs(found.mean / before.mean - 1))
+        return _Reported(found, points, few.error + abs(found.mean / before.mean - 1))
     change = abs(again.best.mean / before.mean - 1)
-    return _Told(again.best, points, _error(model, again, again.best, work) + change)
+    return _Reported(again.best, points, _error(model, again, again.best, work) + change)
 
 
 def _followed_uphill(
@@ -607,8 +612,8 @@ def _march(
     enough: Callable[[RealArray], bool] = never_enough,
 ) -> RingMarch:
     """A march with the instants that were asked for, those of the search when None, or with those
-    of the motion that is told where these are too few for the bodies on their contacts; with more
-    where a layer becomes too stiff for them.
+    of the motion that is reported where these are too few for the bodies on their contacts; with
+    more where a layer becomes too stiff for them.
 
     Raises:
         _MarchFailedError: the forces of a step were not found, or the march takes too long.
