@@ -169,10 +169,11 @@ def test_what_the_mesh_takes_of_the_accuracy_is_not_left_to_the_balance(mesh, as
     model = reference_model(load=3.0, points=4, modes=20, harmonics=63)
     case = LoadCase(3.0, model.elements, np.eye(8))
     plain = shared_accuracy.resonance_curve
-    accuracies = []
+    accuracies, most = [], []
 
     def curve_to(family, settings, band, mode, accuracy, march, **options):
         accuracies.append(accuracy)
+        most.append(settings.most)
         curve = plain(family, settings, band, mode, 0.02, march, **options)
         return replace(curve, settings=replace(curve.settings, error=0.9 * accuracy))
 
@@ -183,6 +184,9 @@ def test_what_the_mesh_takes_of_the_accuracy_is_not_left_to_the_balance(mesh, as
     found = curve_of(scene, case, lambda _: family_of(model), first_for(20), softer=object())
     assert accuracies == pytest.approx(asked)
     assert found.error == pytest.approx(0.9 * asked[-1] + mesh)
+    # many more harmonics are not worth what the mesh leaves; the next load may have them
+    assert most == [first_for(20).most, max(15, found.settings.harmonics)][: len(asked)]
+    assert found.settings.most == first_for(20).most
 
 
 def test_settings_tell_how_many_contact_points_there_are():
