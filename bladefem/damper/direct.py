@@ -170,6 +170,16 @@ def _add_product(total, sign, A, x):
 
 
 @njit(cache=True)
+def _scaled_rows(scale, A):
+    """(n, n) rows of A (n, n) times factors (n,)."""
+    found = np.empty(A.shape)
+    for i in range(A.shape[0]):
+        for k in range(A.shape[1]):
+            found[i, k] = scale[i] * A[i, k]
+    return found
+
+
+@njit(cache=True)
 def _newmark_step(arrays, y, inputs, h):
     p, g, n0 = inputs
     L, D, W, V, Wt, kt, mu, S, G, H = arrays
@@ -179,10 +189,7 @@ def _newmark_step(arrays, y, inputs, h):
     R = np.empty((steps, n))
     F = np.empty((steps, n))
     q, v, z = y[:d], y[d : 2 * d], y[2 * d :]
-    kG = np.empty((n, n))
-    for i in range(n):
-        for k in range(n):
-            kG[i, k] = kt[i] * G[i, k]
+    kG = _scaled_rows(kt, G)
     w, N, f, trial = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     # accelerations, those without contact forces, and motion ahead by half of the old ones
     a, free, q0, v0, rate = np.empty(d), np.empty(d), np.empty(d), np.empty(d), np.empty(d)

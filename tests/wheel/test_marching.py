@@ -75,6 +75,24 @@ def march(omega, deviation, orders, limit, wanted, periods=PERIODS, steps=STEPS)
 
 
 @njit(cache=True)
+def take_step(step_matrix, state):
+    """Displacements now and before (2m,) become those of the next step and those of now.
+
+    Args:
+        step_matrix: (m, 3m) the next displacements from a state.
+        state: (3m,) displacements now and before, and loads; changed.
+    """
+    m = len(step_matrix)
+    moved = np.zeros(m)
+    for i in range(m):
+        for k in range(3 * m):
+            moved[i] += step_matrix[i, k] * state[k]
+    for i in range(m):
+        state[m + i] = state[i]
+        state[i] = moved[i]
+
+
+@njit(cache=True)
 def march_in_loops(step_matrix, ends, tip, drive, reach, steps):
     """Tips (steps, N) and how far each slider goes (N,) in the last period.
 
@@ -86,7 +104,6 @@ def march_in_loops(step_matrix, ends, tip, drive, reach, steps):
     count, m = len(tip), len(step_matrix)
     # displacements now and before, and loads
     state = np.zeros(3 * m)
-    moved = np.zeros(m)
     slider = np.zeros(count)
     slid = np.zeros(count)
     tips = np.zeros((steps, count))
@@ -106,14 +123,7 @@ def march_in_loops(step_matrix, ends, tip, drive, reach, steps):
             f = KT * (w - slider[s])
             state[2 * m + ends[0, s]] -= f
             state[2 * m + ends[1, s]] += f
-        for i in range(m):
-            total = 0.0
-            for k in range(3 * m):
-                total += step_matrix[i, k] * state[k]
-            moved[i] = total
-        for i in range(m):
-            state[m + i] = state[i]
-            state[i] = moved[i]
+        take_step(step_matrix, state)
     return tips, slid
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numba import njit
 from scipy import linalg
-from test_marching import ring_matrices
+from test_marching import ring_matrices, take_step
 
 from bladefem.data import Elements, RigidBody
 from bladefem.hbm.model import Damping
@@ -117,7 +117,6 @@ def march_in_loops(step_matrix, contacts, tip, drive, limits, dt, steps):
     count, m = len(tip), len(step_matrix)
     # displacements now and before, and loads
     state = np.zeros(3 * m)
-    moved = np.zeros(m)
     y, before = np.zeros(count), np.zeros(count)
     slider = np.zeros((2, count))
     tips = np.zeros((steps, count))
@@ -144,14 +143,7 @@ def march_in_loops(step_matrix, contacts, tip, drive, limits, dt, steps):
             next_place = 2 * y[s] - before[s] + dt * dt / MASS * push
             before[s] = y[s]
             y[s] = next_place
-        for i in range(m):
-            total = 0.0
-            for k in range(3 * m):
-                total += step_matrix[i, k] * state[k]
-            moved[i] = total
-        for i in range(m):
-            state[m + i] = state[i]
-            state[i] = moved[i]
+        take_step(step_matrix, state)
     return tips, places
 
 

@@ -183,9 +183,7 @@ def _reduced_diameters(
 
     wanted = sorted(set(diameters))
     size = bodies.ranks_of_sector
-    interior = None
-    if scene.model.reduction == "rubin" and size == 1 and 1 < comm.size <= len(wanted):
-        interior = _interior_of_ranks(bodies, ports)
+    interior = _interior_of_ranks(bodies, ports, len(wanted))
 
     def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
         steps = port_models(
@@ -218,10 +216,17 @@ def _reduced_diameters(
     return dict(zip(wanted, models, strict=True)), span
 
 
-def _interior_of_ranks(bodies: Bodies, ports: Ports) -> tuple[np.ndarray, np.ndarray] | None:
+def _interior_of_ranks(
+    bodies: Bodies, ports: Ports, diameters: int
+) -> tuple[np.ndarray, np.ndarray] | None:
     """`fem.ports.interior_flexibility` of ranks that each have the sector for themselves, a part of
-    the ports by each (collective); None without an open sector.
+    the ports by each (collective); None without an open sector, and where not every rank reduces
+    one of so many nodal diameters by static solves.
     """
+    ranks = bodies.comm.size if bodies.comm else 1
+    static = bodies.scene.model.reduction == "rubin"
+    if not static or bodies.ranks_of_sector > 1 or not 1 < ranks <= diameters:
+        return None
     from ...fem.ports import interior_flexibility
 
     def eliminate(_: int) -> None:
@@ -229,7 +234,7 @@ def _interior_of_ranks(bodies: Bodies, ports: Ports) -> tuple[np.ndarray, np.nda
             bodies.alone.frame.opened.elimination.core()
 
     # a rank that fails is heard of by the others
-    share_work(eliminate, range(bodies.comm.size if bodies.comm else 1), bodies.comm)
+    share_work(eliminate, range(ranks), bodies.comm)
     opened = bodies.alone.frame.opened
     if opened is None:
         return None
