@@ -1,12 +1,15 @@
 """What is solved by one rank is the same on all, and later stages find its factorisations again."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from bladefem import load_scene
+from bladefem.errors import NotSolvedError
 from bladefem.fem.compat import MPI
 from bladefem.reduction.other_diameters import spanned_models
-from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline import pipeline, response_stage
 from bladefem.study.pipeline.bodies import Bodies, on_one_rank
 from bladefem.study.pipeline.damper_contact import contact_patches
 from bladefem.study.pipeline.normal_modes import KEPT_MODES, find_modes
@@ -84,6 +87,33 @@ def test_stages_of_one_rank_are_computed_side_by_side():
     assert found == [(0, 1), (min(1, MPI.COMM_WORLD.size - 1), 1)]
     # asked again they are computed again, by rank 0
     assert keep.of_one_rank(stages[1], bodies)[0] == 0
+
+
+def test_influences_are_found_beside_an_added_load():
+    """By one rank and once; all ranks find them where their turn comes."""
+    comm = MPI.COMM_WORLD
+    keep = StageRunner(None, comm, StageClock({}, []))
+    stage = response_stage._InfluenceStage("key", lambda one: [comm.rank, one])
+    beside = [stage]
+    added = response_stage._added_curves(
+        SimpleNamespace(keep=keep), lambda load: 2 * load, beside, [3.0, 4.0]
+    )
+    assert added == [6.0, 8.0] and beside == []
+    rank, given = keep(response_stage.INFLUENCES, "key", lambda: pytest.fail("computed again"))
+    assert 0 <= rank < comm.size and given is None
+    # further loads have nothing beside them
+    again = response_stage._added_curves(SimpleNamespace(keep=keep), abs, beside, [5.0])
+    assert again == [5.0] and keep.ahead == {}
+
+
+def test_influences_that_are_not_found_beside_a_load_are_left_to_their_stage():
+    def refuse(comm):
+        raise NotSolvedError("no resonance")
+
+    keep = StageRunner(None, MPI.COMM_WORLD, StageClock({}, []))
+    beside = [response_stage._InfluenceStage("key", refuse)]
+    assert response_stage._added_curves(SimpleNamespace(keep=keep), abs, beside, [5.0]) == [5.0]
+    assert keep.ahead == {}
 
 
 def test_contact_and_mesh_error_do_not_depend_on_the_rank_that_found_them():

@@ -189,7 +189,9 @@ def studied_by_kept_motions(loads, found, amplitude=kept_amplitude, unstable="to
 
     given = [case(load, found.mass) for load in loads]
     started = StudiedLoads(given, [curve_at(one) for one in given], [found])
-    return study_kept_loads(started, searches_of([found]), curve_at, 0.05)
+    return study_kept_loads(
+        started, searches_of([found]), lambda cases: list(map(curve_at, cases)), 0.05
+    )
 
 
 @pytest.mark.parametrize(

@@ -19,9 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...hbm.parallel import share_work
 from ...util.arrays import RealArray
-from ...util.communicator import Communicator
 from .assemble_model import LoadCase
 from .best_load import BestLoad, KeptLoad, ends_of_range, studied_load
 from .curve import Curve
@@ -53,9 +51,8 @@ class _Proposal(NamedTuple):
 def study_kept_loads(
     studied: StudiedLoads,
     searches: Sequence[Search],
-    curve_at: Callable[[LoadCase], Curve],
+    curves_of: Callable[[list[LoadCase]], list[Curve]],
     accuracy: float,
-    comm: Communicator | None = None,
 ) -> StudiedLoads:
     """The studied loads with as many more as tell which of the motions that the blade keeps is the
     lowest, and the best loads with that one; unchanged where the blade keeps to the balances of the
@@ -63,6 +60,7 @@ def study_kept_loads(
 
     Args:
         searches: one a best load, for the cases of their masses.
+        curves_of: the responses of load cases.
         accuracy: of the amplitude, relative.
     """
     for _ in range(MAX_ADDED_LOADS):
@@ -75,8 +73,7 @@ def study_kept_loads(
         ]
         if not cases:
             break
-        curves = share_work(curve_at, cases, comm, on_demand=True)
-        studied = in_order(studied, list(zip(cases, curves, strict=True)))
+        studied = in_order(studied, list(zip(cases, curves_of(cases), strict=True)))
     found = [_with_kept_load(best, studied.curves, accuracy) for best in studied.best]
     return studied._replace(best=found)
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
+from typing import Any
 
 from geometry.mesh import Mesh, sector_of
 
 from ...data import Patch
 from ...errors import NotSolvedError
 from ...hbm.parallel import share_work
-from ...io.stage_cache import on_root
+from ...io.stage_cache import cached_stage, on_root
 from ...scene.aerodynamics import has_flow
 from ...scene.kinds import kind_named
 from ...scene.tables import Scene
@@ -54,6 +55,9 @@ from .stability_remarks import Disturbances, judged_disturbances
 from .stage_inputs import stage_key
 from .stage_runner import StageRunner
 from .utilisation import utilisation_message
+
+# name of the stage
+INFLUENCES = "influences"
 
 
 @dataclass(frozen=True)
@@ -110,7 +114,7 @@ def run_response(
             "errors by the body's mesh are not estimated: the reduced model has other modes than "
             "those of the stage, or its elements are far too large"
         )
-    response, cases = _load_responses(study, cases, softer, best, searches)
+    response, cases = _load_responses(study, before.contact, cases, softer, best, searches)
     loads = [case.load for case in cases]
     before = replace(before, contact=with_more_loads(scene, before.contact, loads, clock.messages))
     clock.messages.extend(lower_studied_remarks(scene, response.best, response.curves))
@@ -193,6 +197,7 @@ def _stresses(
 
 def _load_responses(
     study: _Study,
+    contact: Seating,
     cases: list[LoadCase],
     softer: SofterBody | None,
     best: Sequence[BestLoad],
@@ -202,6 +207,7 @@ def _load_responses(
     the curves, which are more where a best load was found that was not given.
 
     Args:
+        contact: for what the best load depends on, which a free rank finds beside added loads.
         softer: the body less the error of its stiffness, for the error by its mesh.
         best: loads that were searched before; none when they were not.
         searches: for them.
@@ -228,7 +234,9 @@ def _load_responses(
         if best:
             studied = studied._replace(best=list(best))
         if scene.study.stability:
-            studied = study_kept_loads(studied, searches, curve_at, scene.accuracy, keep.comm)
+            beside = _influences_beside(study, contact, studied.best)
+            curves_of = partial(_added_curves, study, curve_at, beside)
+            studied = study_kept_loads(studied, searches, curves_of, scene.accuracy)
         cases, curves, found = studied
         band = min(c.frequency[0] for c in curves), max(c.frequency[-1] for c in curves)
         limits = _limits_of_masses(study, cases, softer, band)
@@ -321,11 +329,62 @@ def _best_load_searches(study: _Study, contact: Seating) -> list[Search]:
     return [search(mass) for mass in scene.study.masses or (None,)]
 
 
-def _influences(study: _Study, contact: Seating, best: BestLoad | None) -> tuple[Influence, ...]:
-    """What the best load depends on; none where it was not found or not wanted."""
-    scene, keep = study.scene, study.keep
-    if best is None or not scene.study.influences:
-        return ()
+def _added_curves(
+    study: _Study,
+    curve_at: Callable[[LoadCase], Curve],
+    beside: list[_InfluenceStage],
+    cases: list[LoadCase],
+) -> list[Curve]:
+    """The responses of further loads, mostly a single one.
+
+    Args:
+        beside: stages that are computed ahead beside them; each is taken out of the list.
+    """
+    stages = [beside.pop() for _ in range(len(beside))]
+    tasks: list[Callable[[], Any]] = [
+        *(partial(curve_at, case) for case in cases),
+        *(partial(one.computed_alone, study.keep) for one in stages),
+    ]
+    done = share_work(lambda task: task(), tasks, study.keep.comm, on_demand=True)
+    for found in filter(None, done[len(cases) :]):
+        study.keep.ahead[INFLUENCES] = found
+    return done[: len(cases)]
+
+
+@dataclass(frozen=True)
+class _InfluenceStage:
+    """What a best load depends on."""
+
+    key: str
+    compute: Callable[[Communicator | None], list[Influence]]
+
+    def computed_alone(self, keep: StageRunner) -> tuple[list[Influence], float | None] | None:
+        """By one rank: what `cached_stage` gives; None where it was not found."""
+        try:
+            return cached_stage(keep.folder, INFLUENCES, self.key, lambda: self.compute(None))
+        except NotSolvedError:
+            return None
+
+
+def _influences_beside(
+    study: _Study, contact: Seating, best: Sequence[BestLoad]
+) -> list[_InfluenceStage]:
+    """The influences, for a rank that has nothing else to do; none where there is one rank, or
+    several dampers, of which the best one is not known yet.
+    """
+    comm = study.keep.comm
+    if comm is None or comm.size == 1 or len(best) != 1 or best[0].reason:
+        return []
+    return list(filter(None, [_influence_stage(study, contact, best[0])]))
+
+
+def _influence_stage(study: _Study, contact: Seating, best: BestLoad) -> _InfluenceStage | None:
+    """What the best load of the search depends on; None where that is not wanted."""
+    scene = study.scene
+    if not scene.study.influences:
+        return None
+    # which motions the blade keeps does not matter to them
+    searched = replace(best, kept=None)
     tangents = study.mesh.dimension - 1
     changed = changed_cases(scene, contact.problem, tangents, best.mass, contact.rough)
     # a history of the seating has its friction already
@@ -334,12 +393,20 @@ def _influences(study: _Study, contact: Seating, best: BestLoad | None) -> tuple
     angles = flank_angles(scene) if flank_angles is not None and frictionless else None
     parameters = parameters_of(scene, angles)
 
-    def compute() -> list[Influence]:
-        return influences(scene, best, study.family, changed, parameters, keep.comm)
+    def compute(comm: Communicator | None) -> list[Influence]:
+        return influences(scene, searched, study.family, changed, parameters, comm)
 
-    key = stage_key("response", scene, "influences", best)
+    return _InfluenceStage(stage_key("response", scene, INFLUENCES, searched), compute)
+
+
+def _influences(study: _Study, contact: Seating, best: BestLoad | None) -> tuple[Influence, ...]:
+    """What the best load depends on; none where it was not found or not wanted."""
+    keep = study.keep
+    stage = None if best is None else _influence_stage(study, contact, best)
+    if stage is None:
+        return ()
     try:
-        return tuple(keep("influences", key, compute))
+        return tuple(keep(INFLUENCES, stage.key, lambda: stage.compute(keep.comm)))
     except NotSolvedError as error:
         keep.clock.messages.append(f"what the best load depends on is not known: {error}")
         return ()

@@ -64,13 +64,14 @@ class StageRunner:
         key: str,
         compute: Callable[[], Result],
     ) -> Result:
-        return self._reported(name, *cached_stage(self.folder, name, key, compute, self.comm))
+        """The result of a stage that all ranks compute, or that was computed ahead (collective)."""
+        known = self.ahead.pop(name, None)
+        if known is None:
+            known = cached_stage(self.folder, name, key, compute, self.comm)
+        return self._reported(name, *known)
 
     def of_one_rank(self, stage: StageOfOneRank, bodies: Bodies) -> Any:
         """The result of a stage that rank 0 computes, or that was computed ahead (collective)."""
-        known = self.ahead.pop(stage.name, None)
-        if known is not None:
-            return self._reported(stage.name, *known)
         return self(stage.name, stage.key, lambda: on_one_rank(bodies, stage.compute))
 
     def compute_ahead(self, stages: Sequence[StageOfOneRank], bodies: Bodies) -> None:
