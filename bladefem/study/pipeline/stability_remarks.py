@@ -235,6 +235,26 @@ def undriven_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
+def lower_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances at whose frequency the blade may keep to a far lower motion, or "": marched or
+    measured from rest it may be the only one that is seen.
+    """
+    each = ", ".join(
+        f"{1e6 * c.lower.amplitude:.4g} um in place of {1e6 * c.curve_amplitude:.4g} um at "
+        f"{c.peak_frequency:.5g} Hz under {newtons(c.load)}"
+        + (f" (whether it lasts is not known: {c.lower.doubt})" if c.lower.doubt else "")
+        for c in curves
+        if c.lower is not None
+    )
+    if not each:
+        return ""
+    return (
+        "contacts lift off at the resonance, and the blade may keep to another, lower motion at "
+        f"the same frequency, mostly from rest: {each}; the larger one is given, and the error "
+        "told is that of this one alone"
+    )
+
+
 def unjudged_sentence(curves: Sequence[Curve]) -> str:
     """The resonances whose motion could not be judged, among others that were, or "". One that a
     march gives needs no verdict.
