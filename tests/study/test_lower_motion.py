@@ -115,7 +115,7 @@ def test_the_report_tells_both_motions():
         )
 
     said = lower_sentence([curve(36.0, LowerMotion(131e-6)), curve(73.0, None)])
-    assert "131 um in place of 610 um at 369.54 Hz under 36 N;" in said
+    assert "some 130 um in place of 610 um at 369.54 Hz under 36 N;" in said
     assert "73 N" not in said and "not known" not in said
     assert "not known: too long" in lower_sentence([curve(9.0, LowerMotion(1e-4, "too long"))])
     assert lower_sentence([curve(73.0, None)]) == ""

@@ -64,6 +64,7 @@ def lower_motion(
     if not mostly_lifts_off(top) or settings.softened:
         return None
     few = _few_points(models, settings)
+    # a motion, its verdict and its march have the same modes
     model = family_member(models, few).model
     omega = 2 * np.pi * frequency
     try:
@@ -73,7 +74,7 @@ def lower_motion(
     most = OTHER_MOTION * given
     if not found.converged or size(found) > most:
         return None
-    lasting = model_in_time(models, settings_in_time(models, few))
+    lasting = model_in_time(models, few)
     if stability_verdict(lasting, found, CURVE_OPERATIONS).verdict in (STABLE, UNIQUE):
         return LowerMotion(size(found))
     kept = band_by_steps(lasting, found, MAX_COUNTED)
@@ -90,4 +91,4 @@ def _few_points(models: Family, settings: Settings) -> Settings:
     few = replace(settings, harmonics=harmonics, samples=max(JUDGED_SAMPLES, 8 * harmonics + 8))
     if "points" in settings.chosen:
         few = replace(few, points=FIRST_SETTINGS["points"])
-    return few
+    return settings_in_time(models, few)
