@@ -168,7 +168,7 @@ def curve_of(
     marks, top = judged.marks, judged.point
     estimated, in_time = estimated_errors(curve), None
     if not judged.march_replaces_balance and sought is None:
-        curve, estimated, in_time = judged_in_time(scene, marches, curve, top)
+        curve, estimated, in_time = judged_in_time(scene, marches, curve, judged)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     lifts = any(lifts_off(p) for p in curve.points if p.converged)
     return Curve(

@@ -288,7 +288,11 @@ def doubtful_sentence(curves: Sequence[Curve], unjudged: str = "") -> str:
     each = ", ".join(
         f"{newtons(c.load)} ({unjudged or c.march_at_peak.reason})"
         for c in curves
-        if c.unstable_peak is None and c.march_at_peak is not None and c.march_at_peak.reason
+        if c.unstable_peak is None
+        and c.march_at_peak is not None
+        and c.march_at_peak.reason
+        # a march with fewer contact points tells the error
+        and c.error_march is None
     )
     if not each:
         return ""
