@@ -14,6 +14,7 @@ from bladefem.hbm.solve import solve
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
+from bladefem.study.pipeline import response_remarks as remarks_module
 from bladefem.study.pipeline.stability_remarks import lower_sentence
 from bladefem.study.stability import lower_motion as module
 from bladefem.study.stability.kept_band import KeptBand
@@ -119,3 +120,17 @@ def test_the_report_tells_both_motions():
     assert "73 N" not in said and "not known" not in said
     assert "not known: too long" in lower_sentence([curve(9.0, LowerMotion(1e-4, "too long"))])
     assert lower_sentence([curve(73.0, None)]) == ""
+
+
+def test_the_remarks_on_responses_have_that_sentence(monkeypatch):
+    for name in vars(remarks_module):
+        if name.endswith("_sentence"):
+            monkeypatch.setattr(remarks_module, name, lambda *_: "")
+    for name in ("_of_settings", "history_remarks", "resonance_warnings"):
+        monkeypatch.setattr(remarks_module, name, lambda *_: [])
+    monkeypatch.setattr(remarks_module, "beyond_tolerance", lambda *_: "")
+    monkeypatch.setattr(remarks_module, "lower_sentence", lambda _: "two motions")
+    scene = SimpleNamespace(study=SimpleNamespace(stability=False), accuracy=0.05)
+    judged = SimpleNamespace(reason="")
+    (said,) = remarks_module.response_remarks(scene, SETTINGS, [], 8, judged)
+    assert said == "two motions" and said.level == "warning"
