@@ -1,6 +1,7 @@
 """The error of a resonance with lift-off from a march, against balances with many harmonics."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,18 @@ from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.checked_curve import CheckedCurve
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.stability.error_in_time import Marches, carried_motion, error_in_time
+from bladefem.study.stability import judged_resonance as judged_module
+from bladefem.study.stability.error_in_time import (
+    LIFTING_POINTS,
+    ErrorInTime,
+    Marches,
+    carried_motion,
+    error_in_time,
+    error_of_doubt,
+)
+from bladefem.study.stability.judged_resonance import JudgedResonance, judged_in_time
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.verdicts import Stability
 
 OMEGA = 0.9
 # of the excitation of `bouncing`: three harmonics are 3.1 % off there
@@ -85,3 +97,42 @@ def test_an_error_that_is_unknown_is_told_by_twice_the_contact_points(nodes, cou
     assert found.error == pytest.approx(counted * truth, abs=counted * 2e-3)
     every = replace(coarse, points=nodes)
     assert error_in_time(Marches(family), CheckedCurve(every, [], {}), moved, 0.05) is None
+
+
+def test_a_doubtful_motion_is_marched_with_fewer_contact_points():
+    """Sixteen parts of one contact, of which eight are marched, have the motion of the whole."""
+    family = family_of(in_parts(2 * LIFTING_POINTS), [2 * LIFTING_POINTS])
+    fine = settings_of(0.01, points=2 * LIFTING_POINTS)
+    top = solve(family_member(family, fine).model, OMEGA, 3, 64)
+    truth = abs(size(top) / size(solve(hopping(), OMEGA, 31, 512)) - 1)
+    found = error_of_doubt(Marches(family), CheckedCurve(fine, [top], {}), top)
+    assert found.error == pytest.approx(truth, abs=2e-3) and found.error > 0.02
+    assert found.band.points == LIFTING_POINTS
+    # balances tell more, the points are the user's, or there are no fewer
+    for other in (
+        replace(fine, error=0.05),
+        replace(fine, chosen=()),
+        replace(fine, points=LIFTING_POINTS),
+    ):
+        assert error_of_doubt(Marches(family), CheckedCurve(other, [top], {}), top) is None
+
+
+@pytest.mark.parametrize(
+    ("verdict", "reason", "error"),
+    [("stable", "too long", 0.08), ("unstable", "too long", 0.03), ("stable", "", 0.03)],
+)
+def test_the_error_of_a_resonance_in_doubt_is_told_by_that_march(
+    monkeypatch, verdict, reason, error
+):
+    """An unstable one whose march is not known has an unknown error, see `Curve.marched`."""
+    top = solve(hopping(), OMEGA, 3, 64)
+    curve = CheckedCurve(settings_of(0.03), [top], {top.omega: 0.03})
+    marks = Stability(np.array([verdict]), np.ones(1))
+    resonance = JudgedResonance(top, marks, KeptBand(1.0, np.nan, np.nan, 0, reason))
+    band = KeptBand(1.0, 0.9, 1.0, 100, points=LIFTING_POINTS)
+    monkeypatch.setattr(judged_module, "error_in_time", lambda *_: None)
+    monkeypatch.setattr(judged_module, "error_of_doubt", lambda *_: ErrorInTime(0.08, band))
+    scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
+    found, estimated, march = judged_in_time(scene, None, curve, resonance)
+    assert found.settings.error == error and estimated[0] == error
+    assert march == (band if error > 0.03 else None)

@@ -438,9 +438,14 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     # what could not be marched is said
     marches.band = lambda *_: module.KeptBand(1.0, np.nan, np.nan, 0, "no march")
     unknown = given(lift=3, harmonics=3)
-    shown = SimpleNamespace(load=580.0, march_at_peak=unknown.march, unstable_peak=None)
+    shown = SimpleNamespace(
+        load=580.0, march_at_peak=unknown.march, unstable_peak=None, error_march=None
+    )
     assert "580 N (no march)" in doubtful_sentence([shown])
     assert "580 N (a flow)" in doubtful_sentence([shown], "a flow")
+    # but for the error that fewer contact points tell
+    shown.error_march = held.march
+    assert doubtful_sentence([shown]) == ""
     assert (
         doubtful_sentence([SimpleNamespace(march_at_peak=held.march, unstable_peak=None, load=1.0)])
         == ""

@@ -11,6 +11,7 @@ from ...scene.units import newtons
 from ...util.arrays import BooleanArray, ComplexArray, IntegerArray, RealArray
 from ..adaptive.settings import Settings
 from ..stability.kept_band import KeptBand
+from ..stability.lower_motion import LowerMotion
 from ..stability.resonance_in_time import ResonanceInTime
 from .load_interval import LoadInterval
 
@@ -90,6 +91,9 @@ class Curve:
     flank_march_failure: str = ""
     # contacts lift off, and marches after a strong drive take too long: a higher motion may exist
     strong_drive_skipped: bool = False
+    # another motion at its frequency, far lower, that the blade may keep to instead; None where
+    # none was found
+    lower: LowerMotion | None = None
     # a march from the resonance that its estimated error was taken from; None where richer balances
     # tell it
     error_march: KeptBand | None = None

@@ -21,7 +21,8 @@ from ..adaptive.family import Family, family_member
 from ..adaptive.resonance_curve import too_large_to_follow
 from ..adaptive.settings import Settings
 from ..stability.error_in_time import Marches
-from ..stability.judged_resonance import judged_in_time, judged_resonance
+from ..stability.judged_resonance import JudgedResonance, judged_in_time, judged_resonance
+from ..stability.lower_motion import LowerMotion, lower_motion
 from ..stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from .assemble_model import LoadCase
 from .best_load import BestLoad, holding_load, studied_load
@@ -167,7 +168,7 @@ def curve_of(
     marks, top = judged.marks, judged.point
     estimated, in_time = estimated_errors(curve), None
     if not judged.march_replaces_balance and sought is None:
-        curve, estimated, in_time = judged_in_time(scene, marches, curve, top)
+        curve, estimated, in_time = judged_in_time(scene, marches, curve, judged)
     tolerated = scene.accuracy * size(top) / np.maximum(heights, 1e-6 * size(top))
     lifts = any(lifts_off(p) for p in curve.points if p.converged)
     return Curve(
@@ -188,6 +189,7 @@ def curve_of(
         flank_rise=judged.flank_rise,
         flank_march_failure=judged.flank_march_failure,
         strong_drive_skipped=judged.strong_drive_skipped,
+        lower=_lower_motion(scene, models, curve, judged, sought),
         error_march=in_time,
         resonance_by_march=sought,
         interval=_interval_of(scene, model, curve, top),
@@ -200,6 +202,21 @@ def curve_of(
         layer_shift=unseen.layer_shift,
         layer_height=unseen.layer_height,
     )
+
+
+def _lower_motion(
+    scene: Scene,
+    models: Family,
+    curve: CheckedCurve,
+    judged: JudgedResonance,
+    sought: ResonanceInTime | None,
+) -> LowerMotion | None:
+    """A lower motion at the resonance that is given, where stability is asked for."""
+    if not scene.study.stability:
+        return None
+    given = judged.amplitude if sought is None else sought.highest
+    frequency = judged.point.frequency if sought is None else sought.frequency
+    return lower_motion(models, curve.settings, judged.point, given, frequency)
 
 
 def _interval_of(

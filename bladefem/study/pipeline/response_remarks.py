@@ -20,6 +20,7 @@ from .stability_remarks import (
     Disturbances,
     doubtful_sentence,
     folded_sentence,
+    lower_sentence,
     ripple_sentence,
     stability_sentence,
     undriven_sentence,
@@ -72,6 +73,7 @@ def response_remarks(
     methods += [ripple_sentence(curves, scene.accuracy), undriven_sentence(curves)]
     warnings = [
         folded_sentence(curves),
+        lower_sentence(curves),
         *(unstable_sentence(c, scene.accuracy) for c in curves),
         *map(march_sentence, curves),
         unjudged_sentence(curves),

@@ -15,6 +15,7 @@ from ...hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
 from ...scene.units import newtons
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
+from ..stability.lower_motion import LowerMotion
 from ..stability.verdicts import model_in_time
 
 if TYPE_CHECKING:
@@ -235,6 +236,33 @@ def undriven_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
+def _rounded(lower: LowerMotion) -> str:
+    """Few contact points tell its amplitude: 120 um under 36 N of the shipped wedge, where a march
+    of all of them from rest keeps 135.
+    """
+    return f"some {float(f'{1e6 * lower.amplitude:.2g}'):g} um"
+
+
+def lower_sentence(curves: Sequence[Curve]) -> str:
+    """The resonances at whose frequency the blade may keep to a far lower motion, or "": marched or
+    measured from rest it may be the only one that is seen.
+    """
+    each = ", ".join(
+        f"{_rounded(c.lower)} in place of {1e6 * c.curve_amplitude:.4g} um at "
+        f"{c.peak_frequency:.5g} Hz under {newtons(c.load)}"
+        + (f" (whether it lasts is not known: {c.lower.doubt})" if c.lower.doubt else "")
+        for c in curves
+        if c.lower is not None
+    )
+    if not each:
+        return ""
+    return (
+        "contacts lift off at the resonance, and from rest the blade may keep to another, lower "
+        f"motion at the same frequency: {each}; the larger one is given, and the error told is "
+        "that of this one alone"
+    )
+
+
 def unjudged_sentence(curves: Sequence[Curve]) -> str:
     """The resonances whose motion could not be judged, among others that were, or "". One that a
     march gives needs no verdict.
@@ -260,7 +288,11 @@ def doubtful_sentence(curves: Sequence[Curve], unjudged: str = "") -> str:
     each = ", ".join(
         f"{newtons(c.load)} ({unjudged or c.march_at_peak.reason})"
         for c in curves
-        if c.unstable_peak is None and c.march_at_peak is not None and c.march_at_peak.reason
+        if c.unstable_peak is None
+        and c.march_at_peak is not None
+        and c.march_at_peak.reason
+        # a march with fewer contact points tells the error
+        and c.error_march is None
     )
     if not each:
         return ""

@@ -4,6 +4,6 @@ with ``judged_resonance``, which decides.
 - balances: ``verdicts`` stability of the points of a curve, ``highest_stable`` its highest lasting
   motion, ``finer_contacts`` verdicts with more contact points
 - marches in time: ``kept_band`` from an unstable motion, ``flank_motions`` beside a resonance,
-  ``strong_drive`` after a strong excitation, ``error_in_time`` the error of a balance,
-  ``resonance_in_time`` where balances fail
+  ``strong_drive`` after a strong excitation, ``lower_motion`` another one far below,
+  ``error_in_time`` the error of a balance, ``resonance_in_time`` where balances fail
 """

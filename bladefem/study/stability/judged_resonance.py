@@ -15,7 +15,7 @@ from ...util.arrays import RealArray
 from ..adaptive.check_points import heights_of
 from ..adaptive.checked_curve import CheckedCurve, estimated_errors
 from ..adaptive.settings import Settings
-from .error_in_time import Marches, error_in_time
+from .error_in_time import Marches, error_in_time, error_of_doubt
 from .finer_contacts import FinerMotion, unstable_with_more_points
 from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
@@ -51,6 +51,13 @@ class JudgedResonance:
         if self.march_replaces_balance and self.march is not None:
             return self.march.highest
         return size(self.point)
+
+    def is_doubtful(self, curve: CheckedCurve) -> bool:
+        """Contacts lift off, few harmonics do not call the highest motion unstable, and what the
+        blade does there is not known from a march.
+        """
+        unknown = self.march is not None and bool(self.march.reason)
+        return unknown and self.unstable_peak(curve) is None
 
     def unstable_peak(self, curve: CheckedCurve) -> Solution | None:
         """The highest point of the curve where it is unstable."""
@@ -230,15 +237,18 @@ def judged_in_time(
     scene: Scene,
     marches: Marches,
     curve: CheckedCurve,
-    top: Solution,
+    resonance: JudgedResonance,
 ) -> tuple[CheckedCurve, RealArray, KeptBand | None]:
     """The curve with the error of its resonance by a march where that tells it, the estimated error
     of each point, and the march.
     """
+    top = resonance.point
     estimated = estimated_errors(curve)
     if not scene.study.stability:
         return curve, estimated, None
     judged = error_in_time(marches, curve, top, scene.accuracy)
+    if judged is None and resonance.is_doubtful(curve):
+        judged = error_of_doubt(marches, curve, top)
     if judged is None:
         return curve, estimated, None
     estimated[[p is top for p in curve.points]] = judged.error
