@@ -30,6 +30,17 @@ from .topology import CORNERS, DIMENSION, FAMILY, NODES
 PLAUSIBLE_LENGTHS = (0.01, 3.0)
 # factors to metres, the likeliest first
 UNIT_FACTORS = (1.0, 1e-3, 0.0254, 1e-2)
+# what no mesh tells, with values to start from: left out, the blade would turn at a default speed
+STARTING_PHYSICS = (
+    "",
+    "[material.blade]".ljust(32) + "# steel; yours",
+    'E = "210 GPa"',
+    "nu = 0.3",
+    'rho = "7850 kg/m^3"',
+    "",
+    "[operation]",
+    'speed = "0 rpm"'.ljust(32) + "# at rest; yours",
+)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # of the model's size: distance of nodes that match after a turn
 MATCH_TOLERANCE = 1e-3
@@ -211,6 +222,7 @@ def starting_scene(look: Look, folder: Path | None = None) -> str:
         NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3
     ):
         lines.append('linear = "promote"'.ljust(32) + "# first-order cells get mid-side nodes")
+    lines += STARTING_PHYSICS
     missing = ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing)]
     return "\n".join([*lines, *(missing if look.missing else []), ""])
 

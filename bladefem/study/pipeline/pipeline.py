@@ -12,7 +12,9 @@ from typing import Literal, overload
 from ...contact.peak_pressure import peak_remarks
 from ...data import ModeSet, Patch
 from ...errors import InputError, suggestion
+from ...io.run_folder import given_fields
 from ...scene.aerodynamics import has_flow, refuse_flow
+from ...scene.assumed import assumed_physics
 from ...scene.tables import Scene
 from ...scene.validate import refuse_response
 from ...scene.warnings import implausible_values
@@ -116,9 +118,8 @@ def run(
     if responds:
         refuse_response(scene)
         refuse_flow(scene)
-    keep = StageRunner(
-        folder, comm, StageClock({}, [*map(warning, implausible_values(scene))], progress)
-    )
+    doubts = [*implausible_values(scene), *_assumed(scene, folder)]
+    keep = StageRunner(folder, comm, StageClock({}, [*map(warning, doubts)], progress))
     meshed = _run_mesh(scene, keep)
     if until == "mesh":
         return meshed
@@ -148,6 +149,11 @@ def run(
         flutter = with_best_load(flutter, solved, bodies, patches, keep)
     keep.clock.messages.extend(flutter_sentences(flutter))
     return replace(solved, flutter=flutter)
+
+
+def _assumed(scene: Scene, folder: Folder) -> list[str]:
+    """What the folder's user did not give; unknown without a folder, and of scenes of a program."""
+    return [] if folder is None else assumed_physics(scene, given_fields(folder))
 
 
 def _run_mesh(scene: Scene, keep: StageRunner) -> Run:
