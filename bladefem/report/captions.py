@@ -27,9 +27,9 @@ CAPTIONS = {
     "modes/wave": "The excited mode as a wave that turns round the wheel.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
     "marked where an order meets the wave that it excites. Waves have Coriolis forces, backward "
-    "ones are dashed where they are another line. Drawn are orders 1 to 5 and those next "
-    "to the scene's own, with the nodal diameters that they excite; the table of crossings has all "
-    "orders.",
+    "ones are dashed where they are another line. Of orders 1 to 5 and those "
+    "next to the scene's own the ones that cross a mode are drawn, with the nodal diameters that "
+    "they excite; the table of crossings has all orders.",
     "modes/crossings": "Speeds at which an engine order excites a mode; the orders are those named "
     "under accuracy and method.",
     "modes/interference": "Interference diagram at the operating speed: engine orders against "
@@ -198,8 +198,8 @@ SINGLE_BLADE_CAPTIONS = {
     "modes/nodal_diameters": "Natural frequencies, without damper.",
     "modes/wave": "The excited mode through one period.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
-    "marked where an order meets a mode. Drawn are orders 1 to 5 and those next to the scene's "
-    "own; the table of crossings has all orders.",
+    "marked where an order meets a mode. Of orders 1 to 5 and those next to the scene's own "
+    "the ones that cross a mode are drawn; the table of crossings has all orders.",
     "modes/interference": "Natural frequencies against the engine orders at the operating speed.",
     "modes/stresses_of_modes": "Where the blade is stressed most: by rotation and heat, by each of "
     "the first modes scaled to a largest displacement of 1 mm, and, where a linear response was "
