@@ -59,9 +59,10 @@ CAPTIONS = {
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
-    "and amplitude over load for each value. Bars are estimated errors; diamonds are resonances "
-    "that a march in time gives, or the stiff layer that a softer one stands for, squares unstable "
-    "balances; hollow marks have an unknown error.",
+    "under the damper's own load where study.own_load asks for it, and amplitude over load for "
+    "each value. Bars are estimated errors; diamonds are resonances that a march in time gives, or "
+    "the stiff layer that a softer one stands for, squares unstable balances; hollow "
+    "marks have an unknown error.",
     "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
     "over the values of both fields, with its estimated error and what gives it where that is no "
     "stable balance; the smallest in bold.",
