@@ -27,7 +27,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import mode_strength
 from .bodies import Bodies
 from .body_mesh import mode_errors
-from .case_models import judged_modes, load_cases, reduced_sector
+from .case_models import judged_modes, load_cases, middle_case, reduced_sector
 from .flutter import find_flutter, flutter_sentences, with_best_load
 from .history import refuse_jamming
 from .normal_modes import excited_modes, find_modes, responding_diameters
@@ -250,7 +250,7 @@ def _run_reduction(
     with keep.clock("stresses"):
         stressed = keep.of_one_rank(strength, bodies)
     cases = load_cases(scene, mesh, before.contact)
-    middle = cases[len(cases) // 2]
+    middle = middle_case(cases)
     with keep.clock("reduction"):
         settings, reduced = reduced_sector(scene, bodies, middle, patches, keep)
         errors = keep.of_one_rank(_mode_errors_stage(before, before.modes, patches), bodies)
