@@ -221,6 +221,21 @@ def test_a_decimal_comma_is_told():
     assert "decimals" not in str(refused.value)
 
 
+def test_a_list_that_may_be_a_decimal_comma_is_refused():
+    """Two masses of 1 g and 5 g were studied for "1,5 g"."""
+    for name, text, meant in (
+        ("study.masses", "1,5 g", "expected '1.5 g' or '1, 5 g'"),
+        ("study.loads", "69,7N", "expected '69.7N' or '69, 7N'"),
+    ):
+        with pytest.raises(InputError) as refused:
+            convert_value(text, field_at(name))
+        assert str(refused.value).startswith(f"{name} = ") and str(refused.value).endswith(meant)
+    loads = field_at("study.loads")
+    assert convert_value("20, 50 N", loads) == convert_value("20 N,50 N", loads) == (20.0, 50.0)
+    assert convert_value("20,50,80 N", loads) == (20.0, 50.0, 80.0)
+    assert convert_value("300,500 Hz", field_at("study.band")) == (300.0, 500.0)
+
+
 def test_scenes_with_a_byte_order_mark_are_offered(tmp_path):
     (tmp_path / "first.toml").write_text('kind = "punch"\n', encoding="utf-8-sig")
     with pytest.raises(InputError, match="did you mean '.*first.toml'"):
