@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from bladefem.errors import InputError, suggestion
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.support import area_springs, held_letters
+from bladefem.scene.units import show
 
 from .parameters import MAX_CELLS
 
@@ -100,19 +101,17 @@ def _held_names(scene: Scene) -> list[tuple[str, str]]:
 
 
 def _refuse_many(scene: Scene, cells: float) -> None:
-    """The field that is to blame is the one that was given."""
+    """The field that is to blame is the one that was given, of two sizes the smaller one."""
     if cells <= MAX_CELLS:
         return
     mesh = scene.mesh
-    given = {
-        "mesh.size": mesh.size is not None,
-        "mesh.contact_size": mesh.contact_size is not None,
-    }
-    name = next((key for key, is_given in given.items() if is_given), "mesh.scale")
-    if mesh.scale < 1:
-        name = "mesh.scale"
-    value = getattr(mesh, name.partition(".")[2])
+    sizes = {"mesh.size": mesh.size, "mesh.contact_size": mesh.contact_size}
+    given = {name: size for name, size in sizes.items() if size is not None}
+    said = f"mesh.scale = {mesh.scale:.4g}"
+    if given and mesh.scale >= 1:
+        name, size = min(given.items(), key=lambda item: item[1])
+        said = f"{name} = {show(size, 'm')}"
     raise InputError(
-        f"{name} = {value:.4g}{'' if name == 'mesh.scale' else ' m'}: gives about {cells:.1g} "
-        f"cells, expected at most {MAX_CELLS:.0e}; choose larger elements, or check the length unit"
+        f"{said}: gives about {cells:.1g} cells, expected at most {MAX_CELLS:.0e}; choose larger "
+        "elements, or check the length unit"
     )

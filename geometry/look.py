@@ -30,6 +30,17 @@ from .topology import CORNERS, DIMENSION, FAMILY, NODES
 PLAUSIBLE_LENGTHS = (0.01, 3.0)
 # factors to metres, the likeliest first
 UNIT_FACTORS = (1.0, 1e-3, 0.0254, 1e-2)
+# what no mesh tells, with values to start from: left out, the blade would turn at a default speed
+STARTING_PHYSICS = (
+    "",
+    "[material.blade]".ljust(32) + "# steel; yours",
+    'E = "210 GPa"',
+    "nu = 0.3",
+    'rho = "7850 kg/m^3"',
+    "",
+    "[operation]",
+    'speed = "0 rpm"'.ljust(32) + "# at rest; yours",
+)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 # of the model's size: distance of nodes that match after a turn
 MATCH_TOLERANCE = 1e-3
@@ -135,7 +146,11 @@ def look_at(file: str | Path) -> Look:
     if drawing:
         outside, names = _drawn_faces(raw, outside)
     faces = tuple(_face_part(outside, number, name) for number, name in enumerate(names))
-    cut = _cut_faces(raw, outside, faces, float(np.ptp(box, axis=0).max()), drawing)
+    size = float(np.ptp(box, axis=0).max())
+    cut = _cut_faces(raw, outside, faces, size, by_outline=drawing)
+    if cut is None:
+        # nodes inside of faces need not match, which are then tied by a mortar
+        cut = _cut_faces(raw, outside, faces, size, by_outline=True)
     bore = () if cut is None else _bore_faces(raw, outside, faces, cut)
     alike = {} if drawing else _alike_names(raw)
     return Look(
@@ -145,7 +160,7 @@ def look_at(file: str | Path) -> Look:
         _body_sizes(raw),
         box,
         # a STEP file states its unit
-        1.0 if drawing else _guessed_scale(float(np.ptp(box, axis=0).max())),
+        1.0 if drawing else _guessed_scale(size),
         _set_kinds(raw),
         outside,
         faces,
@@ -211,6 +226,7 @@ def starting_scene(look: Look, folder: Path | None = None) -> str:
         NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3
     ):
         lines.append('linear = "promote"'.ljust(32) + "# first-order cells get mid-side nodes")
+    lines += STARTING_PHYSICS
     missing = ["", "# still missing:", *(f"# {sentence}" for sentence in look.missing)]
     return "\n".join([*lines, *(missing if look.missing else []), ""])
 
@@ -316,13 +332,13 @@ def _cut_faces(
     outside: NumberedFaces,
     faces: tuple[FacePart, ...],
     size: float,
-    drawing: bool,
+    by_outline: bool,
 ) -> CutFaces | None:
     """Pairs of faces on which nodes match after one turn about an axis through the origin.
 
     Args:
-        drawing: the mesh was made for this look, face by face: only the nodes on the edges of its
-            faces match.
+        by_outline: only the nodes on the edges of faces match, as those of a drawing, whose mesh is
+            made for this look face by face.
     """
     best: CutFaces | None = None
     most = 0.0
@@ -330,13 +346,13 @@ def _cut_faces(
     alike = [
         (i, j)
         for i, j in permutations(range(len(faces)), 2)
-        if _similar_faces(faces[i], faces[j], drawing)
+        if _similar_faces(faces[i], faces[j], by_outline)
     ]
     for axis in AXES:
         pairs: dict[int, list[tuple[int, int]]] = {}
         for i, j in alike:
             sectors = _sector_count(faces[i].centre, faces[j].centre, axis, size)
-            if sectors and _cut_faces_match(raw, outside, (i, j), axis, sectors, size, drawing):
+            if sectors and _cut_faces_match(raw, outside, (i, j), axis, sectors, size, by_outline):
                 pairs.setdefault(sectors, []).append((i, j))
         for sectors, some in pairs.items():
             low, high = ([one[k] for one in some] for k in (0, 1))
@@ -352,8 +368,8 @@ def _cut_faces(
     return best
 
 
-def _similar_faces(one: FacePart, other: FacePart, drawing: bool) -> bool:
-    alike = drawing or one.facets == other.facets
+def _similar_faces(one: FacePart, other: FacePart, by_outline: bool) -> bool:
+    alike = by_outline or one.facets == other.facets
     return alike and abs(one.area - other.area) < 1e-3 * one.area
 
 
@@ -391,10 +407,10 @@ def _cut_faces_match(
     axis: str,
     sectors: int,
     size: float,
-    drawing: bool,
+    by_outline: bool,
 ) -> bool:
     """Whether the corner nodes of one face, turned, lie on those of the other."""
-    chosen = _edge_nodes if drawing else _corner_nodes
+    chosen = _edge_nodes if by_outline else _corner_nodes
     one, other = (chosen(outside, i) for i in pair)
     if len(one) != len(other):
         return False

@@ -176,7 +176,7 @@ def read_by_meshio(file: Path) -> RawMesh:
     vtu = file.suffix.lower() == ".vtu"
     if not vtu:
         _check_coordinate_systems(file)
-    mesh = (meshio.vtu if vtu else meshio.nastran).read(file)
+    mesh = meshio.vtu.read(file) if vtu else meshio.nastran.read(io.StringIO(_bulk_data(file)))
     blocks = [(block.type, from_vtk_order(block.type, block.data)) for block in mesh.cells]
     groups = {
         name: [
@@ -193,6 +193,18 @@ def read_by_meshio(file: Path) -> RawMesh:
     points = np.zeros((len(mesh.points), 3))
     points[:, : mesh.points.shape[1]] = mesh.points
     return RawMesh(points, blocks, groups, sets)
+
+
+def _bulk_data(file: Path) -> str:
+    """The bulk data of a file between the statements that meshio asks for, capital ones: those to
+    be included have none, as gmsh writes them, and meshio refuses bulk data without an end.
+    """
+    lines = file.read_text(errors="replace").splitlines()
+    words = [line.strip().upper() for line in lines]
+    first = next((i + 1 for i, word in enumerate(words) if word.startswith("BEGIN BULK")), 0)
+    bulk = range(first, len(lines))
+    last = next((i for i in bulk if words[i].startswith("ENDDATA")), len(lines))
+    return "\n".join(["BEGIN BULK", *lines[first:last], "ENDDATA", ""])
 
 
 def _check_coordinate_systems(file: Path) -> None:

@@ -32,6 +32,7 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
     from geometry.check_parameters import check_file
 
     from ..io.stage_cache import on_root
+    from ..scene.assumed import assumed_physics
     from ..scene.toml import given_keys, read_tables, resolved_rows, scene_of
     from ..scene.warnings import implausible_values
     from ..study.pipeline.preflight import refuse_run
@@ -42,8 +43,9 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
         written = read_tables(file, options.overrides)
         scene = scene_of(written, file.resolve().parent)
         refuse_run(scene)
-        notes = [*implausible_values(scene), *check_file(scene)]
-        rows = tables.resolved_scene(resolved_rows(scene, given_keys(written)))
+        given = given_keys(written)
+        notes = [*assumed_physics(scene, given), *implausible_values(scene), *check_file(scene)]
+        rows = tables.resolved_scene(resolved_rows(scene, given))
         return "\n".join([rows, *(f"note: {note}" for note in notes)])
 
     text = on_root(comm, table)

@@ -70,7 +70,10 @@ def describe_look(found: Look) -> str:
             f"{found.cut.sectors} sectors about {found.cut.axis}"
         )
     else:
-        lines.append("cut faces: none found; one turn would carry one face onto the other")
+        lines.append(
+            "cut faces: none found, as no face lies on another one after a turn of one sector "
+            "about x, y or z"
+        )
     # of a drawing they are its faces, which are listed below
     sets = [] if is_drawing(found.file) else [[n, what] for n, what in found.sets.items()]
     faces = [

@@ -98,7 +98,8 @@ def study(options: argparse.Namespace, comm: Communicator | None) -> None:
         from ..report.study import Variant, warnings_of_variant
 
         warnings = warnings_of_variant(run.response, run.messages)
-        done.append(Variant("; ".join(values), scene, run.response, warnings))
+        own = run.contact.own if scene.study.own_load else None
+        done.append(Variant("; ".join(values), scene, run.response, warnings, own))
         # so that an interruption leaves some
         table, files = on_root(comm, lambda: plan.write(done, base))
         if not sys.stdout.isatty():
@@ -218,6 +219,7 @@ def _map_table(names: tuple[str, ...], values: list[list[str]], table: Any) -> s
     from ..report.study_map import best_pair
 
     shown = [*names, "load", "peak_frequency", "peak_amplitude", "reduction", "error"]
+    shown += [name for name in ("own_load", "own_amplitude") if name in table]
     best = best_pair((names[0], names[1]), (values[0], values[1]), table)
     return f"{tables.report_table(table[shown])}\n{best_value_lines(best)}"
 

@@ -226,6 +226,7 @@ def side_by_side(name: str, best: pd.DataFrame) -> str:
         "free_frequency",
         "load",
         *(c for c in SUMMARY_COLUMNS if c in best and c not in ("dissipated", "points")),
+        *(c for c in ("own_load", "own_amplitude") if c in best),
     ]
     return report_table(best[columns].rename(columns={"value": name}))
 

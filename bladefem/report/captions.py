@@ -27,9 +27,9 @@ CAPTIONS = {
     "modes/wave": "The excited mode as a wave that turns round the wheel.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
     "marked where an order meets the wave that it excites. Waves have Coriolis forces, backward "
-    "ones are dashed where they are another line. Drawn are orders 1 to 5 and those next "
-    "to the scene's own, with the nodal diameters that they excite; the table of crossings has all "
-    "orders.",
+    "ones are dashed where they are another line. Of orders 1 to 5 and those "
+    "next to the scene's own the ones that cross a mode are drawn, with the nodal diameters that "
+    "they excite; the table of crossings has all orders.",
     "modes/crossings": "Speeds at which an engine order excites a mode; the orders are those named "
     "under accuracy and method.",
     "modes/interference": "Interference diagram at the operating speed: engine orders against "
@@ -59,9 +59,10 @@ CAPTIONS = {
     "response/resonances": "Linear resonances without damper.",
     "mesh/convergence": "Frequencies on refined meshes, with the estimated limit and order.",
     "response/side_by_side": "Resonance amplitude and frequency at the best load over the value, "
-    "and amplitude over load for each value. Bars are estimated errors; diamonds are resonances "
-    "that a march in time gives, or the stiff layer that a softer one stands for, squares unstable "
-    "balances; hollow marks have an unknown error.",
+    "under the damper's own load where study.own_load asks for it, and amplitude over load for "
+    "each value. Bars are estimated errors; diamonds are resonances that a march in time gives, or "
+    "the stiff layer that a softer one stands for, squares unstable balances; hollow "
+    "marks have an unknown error.",
     "response/study_map": "Resonance amplitude at the best of the loads studied, and that load, "
     "over the values of both fields, with its estimated error and what gives it where that is no "
     "stable balance; the smallest in bold.",
@@ -198,8 +199,8 @@ SINGLE_BLADE_CAPTIONS = {
     "modes/nodal_diameters": "Natural frequencies, without damper.",
     "modes/wave": "The excited mode through one period.",
     "modes/campbell": "Campbell diagram: natural frequencies over speed, engine orders as rays; "
-    "marked where an order meets a mode. Drawn are orders 1 to 5 and those next to the scene's "
-    "own; the table of crossings has all orders.",
+    "marked where an order meets a mode. Of orders 1 to 5 and those next to the scene's own "
+    "the ones that cross a mode are drawn; the table of crossings has all orders.",
     "modes/interference": "Natural frequencies against the engine orders at the operating speed.",
     "modes/stresses_of_modes": "Where the blade is stressed most: by rotation and heat, by each of "
     "the first modes scaled to a largest displacement of 1 mm, and, where a linear response was "

@@ -22,6 +22,7 @@ from ..io.run_folder import given_fields
 from ..io.stage_cache import on_root, write_results
 from ..scene.tables import Scene
 from ..scene.toml import dump_scene
+from ..scene.units import show
 from ..study.modes.campbell import Campbell
 from ..study.modes.comparison import family_table
 from ..study.modes.crossings import fold_order, wave_sense
@@ -242,7 +243,7 @@ def _report(
         run.timings,
         page=Page(
             live,
-            _numbers(excited, families, result),
+            _numbers(excited, families, result, run.scene.operation.speed),
             [] if result.convergence is not None else [MESH_STEP],
             "report_modes",
             f"{run.scene.kind}, natural frequencies and mode shapes",
@@ -263,8 +264,11 @@ def _numbers(
     excited: ModeSet,
     families: Sequence[str],
     result: Survey,
+    speed: float,
 ) -> list[Headline]:
-    """The first frequencies above zero with the error of the mesh, where that is known."""
+    """The first frequencies above zero with the error of the mesh, where that is known, and the
+    speed [rad/s] that they belong to.
+    """
     elastic = np.flatnonzero(excited.frequencies > 0)[:MAX_HEADLINES]
     errors = {}
     if result.convergence is not None:
@@ -284,12 +288,13 @@ def _numbers(
     diameter = (
         "" if excited.nodal_diameter is None else f"nodal diameter {excited.nodal_diameter}; "
     )
+    turning = f"at {show(speed, 'rad/s', 5)}" if speed else "at rest"
     return [
         Headline(
             f"mode {i + 1}, {families[i]}",
             f"{excited.frequencies[i]:.5g} Hz",
             f"± {percent(errors[i + 1])} (mesh)" if i + 1 in errors else "mesh error not studied",
-            f"{diameter}residual {excited.residuals[i]:.0e}",
+            f"{diameter}{turning}; residual {excited.residuals[i]:.0e}",
         )
         for i in elastic
     ]

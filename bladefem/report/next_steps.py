@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
+from bladefem.scene.fields import value_at
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 
@@ -15,6 +16,8 @@ from .statements import best_mass
 
 # of the damper's own load: nearer to the optimum, another mass changes little
 NEAR_OPTIMUM = 0.15
+# density [kg/m^3] of metals: magnesium to tungsten
+METAL_DENSITIES = (1700.0, 20000.0)
 
 
 def next_steps(
@@ -71,10 +74,25 @@ def _mass_step(
             f"The damper's own {1e3 * mass:.3g} g press it nearly at the optimum: keep its mass."
         ]
     wanted, _ = best_mass(best, mass / load, masses)
+    density = _drawn_density(scene) * best["load"] / load
+    if density < METAL_DENSITIES[0] or density > METAL_DENSITIES[1]:
+        return [
+            f"No metal damper of this shape makes the best load at this speed: it takes {wanted} "
+            f"in place of {1e3 * mass:.3g} g, {density:.3g} kg/m^3 in the shape drawn, where "
+            f"metals have {METAL_DENSITIES[0]:g} to {METAL_DENSITIES[1]:g}. Change its size or "
+            "flanks (damper.length, damper.base, damper.angle); study.own_load = true tells what "
+            "it does as drawn."
+        ]
     return [
         f"Change the damper's mass from {1e3 * mass:.3g} g to {wanted}, and confirm with "
         f"{kind_named(scene.kind).damper_mass} = '{wanted}' and study.own_load = true."
     ]
+
+
+def _drawn_density(scene: Scene) -> float:
+    """Density [kg/m^3] of the damper as drawn; NaN where its mass is given, whatever its shape."""
+    given = value_at(scene, kind_named(scene.kind).damper_mass)
+    return scene.material.damper.rho if given is None else np.nan
 
 
 def _stress_step(best: pd.Series) -> list[str]:

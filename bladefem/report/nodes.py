@@ -152,7 +152,7 @@ def save_cycles_vtu(
     fields: dict[str, np.ndarray] = {}
     for c in cycles:
         at = f"at {newtons(c.load)}" + ("" if c.mass is None else f", {1e3 * c.mass:.6g} g")
-        fields |= {f"friction work [J/m2] {at}": c.work, f"state {at}": c.state}
+        fields |= {f"friction work [J/m^2] {at}": c.work, f"state {at}": c.state}
         fields |= {
             f"share of {name} {at}": c.shares[:, k]
             for k, name in enumerate(("stick", "slip", "separation"))

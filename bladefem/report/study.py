@@ -18,6 +18,7 @@ from ..study.pipeline.curve import Curve
 from ..study.pipeline.design_table import design_table
 from ..study.pipeline.run_records import Response
 from ..util.message import by_level, warning
+from ..util.percent import percent
 from ..view.study import BALANCE, LINEAR, MARCH, STIFF_LAYER, UNSTABLE, draw_study
 from .best_load import error_words, lowest_of_response
 from .best_value import are_determined, value_headlines
@@ -39,6 +40,8 @@ class Variant:
     response: Response
     # of its run (``warnings_of_variant``)
     warnings: Sequence[str] = ()
+    # load of a seat by the damper's own mass [N], where the scene studies it
+    own: float | None = None
 
 
 def write_study(
@@ -99,6 +102,7 @@ def _report(
             "spacing of points, in the report of the value",
             f"{best['free_frequency']:.5g} Hz without damper",
         ),
+        *own_headlines(table),
     ]
     shown = {
         "response/best_load_of_each_value": with_texts(table, [name], variants),
@@ -224,10 +228,45 @@ def study_tables(variants: Sequence[Variant]) -> tuple[pd.DataFrame, pd.DataFram
                 "free_frequency": rows["peak_frequency"].iloc[0],
                 "free_amplitude": rows["peak_amplitude"].iloc[0],
                 **damped.loc[damped["peak_amplitude"].idxmin()].drop("value"),
+                **_under_own_load(variant, damped),
             }
         )
         every.append(rows)
     return pd.DataFrame(best).infer_objects(), pd.concat(every, ignore_index=True)
+
+
+def _under_own_load(variant: Variant, damped: pd.DataFrame) -> dict[str, float]:
+    """What the damper does under the load that its own mass makes; nothing where that was not
+    studied.
+    """
+    if variant.own is None or "mass" in damped:
+        return {}
+    there = damped.loc[(damped["load"] - variant.own).abs().idxmin()]
+    return {
+        "own_load": there["load"],
+        "own_frequency": there["peak_frequency"],
+        "own_amplitude": there["peak_amplitude"],
+        "own_error": there["error"],
+    }
+
+
+def own_headlines(table: pd.DataFrame) -> list[Headline]:
+    """From where to where the amplitudes of the damper as it is go, over the values."""
+    if "own_amplitude" not in table or not table["own_amplitude"].notna().any():
+        return []
+    low, high = (
+        table.loc[place]
+        for place in (table["own_amplitude"].idxmin(), table["own_amplitude"].idxmax())
+    )
+    return [
+        Headline(
+            f"resonance amplitude under the damper's own load, {word}",
+            f"{1e6 * row['own_amplitude']:.4g} µm",
+            "unknown" if not np.isfinite(row["own_error"]) else f"± {percent(row['own_error'])}",
+            f"{row['value']}: {newtons(row['own_load'], 4)} on each seat",
+        )
+        for word, row in (("smallest", low), ("largest", high))
+    ]
 
 
 def given_by(curve: Curve) -> str:

@@ -18,6 +18,7 @@ from .study import (
     Variant,
     end_words,
     load_words,
+    own_headlines,
     study_tables,
     warnings_of_all,
     with_texts,
@@ -46,6 +47,7 @@ def write_map(
     files += write_value_tables(
         loads, names, variants, folder / "study_loads", "all loads of each value"
     )
+    own = own_headlines(best)
     best = with_texts(best, names, variants)
     picture = folder / "study.png"
     draw_map(best, values, names, picture)
@@ -60,6 +62,7 @@ def write_map(
             load_words(top["load"], loads),
         )
     )
+    numbers += own
     loads = with_texts(loads, names, variants)
     pages = _page(names, variants, (best, loads), picture, numbers, folder, "response/study_map")
     return best, [*files, picture, *pages]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import unicodedata
 from collections.abc import Iterator, Mapping
 from types import NoneType
@@ -17,6 +18,10 @@ MOST_VALUES = 1000
 SUGGESTION_START = "did you mean '"
 # ends of a text that gives a share
 PERCENT = ("%", "percent")
+
+
+# "1,5 g", which half of the world writes for 1.5 g
+_AMBIGUOUS_COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\s\d.,+-][^,]*?)\s*")
 
 
 class Field(NamedTuple):
@@ -155,6 +160,12 @@ def _parse_tuple(
     length = None if kinds[-1] is Ellipsis else len(kinds)
     if length is not None and len(items) != length:
         raise InputError(f"{field.name} = {shortened(value)}: expected {length} values")
+    if length is None and isinstance(value, str) and (comma := _AMBIGUOUS_COMMA.fullmatch(value)):
+        whole, rest = comma.groups()
+        raise InputError(
+            f"{field.name} = '{shortened(value)}': one value or two, expected '{whole}.{rest}' or "
+            f"'{whole}, {rest}'"
+        )
     if not items:
         raise InputError(f"{field.name} = {shortened(value)}: expected at least one value")
     if len(items) > MOST_VALUES:

@@ -17,6 +17,7 @@ from .fields import Field, convert_value, display_value, each_field, field_at, v
 from .kinds import KINDS, kind_named
 from .other_blades import whole_entry
 from .tables import Scene
+from .toml_slips import slip_of_pen
 from .units import shortened, show_exactly
 from .validate import validate
 
@@ -77,13 +78,18 @@ def read_tables(path: str | Path, overrides: Iterable[str] = ()) -> dict[str, An
             ) from None
         wanted = "scene file" if path.suffix else "scene file or run folder"
         raise InputError(f"{path}: there is no such {wanted}{_nearby_scenes(path)}") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
         raise InputError(f"{path}: cannot be read as a scene file ({error})") from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path}: cannot be read as a scene file, expected text in UTF-8 (byte {error.start} "
+            "is none of it); editors save it as such"
+        ) from None
     except RecursionError:
         raise InputError(f"{path}: not a scene, its lists or tables are nested too deep") from None
     except ValueError as error:
         # TOMLDecodeError, and integers of more digits than Python converts
-        raise InputError(f"{path}: not valid TOML: {error}") from None
+        raise InputError(f"{path}: not valid TOML: {error}{slip_of_pen(path, error)}") from None
     for override in overrides:
         name, value = _split_override(override)
         _put_value(tables, name, value)
@@ -318,6 +324,6 @@ def _nearby_scenes(path: Path) -> str:
 def _is_scene(path: Path) -> bool:
     """A TOML file with a kind of scene in it."""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8")).get("kind") in KINDS
+        return tomllib.loads(path.read_text(encoding="utf-8-sig")).get("kind") in KINDS
     except (OSError, ValueError):
         return False

@@ -238,8 +238,21 @@ def _split_number(
         raise InputError(f"{name} = {shortened(value)}: expected a number{_in_unit(unit)}")
     match = _NUMBER.fullmatch(value)
     if not match:
-        raise InputError(f"{name} = {shortened(repr(value))}: expected {_expected(unit)}")
+        point = _with_point(value)
+        meant = f"; decimals have a point, '{point}'" if point else ""
+        raise InputError(f"{name} = {shortened(repr(value))}: expected {_expected(unit)}{meant}")
     return float(match[1]), match[2] or ""
+
+
+def _with_point(text: str) -> str:
+    """A number whose decimals follow a comma, as half of the world writes it, with a point; else
+    nothing.
+
+    >>> _with_point("140,5 mm"), _with_point("1, 2"), _with_point("1,2,3")
+    ('140.5 mm', '', '')
+    """
+    point = re.sub(r"^(\s*[+-]?\d+),(?=\d)", r"\1.", text)
+    return point.strip() if point != text and _NUMBER.fullmatch(point) else ""
 
 
 def _parse_dimension(

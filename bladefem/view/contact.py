@@ -20,12 +20,11 @@ from bladefem.data import Patch, PressureMap
 from ..scene.units import newtons
 from .mesh import write_vtu
 from .skin import split_faces
-from .style import COLOURS, canvas, headline
+from .style import COLOURS, SEAT_COLOURS, canvas, headline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-PRESSURE_COLOURS = "inferno_r"
 # faces that nothing presses
 OPEN_FACE_COLOUR = "#e6e6e6"
 # corners of a face: VTK's number for line, triangle, quadrilateral
@@ -127,7 +126,7 @@ def save_faces_vtu(
     grid = pyvista.UnstructuredGrid(
         table, kinds, np.concatenate([p.points for p in patches]).astype(float)
     )
-    grid.point_data["area [m2]"] = np.concatenate([p.area for p in patches])
+    grid.point_data["area [m^2]"] = np.concatenate([p.area for p in patches])
     grid.point_data["normal"] = np.concatenate([p.frame[:, 0] for p in patches])
     for name, values in fields.items():
         grid.point_data[name] = np.asarray(values)
@@ -174,7 +173,7 @@ def draw_pressure(
             ax.set_title(caption(seat, ", " if stacked else ",\n"), fontsize=9, fontweight="normal")
         figure = axes[0, 0].figure
         if not line:
-            add_colourbar(axes, peak, PRESSURE_COLOURS, "contact pressure [MPa]")
+            add_colourbar(axes, peak, SEAT_COLOURS, "contact pressure [MPa]")
         label_outer(axes, line)
         common_legend(axes, ncols=3)
         headline(figure, title or "contact pressure" + ("" if line else ", faces unfolded"))
@@ -284,7 +283,7 @@ def colour_pressure(
             flat,
             seat.pressure / 1e6,
             shading="gouraud",
-            cmap=PRESSURE_COLOURS,
+            cmap=SEAT_COLOURS,
             norm=norm,
             rasterized=True,
         )

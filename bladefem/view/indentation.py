@@ -16,8 +16,8 @@ from matplotlib.patches import Patch
 from bladefem.data import PressureMap
 
 from ..scene.units import newtons
-from .contact import OPEN_FACE_COLOUR, PRESSURE_COLOURS, colour_pressure
-from .style import COLOURS, canvas, headline
+from .contact import OPEN_FACE_COLOUR, colour_pressure
+from .style import COLOURS, SEAT_COLOURS, canvas, headline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -96,7 +96,7 @@ def _from_above(
         label="edge, closed form",
     )
     ax.figure.colorbar(
-        ScalarMappable(norm, PRESSURE_COLOURS),
+        ScalarMappable(norm, SEAT_COLOURS),
         ax=ax,
         label="contact pressure [MPa]",
         aspect=25,

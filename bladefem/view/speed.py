@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
+from matplotlib.patheffects import withStroke
 
 from ..scene.units import RPM
 from .style import COLOURS, FAILED_COLOUR, canvas
@@ -360,7 +361,8 @@ def draw_excitations(
             ha="center",
             va="top",
             zorder=6,
-            bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.5},
+            # an outline, not a box: that washes out the modes below it
+            path_effects=[withStroke(linewidth=1.5, foreground="white")],
         )
         near = table[
             (table["nodal_diameter"] == n) & ((table["frequency"] / max(f, 1e-9) - 1).abs() < close)

@@ -37,7 +37,8 @@ def draw_study(
     Args:
         table: one row a value: axis (number or text), value (text), peak_amplitude [m],
             peak_frequency [Hz], free_amplitude [m], free_frequency [Hz], load [N], error (NaN: not
-            estimated, inf: unknown), given_by (words of this file).
+            estimated, inf: unknown), given_by (words of this file); own_amplitude [m] and
+            own_frequency [Hz] under the damper's own load where that was studied.
         loads: one row a load of each value: value, load [N], peak_amplitude [m], error, given_by.
         file: PNG to write.
         label: of the axis of values.
@@ -63,6 +64,14 @@ def draw_study(
                 color=COLOURS[0],
                 label="best load",
             )
+            if f"own_{column}" in table:
+                axis.plot(
+                    table["axis"],
+                    scale * table[f"own_{column}"],
+                    "^-.",
+                    color=COLOURS[1],
+                    label="damper's own load",
+                )
         amplitude = MICRO * table["peak_amplitude"]
         draw_certainty(axes[0, 0], table["axis"], amplitude, table, COLOURS[0])
         axes[0, 0].set(ylabel="resonance amplitude [µm]", title=title)

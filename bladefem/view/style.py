@@ -12,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axis import Axis
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
 # Okabe and Ito, Color Universal Design (2008); yellow last because it is weak on white.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 SEQUENTIAL_COLOURS = "viridis"
+# of seats, pale to purple: the black at the end of "inferno_r" hides marks, and prints an even
+# pressure, which is the largest everywhere, as a black page
+SEAT_COLOURS = ListedColormap(colormaps["inferno_r"](np.linspace(0.0, 0.7, 256)), "seats")
 DIVERGING_COLOURS = "RdBu_r"
 INK_COLOUR = "#222222"
 # pixels of the window to one of the picture, along each side, in place of several samples a pixel

@@ -15,12 +15,11 @@ from bladefem.data import Patch
 
 from .contact import add_colourbar, arrangement, common_legend, label_outer, seat_name, unfold
 from .skin import split_faces
-from .style import COLOURS, canvas, headline
+from .style import COLOURS, SEAT_COLOURS, canvas, headline
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-WORK_COLOURS = "inferno_r"
 STATE_MARKERS = {
     0: ("o", "separated"),
     1: ("s", "stuck"),
@@ -60,7 +59,7 @@ def draw_work(
             )
         figure = axes[0, 0].figure
         if not line:
-            add_colourbar(axes, most, WORK_COLOURS, "friction work [J/m²]")
+            add_colourbar(axes, most, SEAT_COLOURS, "friction work [J/m²]")
         label_outer(axes, line)
         common_legend(axes, ncols=2)
         headline(figure, title or "friction work of a period")
@@ -80,7 +79,7 @@ def _draw_face(
         Triangulation(xy[:, 0], xy[:, 1], triangles),
         work,
         shading="gouraud",
-        cmap=WORK_COLOURS,
+        cmap=SEAT_COLOURS,
         vmin=0,
         vmax=most,
         rasterized=True,

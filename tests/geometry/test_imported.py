@@ -465,6 +465,24 @@ def test_nastran_with_faces_as_shells(tmp_path):
     assert body_volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("begins", "ends"), [("", ""), ("", "ENDDATA\nafter it"), ("SOL 103\nbegin bulk", "enddata")]
+)
+def test_bulk_data_without_its_statements(tmp_path, begins, ends):
+    """A file to be included has none of them, as gmsh writes bulk data; small letters are legal.
+    Without an end meshio refuses them.
+    """
+    block = box((4, 2, 2), (0.1, 0.02, 0.03), "tetra10")
+    cells = block.bodies["blade"][:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]]
+    reference = {"nastran:ref": [np.ones(len(cells), int)]}
+    whole = tmp_path / "whole.bdf"
+    meshio.write(whole, meshio.Mesh(block.points, [("tetra10", cells)], cell_data=reference))
+    bulk = whole.read_text().partition("BEGIN BULK\n")[2].partition("ENDDATA")[0]
+    (tmp_path / "a.bdf").write_text("\n".join(filter(None, (begins, bulk.strip(), ends))))
+    found = read_mesh(tmp_path / "a.bdf")
+    assert body_volume(found, "blade") == pytest.approx(0.1 * 0.02 * 0.03, rel=1e-6)
+
+
 def test_a_nastran_deck_of_blade_and_damper_runs_to_the_report(tmp_path, capsys):
     """Looked at, named by its properties, and run: what the same mesh gives from gmsh's file, but
     for the ten digits of a node.

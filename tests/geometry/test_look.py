@@ -7,6 +7,7 @@ from pathlib import Path
 import decks
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from structured import box
 
 import bladefem
@@ -218,3 +219,35 @@ def test_a_drawing_without_cut_faces_asks_for_the_number_of_blades(tmp_path):
     assert found.cut is None
     assert found.missing[0].startswith("imported.sectors")
     assert "# no cut faces were found" in starting_scene(found)
+
+
+def test_cut_faces_are_found_where_nodes_inside_do_not_match(tmp_path):
+    """Free triangles on both sides of a sector of 24, as most meshes of others have them."""
+    angle = 2 * np.pi / 24
+    with gmsh_session() as gmsh:
+        occ = gmsh.model.occ
+        disc = occ.addCylinder(0, 0, 0, 0, 0, 30, 200, angle=angle)
+        bore = occ.addCylinder(0, 0, -1, 0, 0, 32, 100)
+        sector, _ = occ.cut([(3, disc)], [(3, bore)])
+        occ.rotate(sector, 0, 0, 0, 0, 0, 1, -angle / 2)
+        blade = occ.addBox(195, -4, 5, 80, 8, 20)
+        occ.fuse(sector, [(3, blade)])
+        occ.synchronize()
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 15)
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 8)
+        gmsh.model.mesh.generate(3)
+        gmsh.model.mesh.setOrder(2)
+        gmsh.model.addPhysicalGroup(3, [tag for _, tag in gmsh.model.getEntities(3)], name="all")
+        gmsh.write(str(tmp_path / "sector.msh"))
+    found = look_at(tmp_path / "sector.msh")
+    assert found.cut is not None and (found.cut.axis, found.cut.sectors) == ("z", 24)
+    # nodes inside are elsewhere, by polar coordinates of all nodes on the two planes
+    x = found.raw.points
+    radius, turn = np.hypot(x[:, 0], x[:, 1]), np.arctan2(x[:, 1], x[:, 0])
+    low, high = (
+        np.stack([radius, x[:, 2]], axis=1)[np.abs(turn - side * angle / 2) < 1e-6]
+        for side in (-1, 1)
+    )
+    assert cKDTree(low).query(high)[0].max() > 0.5
+    names = tomllib.loads(starting_scene(found))["imported"]["names"]
+    assert [name.split(" ")[0] for name in names] == ["cyclic_low", "cyclic_high", "clamp"]

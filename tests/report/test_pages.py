@@ -61,7 +61,7 @@ def test_frequencies_say_whether_the_mesh_was_studied(studied):
     # the second frequency is of another mesh
     summary = pd.DataFrame({"mode": [1, 2], "frequency": [100.0, 245.1], "error": [0.004, 0.01]})
     result = SimpleNamespace(convergence=SimpleNamespace(summary=summary) if studied else None)
-    first, second = _numbers(modes, ["flap", "edge"], result)
+    first, second = _numbers(modes, ["flap", "edge"], result, 0.0)
     assert first.what == "mode 1, flap"
     assert second.value == "250 Hz"
     assert first.uncertainty == ("± 0.4 % (mesh)" if studied else "mesh error not studied")

@@ -480,6 +480,22 @@ def test_next_steps_name_the_mass_to_try():
     assert next_steps(Scene(), ["widen"], summary, own)[0] == "widen"
 
 
+@pytest.mark.parametrize(("own_load", "metal"), [(200.0 * 4.0, True), (200.0 * 46.0, False)])
+def test_no_mass_is_advised_that_no_metal_gives_the_shape(own_load, metal):
+    """A blade of 62 mm at 7500 rpm was told to make its steel wedge of 12.5 g one of 0.273 g, whose
+    density is that of balsa: 7850 kg/m^3 * 0.273 / 12.5.
+    """
+    summary = synthetic.summary()
+    own = pd.DataFrame({"mass": [0.012], "speed": [800.0], "load": [own_load]})
+    (step, *_) = next_steps(Scene(), [], summary, own)
+    assert step.startswith("Change the damper's mass") == metal
+    if not metal:
+        assert step.startswith("No metal damper of this shape") and "171 kg/m^3" in step
+    # a mass that is given has the density that it takes
+    heavy = next_steps(vary(Scene(), "damper.mass", "12 g"), [], summary, own)
+    assert heavy[0].startswith("Change the damper's mass")
+
+
 def test_an_assumed_contact_stiffness_is_told():
     """Whichever of the stiffnesses is given, for both seats or for each, nothing is assumed."""
     pressed = pd.DataFrame({"mean_pressure": [3.3e5, 3.3e6]})

@@ -82,6 +82,34 @@ def test_best_load_of_each_value(field, texts, head, tmp_path):
     assert "with 20 N on each seat, the smallest load studied" in page
 
 
+def test_the_damper_as_it_is_stands_beside_the_best_load(tmp_path):
+    """Over speeds it has no best load to choose: its own one grows with their square."""
+    texts, amplitudes = ("6000 rpm", "9000 rpm"), ((3e-5, 5e-5, 9e-5), (2e-5, 4e-5, 8e-5))
+    variants = [
+        Variant(text, vary(Scene(), "operation.speed", text), response(*some), own=own)
+        for text, some, own in zip(texts, amplitudes, (40.01, 60.02), strict=True)
+    ]
+    table, _ = study_tables(variants)
+    assert list(table["own_load"]) == [40.0, 60.0] and list(table["own_amplitude"]) == [5e-5, 8e-5]
+    _, files = write_study("operation.speed", variants, tmp_path)
+    page = files[-1].read_text(encoding="utf-8")
+    assert "the damper's own load, smallest: **50 µm**, ± 1 % (6000 rpm: 40 N on each seat)" in page
+    assert "the damper's own load, largest: **80 µm**, ± 1 % (9000 rpm: 60 N on each seat)" in page
+    assert {"own_load [N]", "own_amplitude [m]", "own_frequency [Hz]", "own_error"} <= {
+        *pd.read_csv(tmp_path / "study.csv")
+    }
+    mus = ("0.2", "0.3")
+    four = [
+        replace(one, scene=vary(one.scene, "contact.mu", mu), text=f"{one.text}; {mu}")
+        for one in variants
+        for mu in mus
+    ]
+    _, files = write_map(("operation.speed", "contact.mu"), (texts, mus), four, tmp_path)
+    assert "(9000 rpm; 0.2: 60 N on each seat)" in files[-1].read_text(encoding="utf-8")
+    # not where nobody asked for it
+    assert "own_load" not in study_tables([replace(one, own=None) for one in variants])[0]
+
+
 def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
     names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3", "0.4"))
     variants = [

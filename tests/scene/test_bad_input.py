@@ -10,6 +10,7 @@ from bladefem.errors import InputError
 from bladefem.scene.fields import convert_value, field_at
 from bladefem.scene.tables import Contact, Scene
 from bladefem.scene.toml import load_scene, scene_of
+from bladefem.scene.units import parse
 from bladefem.scene.validate import validate
 
 WEDGE = Path(__file__).with_name("wedge.toml")
@@ -184,6 +185,61 @@ def test_files_that_are_no_scenes(tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             load_scene(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("line", "meant"),
+    [
+        ("span = 95 mm", 'span = 95 mm: a value with a unit stands in quotes, "95 mm"'),
+        ("span = 95,5 mm  # new", 'a value with a unit stands in quotes, "95.5 mm"'),
+        ("fillet = 0,002", "fillet = 0,002: decimals have a point, 0.002"),
+        ("span = \u201c95 mm\u201d", "expected straight quotation marks"),
+        ("loads = [9 N, 18 N]", "each value with a unit stands in quotes"),
+        ("span = = 3", "(at line 4, column 8)"),
+    ],
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_lines_that_are_no_toml_say_how_they_are_meant(tmp_path, line, meant, end):
+    """As they are typed by those who have not read what TOML is."""
+    file = tmp_path / "a.toml"
+    lines = ['kind = "wedge sector"', "", "[aerofoil]", line, ""]
+    file.write_bytes(end.join(lines).encode())
+    with pytest.raises(InputError) as refused:
+        load_scene(file)
+    assert "at line 4" in str(refused.value) and str(refused.value).endswith(meant) == (
+        "straight" not in meant
+    )
+    assert meant in str(refused.value) and "\n" not in str(refused.value)
+
+
+def test_a_decimal_comma_is_told():
+    for text, meant in (("140,5 mm", "140.5 mm"), ("1,5", "1.5"), ("-0,5e-3 m", "-0.5e-3 m")):
+        with pytest.raises(InputError, match=f"; decimals have a point, '{meant}'$"):
+            parse(text, "m", "aerofoil.span")
+    with pytest.raises(InputError) as refused:
+        parse("1,2,3 mm", "m")
+    assert "decimals" not in str(refused.value)
+
+
+def test_a_list_that_may_be_a_decimal_comma_is_refused():
+    """Two masses of 1 g and 5 g were studied for "1,5 g"."""
+    for name, text, meant in (
+        ("study.masses", "1,5 g", "expected '1.5 g' or '1, 5 g'"),
+        ("study.loads", "69,7N", "expected '69.7N' or '69, 7N'"),
+    ):
+        with pytest.raises(InputError) as refused:
+            convert_value(text, field_at(name))
+        assert str(refused.value).startswith(f"{name} = ") and str(refused.value).endswith(meant)
+    loads = field_at("study.loads")
+    assert convert_value("20, 50 N", loads) == convert_value("20 N,50 N", loads) == (20.0, 50.0)
+    assert convert_value("20,50,80 N", loads) == (20.0, 50.0, 80.0)
+    assert convert_value("300,500 Hz", field_at("study.band")) == (300.0, 500.0)
+
+
+def test_scenes_with_a_byte_order_mark_are_offered(tmp_path):
+    (tmp_path / "first.toml").write_text('kind = "punch"\n', encoding="utf-8-sig")
+    with pytest.raises(InputError, match="did you mean '.*first.toml'"):
+        load_scene(tmp_path / "frist.toml")
 
 
 def test_scenes_of_a_similar_name_are_offered(tmp_path):

@@ -81,8 +81,8 @@ def test_byte_order_mark_is_no_mistake(tmp_path):
 # what only the mesher, the seating or the balance refused before
 WITHOUT_A_MESH = [
     ("mesh.scale=0.02", "mesh.scale = 0.02: gives about"),
-    ("mesh.size=0.1 mm", "mesh.size = 0.0001 m: gives about"),
-    ("mesh.contact_size=1 um", "mesh.contact_size = 1e-06 m: gives about"),
+    ("mesh.size=0.1 mm", "mesh.size = 100 um: gives about"),
+    ("mesh.contact_size=1 um", "mesh.contact_size = 1 um: gives about"),
     ("support.clamp=rooot", "support.clamp = 'rooot': a scene of kind 'wedge sector' has no face"),
     (
         'support.directions=["rim: z"]',
@@ -191,6 +191,11 @@ def test_what_a_reader_prints_is_its_reason(tmp_path, capsys):
 @pytest.mark.parametrize(("override", "said"), WITHOUT_A_MESH, ids=lambda v: str(v)[:40])
 def test_check_refuses_without_a_mesh(override, said):
     assert said in refused(load_scene, WEDGE, [override])
+
+
+def test_of_two_sizes_the_smaller_one_is_to_blame():
+    sizes = ["mesh.size=5 mm", "mesh.contact_size=1 um"]
+    assert "mesh.contact_size = 1 um: gives about" in refused(load_scene, WEDGE, sizes)
 
 
 def test_a_force_on_the_fillet_needs_one():

@@ -166,7 +166,7 @@ def test_pictures_and_paraview(tmp_path):
     draw_wear(patches, cycle, tmp_path / "work.png")
     assert (tmp_path / "work.png").stat().st_size > 10_000
     grid = pyvista.read(save_cycles_vtu(patches, [cycle], tmp_path / "work.vtu"))
-    np.testing.assert_allclose(grid["friction work [J/m2] at 80 N"], cycle.work)
+    np.testing.assert_allclose(grid["friction work [J/m^2] at 80 N"], cycle.work)
     np.testing.assert_allclose(grid["share of slip at 80 N"], 1)
 
 

@@ -12,7 +12,9 @@ from bladefem.report.response_points import linear_points
 from bladefem.report.statements import response_answer
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline import pipeline
+from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.bodies import Bodies
+from bladefem.study.pipeline.case_models import middle_case
 from bladefem.study.pipeline.damper_contact import contact_patches
 from bladefem.study.pipeline.design_table import design_table
 from bladefem.study.pipeline.linear_limits import full_stick
@@ -37,6 +39,17 @@ def test_weighted_damper_is_the_one_with_that_density():
         a, b = receptance(scaled.damper, omega), receptance(meshed.damper, omega)
         assert abs(a - b).max() < 1e-7 * abs(b).max()
     assert with_damper_mass(meshed, None) is meshed
+
+
+@pytest.mark.parametrize("masses", [(None,), (1e-3, 5e-3), (1e-3, 3e-3, 5e-3)])
+@pytest.mark.parametrize("loads", [(5.0, 40.0, 300.0), (300.0, 5.0, 40.0)])
+def test_modes_are_chosen_under_a_middle_load(masses, loads):
+    """Of two masses the first load of the second one stood in the middle of the list: 5 N, at which
+    the damper of a blade of 95 mm lifts off, so that the run was refused.
+    """
+    cases = [LoadCase(load, None, None, mass) for mass in masses for load in loads]
+    assert middle_case(cases).load == 40.0
+    assert middle_case(cases).mass == masses[len(masses) // 2]
 
 
 @pytest.fixture(scope="module")

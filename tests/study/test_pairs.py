@@ -56,6 +56,9 @@ def test_loads_that_the_mesh_cannot_show_are_refused():
     # elements of 0.8 mm, two of which are wider than the contact
     with pytest.raises(InputError, match=r"study\.loads = .*made for 12\.\d* kN to 17\.9\d* kN"):
         solve_pair(vary(HERTZ, mesh__contact_size=1e-4, mesh__scale=8.0))
+    # elements of 5 mm: as wide as the body, which told of "3.08 MN to 17.9 kN"
+    with pytest.raises(InputError, match=r"contact_radius = 1 mm: too small for elements of 5 mm"):
+        solve_pair(vary(HERTZ, mesh__contact_size=1e-4, mesh__scale=50.0))
     with pytest.raises(InputError, match="expected hertz or punch"):
         solve_pair(load_scene("scenes/plane.toml"))
 

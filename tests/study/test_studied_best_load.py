@@ -235,6 +235,26 @@ def test_a_resonance_that_falls_to_the_end_of_all_loads_has_no_best():
     assert len(found.curves) == 2 + MAX_ADDED_LOADS and found.best[0].kept is None
 
 
+def test_a_load_whose_resonance_is_hardly_known_is_not_studied_again():
+    """A short blade had 21 N three times: proposed between its neighbours, as its own error kept it
+    out of the comparison.
+    """
+    found = best(25.72)
+    given = [case(load) for load in (13.0, 17.15, 25.72, 51.0)]
+
+    def curve_at(one):
+        new = curve(one.load, kept_amplitude(one.load, 22.0), unstable="torus")
+        if one.load not in [c.load for c in given]:
+            new.error = 0.21
+        return new
+
+    started = StudiedLoads(given, [curve_at(one) for one in given], [found])
+    ended = study_kept_loads(started, searches_of([found]), curve_at, 0.05)
+    loads = np.array([c.load for c in ended.curves])
+    assert len(loads) == len(given) + 1
+    assert np.all(np.diff(loads) / loads[:-1] > 0.02)
+
+
 def test_resonances_that_are_hardly_known_are_not_compared():
     """The lowest of several would be the one whose highest motion was missed."""
     given = [case(load) for load in (36.0, 79.68, 159.0)]

@@ -334,6 +334,19 @@ def test_open_nodes_are_in_the_legend_where_there_are_some(some_open):
     assert ("open node" in [text.get_text() for text in texts]) == some_open
 
 
+def test_an_even_pressure_is_no_black_page():
+    """The largest pressure of a seat is everywhere where it is pressed evenly. Luminance of WCAG
+    2.1: black on 0.04 has a contrast of 1.8; it was 0.
+    """
+    even = [replace(one, force=4e6 * one.patch.area) for one in synthetic.seats()]
+    figure = draw_pressure(even)
+    figure.canvas.draw()
+    *_, mesh = (c for c in figure.axes[0].collections if c.get_array() is not None)
+    shades = np.array(mesh.to_rgba(4.0)[:3])
+    linear = np.where(shades <= 0.04045, shades / 12.92, ((shades + 0.055) / 1.055) ** 2.4)
+    assert np.dot([0.2126, 0.7152, 0.0722], linear) > 0.04
+
+
 def test_pressure_for_paraview(folder):
     import pyvista
 
@@ -343,7 +356,7 @@ def test_pressure_for_paraview(folder):
         pressure = np.concatenate([s.pressure for s in seats])
         np.testing.assert_allclose(grid["pressure [Pa] at 80 N"], pressure)
         np.testing.assert_allclose(
-            grid["area [m2]"] @ grid["pressure [Pa] at 40 N"], sum(s.force.sum() for s in seats)
+            grid["area [m^2]"] @ grid["pressure [Pa] at 40 N"], sum(s.force.sum() for s in seats)
         )
 
 

@@ -22,7 +22,7 @@ from ..adaptive.checked_curve import CheckedCurve
 from ..adaptive.family import Family, family_of
 from ..adaptive.settings import first_for, restarted_settings, scene_line
 from ..pipeline.bodies import Bodies
-from ..pipeline.case_models import family_of_case, load_cases, reduced_sector
+from ..pipeline.case_models import family_of_case, load_cases, middle_case, reduced_sector
 from ..pipeline.pipeline import run
 from ..pipeline.reduced_sector import Reduced
 from ..stability.error_in_time import Marches
@@ -56,7 +56,7 @@ def scene_chart(
     bodies = Bodies(scene, done.mesh, comm)
     patches = list(done.contact.problem.patches)
     cases = load_cases(scene, done.mesh, done.contact)
-    case = cases[len(cases) // 2]
+    case = middle_case(cases)
 
     def stage(name: str, key: str, make: Callable[[], Reduced]) -> Reduced:
         return cached_stage(folder, name, key, make, comm)[0]

@@ -159,6 +159,14 @@ def _check_load(scene: Scene, load: float) -> None:
     low, high = (
         hertz_load(scene, a) for a in (MIN_ELEMENTS_PER_RADIUS * fine, MAX_RADIUS_RATIO * expected)
     )
+    if low > high:
+        # no load would do
+        raise InputError(
+            f"hertz.contact_radius = {show(expected, 'm')}: too small for elements of "
+            f"{show(fine, 'm')} on the contact, expected at most "
+            f"{show(MAX_RADIUS_RATIO * expected / MIN_ELEMENTS_PER_RADIUS, 'm')}; choose a smaller "
+            "mesh.contact_size or mesh.scale"
+        )
     if not low <= load <= high:
         raise InputError(
             f"{_said(scene, load)}: the contact radius would be "

@@ -63,6 +63,17 @@ def load_cases(
     ]
 
 
+def middle_case(cases: Sequence[LoadCase]) -> LoadCase:
+    """The middle load of the middle damper mass, for choices that are made once for all cases.
+
+    Not the middle of the list: of an even number of masses that is the first load of one of them,
+    under which the damper may lift off.
+    """
+    masses = list(dict.fromkeys(case.mass for case in cases))
+    own = [case for case in cases if case.mass == masses[len(masses) // 2]]
+    return sorted(own, key=lambda case: case.load)[len(own) // 2]
+
+
 def family_of_case(
     scene: Scene,
     mesh: Mesh,

@@ -12,7 +12,9 @@ from typing import Literal, overload
 from ...contact.peak_pressure import peak_remarks
 from ...data import ModeSet, Patch
 from ...errors import InputError, suggestion
+from ...io.run_folder import given_fields
 from ...scene.aerodynamics import has_flow, refuse_flow
+from ...scene.assumed import assumed_physics
 from ...scene.tables import Scene
 from ...scene.validate import refuse_response
 from ...scene.warnings import implausible_values
@@ -25,7 +27,7 @@ from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import mode_strength
 from .bodies import Bodies
 from .body_mesh import mode_errors
-from .case_models import judged_modes, load_cases, reduced_sector
+from .case_models import judged_modes, load_cases, middle_case, reduced_sector
 from .flutter import find_flutter, flutter_sentences, with_best_load
 from .history import refuse_jamming
 from .normal_modes import excited_modes, find_modes, responding_diameters
@@ -116,9 +118,8 @@ def run(
     if responds:
         refuse_response(scene)
         refuse_flow(scene)
-    keep = StageRunner(
-        folder, comm, StageClock({}, [*map(warning, implausible_values(scene))], progress)
-    )
+    doubts = [*implausible_values(scene), *_assumed(scene, folder)]
+    keep = StageRunner(folder, comm, StageClock({}, [*map(warning, doubts)], progress))
     meshed = _run_mesh(scene, keep)
     if until == "mesh":
         return meshed
@@ -148,6 +149,11 @@ def run(
         flutter = with_best_load(flutter, solved, bodies, patches, keep)
     keep.clock.messages.extend(flutter_sentences(flutter))
     return replace(solved, flutter=flutter)
+
+
+def _assumed(scene: Scene, folder: Folder) -> list[str]:
+    """What the folder's user did not give; unknown without a folder, and of scenes of a program."""
+    return [] if folder is None else assumed_physics(scene, given_fields(folder))
 
 
 def _run_mesh(scene: Scene, keep: StageRunner) -> Run:
@@ -244,7 +250,7 @@ def _run_reduction(
     with keep.clock("stresses"):
         stressed = keep.of_one_rank(strength, bodies)
     cases = load_cases(scene, mesh, before.contact)
-    middle = cases[len(cases) // 2]
+    middle = middle_case(cases)
     with keep.clock("reduction"):
         settings, reduced = reduced_sector(scene, bodies, middle, patches, keep)
         errors = keep.of_one_rank(_mode_errors_stage(before, before.modes, patches), bodies)

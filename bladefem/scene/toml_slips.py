@@ -1,0 +1,44 @@
+"""What was most likely meant by a line that is no TOML: a value without quotes, a decimal comma,
+quotation marks of a word processor.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from .units import shortened
+
+_PLACE = re.compile(r"at line (\d+), column \d+")
+_BARE = re.compile(r"\s*[\w.]+\s*=\s*(?P<value>[+-]?[\d.]+(?P<comma>,\d+)?[^#\[\]\"']*?)\s*(#.*)?")
+_BARE_LIST = re.compile(r"=\s*\[[^\"']*\d\s*[A-Za-z%]+[^\"']*$")
+_CURLED = "\u201c\u201d\u201e\u201f\u2018\u2019\u00ab\u00bb"
+
+
+def slip_of_pen(path: Path, error: ValueError) -> str:
+    """The end of a message: the line of the error and how it is meant to be written; nothing where
+    that is not known.
+
+    Args:
+        path: scene file, which could be read.
+        error: of the parser, which names the line.
+    """
+    place = _PLACE.search(str(error))
+    if place is None:
+        return ""
+    lines = path.read_text(encoding="utf-8-sig").split("\n")
+    number = int(place[1])
+    if number > len(lines):
+        return ""
+    line = lines[number - 1]
+    if any(letter in line for letter in _CURLED):
+        return f'; {shortened(line.strip())}: expected straight quotation marks, "..."'
+    if _BARE_LIST.search(line):
+        return f"; {shortened(line.strip())}: each value with a unit stands in quotes"
+    bare = _BARE.fullmatch(line.rstrip("\r"))
+    if bare is None:
+        return ""
+    value = bare["value"].replace(",", ".") if bare["comma"] else bare["value"]
+    if re.fullmatch(r"[+-]?[\d.]+", value):
+        return f"; {shortened(line.strip())}: decimals have a point, {value}"
+    return f'; {shortened(line.strip())}: a value with a unit stands in quotes, "{value}"'
