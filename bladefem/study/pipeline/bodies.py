@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
+# displacements for which the blade at rest is factorised
+STATIC_PARTS = ("swell", "thermal_displacement")
 
 
 @dataclass(frozen=True)
@@ -170,6 +172,15 @@ class Bodies:
             return SteadyState(found.displacement, speed, axis, large=True)
         u0 = speed**2 * self.swell + self.thermal_displacement
         return SteadyState(u0, speed, axis)
+
+    def steady_parts(self) -> dict[str, Any]:
+        """What :attr:`state` was made of, and itself, for bodies of the same mesh elsewhere."""
+        made = {"state": self.state}
+        return made | {name: vars(self)[name] for name in STATIC_PARTS if name in vars(self)}
+
+    def take_steady_parts(self, made: dict[str, Any]) -> None:
+        """Have the state that bodies on another rank have found, in place of a solve."""
+        vars(self).update(made)
 
     @property
     def on_large_state(self) -> bool:
