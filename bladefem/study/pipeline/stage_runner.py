@@ -102,9 +102,7 @@ class StageRunner:
             if rank == 0:
                 return alone.steady_parts()
             if rank == 1:
-                return cached_stage(
-                    self.folder, stage.name, stage.key, lambda: stage.compute(alone)
-                )
+                return cached_stage(self.folder, stage.name, stage.key, compute)
             # what follows needs its mesh and matrices
             assert alone.still_blade
             return None
