@@ -152,6 +152,9 @@ def transformation_about(t: Transformation, body: Body) -> Transformation:
     """The transformation of a body that has the nodes and constraints of ``t.body`` and another
     stiffness, as :func:`rotation.body_about` makes it: what does not depend on this serves both
     (collective).
+
+    Raises:
+        ValueError: ``t`` is not that of an open sector.
     """
     if t.opened is None:
         raise ValueError("the transformation is not that of an open sector")
