@@ -28,7 +28,7 @@ from .cut_faces import repeated_motion, tie_cut_faces
 from .cyclic_schur import FaceMap
 from .distributed import local_rows, to_petsc
 from .linalg import Doubled, Folded, Matrix, combined
-from .open_sector import Opened, boundary_map, columns_of_part, open_sector
+from .open_sector import Opened, boundary_map, columns_of_part, open_sector, with_stiffness
 from .supports import held_directions, polar_elimination
 
 
@@ -146,6 +146,19 @@ def transformation(
         None,
         sectors,
     )
+
+
+def transformation_about(t: Transformation, body: Body) -> Transformation:
+    """The transformation of a body that has the nodes and constraints of ``t.body`` and another
+    stiffness, as :func:`rotation.body_about` makes it: what does not depend on this serves both
+    (collective).
+
+    Raises:
+        ValueError: ``t`` is not that of an open sector.
+    """
+    if t.opened is None:
+        raise ValueError("the transformation is not that of an open sector")
+    return replace(t, body=body, opened=with_stiffness(t.opened, body))
 
 
 def high_part(t: Transformation) -> sp.csr_matrix:

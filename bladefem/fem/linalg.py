@@ -169,21 +169,24 @@ def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
     if isinstance(A, Folded):
         if A.shared is not None:
             return sum_of_parts(A.shared, _folded_product(A, whole_part(A.shared, X)))
-        if X.shape[1] <= COLUMNS_AT_A_TIME:
-            return _folded_product(A, X)
-        out = np.empty(X.shape, np.result_type(X, A.C.dtype), order="F")
-        for first in range(0, X.shape[1], COLUMNS_AT_A_TIME):
-            part = slice(first, first + COLUMNS_AT_A_TIME)
-            out[:, part] = _folded_product(A, X[:, part])
-        return out
+        return _folded_product(A, X)
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
     return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)
 
 
 def _folded_product(A: Folded, X: np.ndarray) -> np.ndarray:
-    """C^H A C X for unknowns (n_free, k) of one rank's part."""
-    return np.asfortranarray(A.C.conj().T @ times(A.A, A.C @ X))
+    """C^H A C X for unknowns (n_free, k) of one rank's part, a few columns at a time: what lies
+    between the three factors then stays near the core.
+    """
+    turned = A.C.conj().T
+    if X.shape[1] <= COLUMNS_AT_A_TIME:
+        return np.asfortranarray(turned @ times(A.A, A.C @ X))
+    out = np.empty(X.shape, np.result_type(X, A.C.dtype), order="F")
+    for first in range(0, X.shape[1], COLUMNS_AT_A_TIME):
+        part = slice(first, first + COLUMNS_AT_A_TIME)
+        out[:, part] = turned @ times(A.A, A.C @ X[:, part])
+    return out
 
 
 def combined(

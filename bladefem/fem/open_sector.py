@@ -4,8 +4,9 @@ nodal diameters.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import scipy.sparse as sp
@@ -17,7 +18,7 @@ from .distributed import local_rows, rows_of_rank, shared_rows, to_petsc
 from .memory import give_back
 from .open_matrix import OpenMatrix, Repeated, Selected
 from .ordering import interior_first
-from .subdomains import SharedBoundary, divide, matrix_share, share_boundary
+from .subdomains import Part, SharedBoundary, divide, matrix_share, share_boundary
 
 # largest difference of masses of two directions, of the largest mass: rounding
 SAME_MASS = 1e-14
@@ -41,6 +42,8 @@ class Opened:
     elimination: core.Elimination
     # (nb,) places of the boundary of all parts; empty on one rank
     boundary: np.ndarray
+    # K of a body with the same nodes and constraints (collective)
+    stiffness_of: Callable[[Body], OpenMatrix]
 
     @property
     def shared(self) -> SharedBoundary | None:
@@ -80,8 +83,9 @@ def open_sector(
     if len(rim) in (0, len(places)):
         return None
     if body.comm.size == 1:
-        both = _open_stiffness(body, T, start), _open_mass(body, T, start)
-        return _opened(body, T, places, both, rim, None, np.empty(0, int))
+        stiffness_of = partial(_open_stiffness, T=T, start=start)
+        both = stiffness_of(body), _open_mass(body, T, start)
+        return _opened(body, T, places, both, rim, None, np.empty(0, int), stiffness_of)
     part = shared = None
     shares = []
     for A in _open_matrices(body, T, start):
@@ -101,7 +105,19 @@ def open_sector(
     T_part = (T[:, members] @ sp.diags(mine.astype(float))).tocsr()
     T_part.eliminate_zeros()
     local_rim = np.arange(len(part.inside), len(members))
-    return _opened(body, T_part, places[members], (K, M), local_rim, shared, places[part.boundary])
+    stiffness_of = partial(_share_of_stiffness, part, T=T, start=start)
+    on_boundary = places[part.boundary]
+    return _opened(
+        body, T_part, places[members], (K, M), local_rim, shared, on_boundary, stiffness_of
+    )
+
+
+def with_stiffness(opened: Opened, body: Body) -> Opened:
+    """The open sector of a body of the same nodes and constraints with another stiffness, as
+    rotation gives it (collective): the mass and the order of the elimination serve both.
+    """
+    K = opened.stiffness_of(body)
+    return replace(opened, K=K, elimination=replace(opened.elimination, A=K, done=None))
 
 
 def columns_of_part(opened: Opened, A: sp.csr_matrix) -> sp.csr_matrix:
@@ -143,6 +159,7 @@ def _opened(
     rim: np.ndarray,
     shared: SharedBoundary | None,
     boundary: np.ndarray,
+    stiffness_of: Callable[[Body], OpenMatrix],
 ) -> Opened:
     """The record, with the order of the elimination."""
     K, mass = matrices
@@ -151,7 +168,7 @@ def _opened(
     # what building the matrices took is of no more use
     give_back()
     elimination = core.Elimination(K, rim, order, shared, body.plan.on_disk)
-    return Opened(T, places, K, M, elimination, boundary)
+    return Opened(T, places, K, M, elimination, boundary, stiffness_of)
 
 
 def _open_matrices(
@@ -203,6 +220,13 @@ def _open_stiffness(body: Body, T: sp.csr_matrix, start: np.ndarray) -> OpenMatr
         return _open_matrix(body, body.K, T, start)
     # open unknowns are numbered as the rows are
     return Selected(whole, body.scalar_rows[T.tocsc().indices], body.K)
+
+
+def _share_of_stiffness(
+    part: Part, body: Body, T: sp.csr_matrix, start: np.ndarray
+) -> sp.csr_matrix:
+    """This rank's share of the stiffness of an open sector that several ranks hold."""
+    return matrix_share(part, _open_matrix(body, body.K, T, start))
 
 
 def _selected(

@@ -14,12 +14,19 @@ from bladefem.fem import cyclic_schur as core
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
-from bladefem.fem.constraint import at_diameter, restrict_load, transformation, unknowns
+from bladefem.fem.constraint import (
+    at_diameter,
+    restrict_load,
+    transformation,
+    transformation_about,
+    unknowns,
+)
 from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.linalg import apply_block, mean_diagonal
 from bladefem.fem.modes import count_below
 from bladefem.fem.open_matrix import entries
 from bladefem.fem.ports import port_models
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.scene.tables import Material
 
 pytestmark = pytest.mark.mpi
@@ -155,3 +162,31 @@ def _ports(t):
         (np.ones(len(places)), (places, np.arange(len(places)))), (t.low.shape[0], len(places))
     )
     return P, {"all": slice(0, len(places))}
+
+
+def test_a_stiffness_put_in_later_is_shared_as_the_first(both):
+    """The parts of a sector under rotation are those at rest, whose own stiffness stays."""
+    together = both[0]
+    load = loads(at_diameter(together, 3))
+    before = apply_block(at_diameter(together, 3).K, load)
+    body = body_under_rotation(together.body, 3000.0, linear=True)
+    found, expected = (
+        at_diameter(t, 3)
+        for t in (transformation_about(together, body), transformation(body, "clamp", True))
+    )
+    for one, other in ((found.K, expected.K), (found.M, expected.M)):
+        a, b = (in_mesh(found, apply_block(A, load)) for A in (one, other))
+        np.testing.assert_allclose(a, b, atol=1e-12 * abs(b).max())
+    a, b = (in_mesh(con, compliance(flexible(con), load)) for con in (found, expected))
+    np.testing.assert_allclose(a, b, atol=1e-10 * abs(b).max())
+    np.testing.assert_array_equal(apply_block(at_diameter(together, 3).K, load), before)
+
+
+def test_products_with_wide_blocks_are_those_of_their_columns(both):
+    con = at_diameter(both[0], 3)
+    B = loads(con, 9)
+    for A in (con.K, con.M):
+        wide = apply_block(A, B)
+        columns = np.hstack([apply_block(A, B[:, i : i + 1]) for i in range(B.shape[1])])
+        assert wide.flags.f_contiguous
+        np.testing.assert_allclose(wide, columns, atol=1e-13 * abs(columns).max(initial=1e-30))

@@ -116,6 +116,28 @@ def test_influences_that_are_not_found_beside_a_load_are_left_to_their_stage():
     assert keep.ahead == {}
 
 
+def test_one_rank_solves_the_preload_and_another_a_stage_meanwhile():
+    """No other rank factorises the blade at rest, and all have the state that each would find."""
+    scene = load_scene("scenes/wedge.toml", COARSE)
+    mesh = build_mesh(scene, MPI.COMM_WORLD)
+    bodies = Bodies(scene, mesh, MPI.COMM_WORLD)
+    keep = StageRunner(None, MPI.COMM_WORLD, StageClock({}, []))
+    stage = StageOfOneRank("clamped", "clamped", lambda some: (MPI.COMM_WORLD.rank, some.comm.size))
+    keep.compute_beside_state(stage, bodies)
+    several = MPI.COMM_WORLD.size > 1
+    assert ("still" in vars(bodies.alone)) == (several and MPI.COMM_WORLD.rank == 0)
+    assert keep.of_one_rank(stage, bodies) == (int(several), 1)
+    expected = Bodies(scene, mesh, MPI.COMM_SELF)
+    assert bodies.alone.state.speed == expected.state.speed
+    scale = abs(expected.state.displacement).max()
+    for name, size in (("state", scale), ("swell", abs(expected.swell).max())):
+        one, other = (getattr(some, name) for some in (bodies.alone, expected))
+        one, other = (getattr(x, "displacement", x) for x in (one, other))
+        np.testing.assert_allclose(one, other, atol=1e-12 * size)
+    assert bodies.alone.blade.K.norm() == pytest.approx(expected.blade.K.norm(), rel=1e-12)
+    assert ("still" in vars(bodies.alone)) == (not several or MPI.COMM_WORLD.rank == 0)
+
+
 def test_contact_and_mesh_error_do_not_depend_on_the_rank_that_found_them():
     given = ["model.modes=4", "model.harmonics=1", "model.samples=64", "model.damper=rigid"]
     scene = load_scene("scenes/wedge.toml", [*COARSE, *given, "contact.points=4"])

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
+# displacements for which the blade at rest is factorised
+STATIC_PARTS = ("swell", "thermal_displacement")
 
 
 @dataclass(frozen=True)
@@ -171,6 +173,15 @@ class Bodies:
         u0 = speed**2 * self.swell + self.thermal_displacement
         return SteadyState(u0, speed, axis)
 
+    def steady_parts(self) -> dict[str, Any]:
+        """What :attr:`state` was made of, and itself, for bodies of the same mesh elsewhere."""
+        made = {"state": self.state}
+        return made | {name: vars(self)[name] for name in STATIC_PARTS if name in vars(self)}
+
+    def take_steady_parts(self, made: dict[str, Any]) -> None:
+        """Have the state that bodies on another rank have found, in place of a solve."""
+        vars(self).update(made)
+
     @property
     def on_large_state(self) -> bool:
         """Whether the blade stands on the nonlinear preload at the operating speed; without
@@ -237,19 +248,36 @@ class Bodies:
     @cached_property
     def frame(self) -> Transformation:
         """What serves every nodal diameter."""
+        from ...fem.constraint import transformation, transformation_about
+
+        still = self._still_sector
+        if still is None:
+            return transformation(self.blade, "clamp", is_wheel(self.mesh))
+        return still if self.blade is self.still_blade else transformation_about(still, self.blade)
+
+    @cached_property
+    def _still_sector(self) -> Transformation | None:
+        """What serves every nodal diameter of the blade at rest; None where no open sector does.
+
+        Rotation changes nothing of it but the stiffness.
+        """
         from ...fem.constraint import transformation
 
-        return transformation(self.blade, "clamp", is_wheel(self.mesh))
+        if not is_wheel(self.mesh):
+            return None
+        found = transformation(self.still_blade, "clamp", True)
+        return None if found.opened is None else found
 
     @cached_property
     def still(self) -> Flexibility:
         """The blade at rest under loads that are the same on all
         blades.
         """
-        from ...fem.constraint import in_step
+        from ...fem.constraint import at_diameter, in_step
         from ...fem.flexibility import flexible
 
-        return flexible(in_step(self.still_blade))
+        sector = self._still_sector
+        return flexible(in_step(self.still_blade) if sector is None else at_diameter(sector, 0))
 
     def _release_still(self) -> None:
         """Give the factors of the blade at rest back where ranks share them: one rank seats the

@@ -25,7 +25,7 @@ from ..adaptive.contact_mesh import coarse_sentence
 from ..adaptive.settings import first_settings
 from ..modes.clamped_aerofoil import clamped_blade
 from ..modes.stress import mode_strength
-from .bodies import Bodies
+from .bodies import Bodies, is_wheel
 from .body_mesh import mode_errors
 from .case_models import judged_modes, load_cases, middle_case, reduced_sector
 from .flutter import find_flutter, flutter_sentences, with_best_load
@@ -188,13 +188,17 @@ def _run_modes(
     # the reduction needs more modes of the same pencils
     reduced = judged_modes(scene, first_settings(scene)) if responds else 0
     diameters = responding_diameters(scene, before.mesh) if responds else None
-    with keep.clock("modes"):
-        modes = keep(
-            "modes",
-            stage_key("modes", scene, *(diameters or ())),
-            lambda: find_modes(bodies, diameters, reduced=reduced),
-        )
     clamped = StageOfOneRank("clamped", stage_key("modes", scene), clamped_blade)
+
+    def found_modes() -> list[ModeSet]:
+        turns = scene.operation.stiffening and scene.operation.speed != 0
+        # without a reduction ranks may share the sector for few nodal diameters
+        if responds and turns and is_wheel(before.mesh):
+            keep.compute_beside_state(clamped, bodies)
+        return find_modes(bodies, diameters, reduced=reduced)
+
+    with keep.clock("modes"):
+        modes = keep("modes", stage_key("modes", scene, *(diameters or ())), found_modes)
     if patches:
         beside = [condensed_stage(scene, patches)]
         if responds:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
@@ -84,8 +85,32 @@ class StageRunner:
         def result_of(one: StageOfOneRank) -> tuple[Any, float | None]:
             return cached_stage(self.folder, one.name, one.key, lambda: one.compute(bodies.alone))
 
-        found = share_work(result_of, stages, self.comm)
-        self.ahead.update(zip([one.name for one in stages], found, strict=True))
+        missing = [one for one in stages if one.name not in self.ahead]
+        found = share_work(result_of, missing, self.comm)
+        self.ahead.update(zip([one.name for one in missing], found, strict=True))
+
+    def compute_beside_state(self, stage: StageOfOneRank, bodies: Bodies) -> None:
+        """The steady state of the blade, which all ranks need, by one of them and a stage that does
+        without it by another, where ranks have the bodies for themselves: the call for the stage
+        finds its result (collective).
+        """
+        if self.comm is None or self.comm.size == 1 or bodies.ranks_of_sector > 1:
+            return
+        alone = bodies.alone
+        compute = partial(stage.compute, alone)
+
+        def of_rank(rank: int) -> Any:
+            if rank == 0:
+                return alone.steady_parts()
+            if rank == 1:
+                return cached_stage(self.folder, stage.name, stage.key, compute)
+            # what follows needs its mesh and matrices
+            _ = alone.still_blade
+            return None
+
+        found = share_work(of_rank, range(self.comm.size), self.comm)
+        alone.take_steady_parts(found[0])
+        self.ahead[stage.name] = found[1]
 
     def alone(
         self,
