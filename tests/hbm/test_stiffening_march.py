@@ -14,7 +14,7 @@ from bladefem.hbm.model import ReducedModel, in_series
 from bladefem.hbm.ring_march import march_ring, state_of_solution, steps_are_resolved
 from bladefem.hbm.solve import solve
 from bladefem.reduction.matrices import port_model_from_matrices
-from bladefem.study.stability import resonance_in_time
+from bladefem.study.stability import settled_march
 
 # over which the stiffness grows by e
 DECAY = np.array([0.1])
@@ -152,14 +152,14 @@ def test_steps_are_resolved_by_the_stiffness_that_the_layer_reaches(stop):
 
 def test_a_search_takes_steps_for_the_stiffness_that_the_layer_reaches(stop, monkeypatch):
     """Or none, where these would be too many."""
-    work = resonance_in_time._Work()
-    found = resonance_in_time._march(stop.model, stop.start, BOUNCES, work)
+    work = settled_march.MarchBudget()
+    found = settled_march.limited_march(stop.model, stop.start, BOUNCES, work)
     assert found.resolved
-    assert work.final_instants == work.instants > resonance_in_time.INSTANTS_PER_PERIOD
+    assert work.final_instants == work.instants > settled_march.INSTANTS_PER_PERIOD
     assert heights(found.motion[:, 0]) == pytest.approx(stop.plain, rel=0.15)
-    monkeypatch.setattr(resonance_in_time, "MOST_INSTANTS", 256)
-    with pytest.raises(resonance_in_time._MarchFailedError):
-        resonance_in_time._march(stop.model, stop.start, BOUNCES, resonance_in_time._Work())
+    monkeypatch.setattr(settled_march, "MOST_INSTANTS", 256)
+    with pytest.raises(settled_march.MarchFailedError):
+        settled_march.limited_march(stop.model, stop.start, BOUNCES, settled_march.MarchBudget())
 
 
 def test_each_blade_of_a_wave_has_the_layer_of_its_own_instant():

@@ -18,6 +18,7 @@ from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.stability import resonance_in_time as module
+from bladefem.study.stability import settled_march, uphill_climb
 from bladefem.study.stability.kept_band import KeptBand
 from bladefem.study.stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from bladefem.view.response import FOLLOWED, MARCHED
@@ -52,9 +53,9 @@ def test_where_no_period_is_like_another_the_end_is_marched_on(folding, monkeypa
     """As if the band of a steady motion were wide: it keeps what it is."""
     start = solve(folding.model, 360.0, 15, 512)
     found = resonance_in_time(family_of(folding.model), SETTINGS, start)
-    monkeypatch.setattr(module, "WIDE_BAND", -1.0)
+    monkeypatch.setattr(settled_march, "WIDE_BAND", -1.0)
     longer = resonance_in_time(family_of(folding.model), SETTINGS, start)
-    assert longer.periods == found.periods + module.CALMING_PERIODS
+    assert longer.periods == found.periods + settled_march.CALMING_PERIODS
     assert longer.highest == pytest.approx(found.highest, rel=2e-3)
     # less is left to its limit
     assert 0.9 * found.error < longer.error < found.error
@@ -88,22 +89,27 @@ def test_a_response_that_falls_smoothly_has_its_linear_peak():
 def settled_at(mean):
     """What a blade keeps to at 1 rad/s, every period alike."""
     state = SimpleNamespace(drive=SimpleNamespace(omega=1.0))
-    return module._Settled(1.0, mean, mean, mean, state, True, 0.0, 0.0)
+    return settled_march.SettledMotion(1.0, mean, mean, mean, state, True, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("change", [0.03, -0.03])
 def test_what_shorter_steps_change_is_part_of_the_error(monkeypatch, change):
     """Of a layer that stiffens; steps of the linear one are short enough by themselves."""
-    top = module._Top(settled_at(1.0), settled_at(0.9), 1.0)
-    shorter = {module.INSTANTS_PER_PERIOD: 1.0, 2 * module.INSTANTS_PER_PERIOD: 1 + change}
+    top = uphill_climb.Top(settled_at(1.0), settled_at(0.9), 1.0)
+    shorter = {
+        settled_march.INSTANTS_PER_PERIOD: 1.0,
+        2 * settled_march.INSTANTS_PER_PERIOD: 1 + change,
+    }
     monkeypatch.setattr(module, "state_of_solution", lambda *_: None)
-    monkeypatch.setattr(module, "_highest", lambda *_: top)
+    monkeypatch.setattr(module, "highest_uphill", lambda *_: top)
     monkeypatch.setattr(module, "_error", lambda *_: 0.01)
     monkeypatch.setattr(
-        module, "_settled", lambda model, state, work, instants: settled_at(shorter[instants])
+        module, "settle", lambda model, state, work, instants: settled_at(shorter[instants])
     )
     for decay, error in ((np.ones(1), 0.01 + abs(change)), (None, 0.01)):
-        found, reported = module._by_short_steps(SimpleNamespace(decay=decay), None, module._Work())
+        found, reported = module._by_short_steps(
+            SimpleNamespace(decay=decay), None, settled_march.MarchBudget()
+        )
         assert found.best.mean == 1.0
         assert reported == pytest.approx(error)
 
@@ -126,7 +132,7 @@ def test_what_shorter_steps_change_is_part_of_the_error(monkeypatch, change):
 )
 def test_a_march_has_settled_where_its_mean_and_its_band_have(heights, settled):
     motion = heights[:, None, None] * np.cos(2 * np.pi * np.arange(64) / 64)
-    assert module._has_settled(motion) == settled
+    assert settled_march._has_settled(motion) == settled
 
 
 def test_where_nothing_can_be_marched_there_is_no_resonance(folding):
@@ -212,24 +218,25 @@ def test_more_contact_points_that_change_much_have_their_own_resonance(monkeypat
     def settled(omega, top, most):
         """1 / height^2 is a parabola, as that of one mode."""
         mean = (most**-2 + bend / 2 * (omega - top) ** 2) ** -0.5
-        return module._Settled(omega, mean, mean, mean, None, True, 0.0, 0.0)
+        return settled_march.SettledMotion(omega, mean, mean, mean, None, True, 0.0, 0.0)
 
     def moved(model, before, omega, work):
         marched.append(omega)
         return settled(omega, 95.0, height)
 
-    monkeypatch.setattr(module, "_moved", moved)
+    for one in (module, uphill_climb):
+        monkeypatch.setattr(one, "settle_at", moved)
     monkeypatch.setattr(module, "_marched_model", lambda *_: None)
     monkeypatch.setattr(module, "_most_points", lambda *_: 63)
     monkeypatch.setattr(module, "_error", lambda *_: 0.02)
-    top = module._Top(settled(100.0, 100.0, 1.0), settled(97.0, 100.0, 1.0), bend)
+    top = uphill_climb.Top(settled(100.0, 100.0, 1.0), settled(97.0, 100.0, 1.0), bend)
     few = module._Reported(top.best, 8, 0.3)
-    work = module._Work()
+    work = settled_march.MarchBudget()
     reported = module._with_more_points(None, replace(SETTINGS, points=8), None, few, top, work)
     assert reported.best.omega == pytest.approx(95.0, abs=1.5)
-    assert reported.best.mean == pytest.approx(height, rel=module.WORTH_A_MARCH)
+    assert reported.best.mean == pytest.approx(height, rel=uphill_climb.WORTH_A_MARCH)
     assert reported.points == 32
-    assert reported.error == pytest.approx(0.02 + 0.1, abs=module.WORTH_A_MARCH)
+    assert reported.error == pytest.approx(0.02 + 0.1, abs=uphill_climb.WORTH_A_MARCH)
     # towards the higher neighbour first, and no further to the other side
     assert max(marched) == 100.0
     # without room for a search the change at the frequency of fewer points is all that is known

@@ -5,5 +5,6 @@ with ``judged_resonance``, which decides.
   motion, ``finer_contacts`` verdicts with more contact points
 - marches in time: ``kept_band`` from an unstable motion, ``flank_motions`` beside a resonance,
   ``strong_drive`` after a strong excitation, ``lower_motion`` another one far below,
-  ``error_in_time`` the error of a balance, ``resonance_in_time`` where balances fail
+  ``error_in_time`` the error of a balance, ``resonance_in_time`` where balances fail:
+  ``uphill_climb`` from frequency to frequency, ``settled_march`` at one of them
 """
