@@ -5,6 +5,7 @@ told.
 from __future__ import annotations
 
 import tomllib
+from pathlib import Path
 
 import pytest
 
@@ -94,3 +95,9 @@ def test_the_scene_to_start_from_says_what_no_mesh_tells(cantilever):
     assert written["operation"]["speed"] == "0 rpm"
     assert set(written["material"]["blade"]) == {"E", "nu", "rho"}
     assert assumed_physics(scene_of(written, cantilever.parent), given_keys(written)) == []
+
+
+@pytest.mark.parametrize("file", sorted(Path("scenes").glob("*.toml")), ids=lambda file: file.stem)
+def test_shipped_scenes_give_speed_and_material(file):
+    tables = read_tables(file)
+    assert assumed_physics(scene_of(tables, "scenes"), given_keys(tables)) == []
