@@ -19,6 +19,7 @@ from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.stability import resonance_in_time as module
 from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.lower_motion import LowerMotion
 from bladefem.study.stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from bladefem.view.response import FOLLOWED, MARCHED
 
@@ -168,6 +169,10 @@ def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     assert (row["method"], row["frequency"], row["amplitude"]) == (MARCHED, 101.0, 2e-3)
     assert row["dissipated"] == curve.friction_work == 6e-3
     assert curve.input_work == pytest.approx(10e-3)
+    # the row of the resonance has the lower motion beside it
+    lower = points_of(replace(curve, lower=LowerMotion(1e-4)))["lower_amplitude"]
+    assert lower.tolist() == [pytest.approx(np.nan, nan_ok=True), 1e-4]
+    assert "lower_amplitude" not in points_of(curve)
     # of the march neither is known
     assert np.isnan([row["slipping"], row["drift"]]).all()
     assert points_of(replace(curve, resonance_by_march=None))["method"].tolist() == [1.0]
