@@ -165,6 +165,9 @@ def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     )
     assert (curve.peak_frequency, curve.peak_amplitude) == (101.0, 2e-3)
     assert curve.balance_amplitude == 1e-3 and curve.error == pytest.approx(0.07)
+    # a balance of the same resonance tells what contact points change of it
+    near = replace(curve, resonance_by_march=replace(sought, highest=1.06e-3))
+    assert near.error == pytest.approx(0.07 + 0.3)
     row = points_of(curve).iloc[-1]
     assert (row["method"], row["frequency"], row["amplitude"]) == (MARCHED, 101.0, 2e-3)
     assert row["dissipated"] == curve.friction_work == 6e-3
