@@ -55,6 +55,7 @@ def fake_curve(load, amplitude):
         layer_law=np.nan,
         error=0.013,
         interval=None,
+        lower=None,
         is_march=False,
         keeps_unstable=False,
         reaches_layer=False,
