@@ -53,7 +53,8 @@ CAPTIONS = {
     "parameter give 1 % more.",
     "response/local_resonances": "Every local maximum of each response: motions found at its "
     "frequency, and by which slow sweep it is reached (isolated: by neither; march in time: kept "
-    "there in time, in place of an unstable balance). Stability is lost by a fold (the motion "
+    "there in time, in place of an unstable balance; from rest: another, lower motion at the "
+    "frequency of the resonance, no maximum of its own). Stability is lost by a fold (the motion "
     "jumps, or moves on to one that branches off beside it), period doubling (it repeats after two "
     "periods) or a torus (a ripple of another frequency grows).",
     "response/resonances": "Linear resonances without damper.",
@@ -152,14 +153,16 @@ CAPTIONS = {
     "damper (black, dashed) and in full stick (grey, dotted). Dots are solved points, large dots "
     "the highest of each curve that is not unstable, diamonds the resonances that a march in time "
     "gives, or the stiff layer that a softer one stands for, in place of it; squares are unstable "
-    "motions, and coloured lines are dashed next to them.",
+    "motions, and coloured lines are dashed next to them. Open triangles are other, lower motions "
+    "that the blade may keep to at the frequency of a resonance.",
     "response/forced_response_linear": "Linear response without damper: amplitude and phase at the "
     "probe over frequency. Dots are its resonances with the numbers of their modes, hollow where "
     "the amplitude has no maximum near the natural frequency, which stands there.",
     "response/optimum": "Amplitude and frequency of the resonance over the normal load per seat. "
     "The star marks the best load, by exact search where that was made, with the band of loads "
     "that keep within the accuracy of it; there is none where the answer names no optimum. Bars "
-    "are estimated errors, dashed lines the blade without damper and in full stick.",
+    "are estimated errors, dashed lines the blade without damper and in full stick; open triangles "
+    "are lower motions that the blade may keep to at the frequency of the resonance.",
     "response/damped_motion": "Motion of blade and damper at the resonance under the best load, "
     "with all modes, harmonics and damper forces, about the mean position; the damper moves as a "
     "rigid body. Colours: amplitude of each node.",

@@ -56,6 +56,7 @@ PAGE_COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
             "lowest",
             "highest",
             "interval",
+            "lower_amplitude",
             "reduction",
             "alternating_stress",
             "stress_error",

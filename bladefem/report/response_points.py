@@ -50,7 +50,18 @@ def points_of(curve: Curve) -> pd.DataFrame:
             ),
         }
     )
-    return table if curve.peak_amplitude == curve.balance_amplitude else _with_marched(table, curve)
+    if curve.peak_amplitude != curve.balance_amplitude:
+        table = _with_marched(table, curve)
+    return table if curve.lower is None else _with_lower(table, curve)
+
+
+def _with_lower(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:
+    """The table with the lower motion at the resonance beside that, in a column of its own."""
+    assert curve.lower is not None
+    beside = np.full(len(table), np.nan)
+    off = abs(table["amplitude"] / curve.peak_amplitude - 1).where(table["converged"].astype(bool))
+    beside[int(np.nanargmin(off))] = curve.lower.told
+    return table.assign(lower_amplitude=beside)
 
 
 def _with_marched(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:

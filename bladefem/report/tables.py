@@ -257,6 +257,7 @@ COLUMNS = {
     "own_amplitude": Column("its amplitude", "m", "µm", 1e6),
     "own_error": Column("its estimated error", "1", "%", 100.0, 2),
     "free_amplitude": Column("amplitude without damper", "m", "µm", 1e6),
+    "lower_amplitude": Column("lower motion there", "m", "µm", 1e6, 2),
     "halved": Column("change with half the contact points", "1", "%", 100.0, 2),
     "body_mesh": Column("change by the error of the body's mesh", "1", "%", 100.0, 2),
     "layer_law": Column("change by the law of the layer", "1", "%", 100.0, 2),

@@ -11,6 +11,7 @@ import pandas as pd
 
 from ..scene.units import newtons
 from ..util.percent import percent
+from .lower_motion import COLUMN, LOWER, with_lower_motion
 from .optimum import exact_optimum, limit_name
 from .response import FOLLOWED, MARCHED, load_colours, load_name, pieces_of, smooth_curve
 from .style import COLOURS, FAILED_COLOUR, MICRO
@@ -39,7 +40,7 @@ def live_responses(
     for load in loads:
         curve = points[points["load"] == load].sort_values("frequency", kind="stable")
         for number, (piece, unstable) in enumerate(pieces_of(curve)):
-            colour = matplotlib.colors.to_hex(colours[load])
+            colour = _hex(colours[load])
             lines = _curve_traces(curve.iloc[piece], float(load), colour)
             if curve["method"].iloc[piece].isin([MARCHED, FOLLOWED]).any():
                 lines[1]["marker"] = {**lines[1]["marker"], "symbol": "diamond", "size": 9}
@@ -59,6 +60,7 @@ def live_responses(
         unstable = points[points["stability"] == "unstable"]
         style = {"symbol": "square-open", "color": FAILED_COLOUR, "size": 7}
         data.append(_mark_points(unstable, f"unstable ({len(unstable)})", style))
+    data += _lower_motions(points, "frequency", {load: _hex(colours[load]) for load in loads})
     layout = {
         "title": _escape_title(title),
         "xaxis": {"title": {"text": "excitation frequency [Hz]"}},
@@ -70,6 +72,40 @@ def live_responses(
         "hovermode": "closest",
     }
     return {"kind": "chart", "data": data, "layout": layout}
+
+
+def _hex(colour: Any) -> str:
+    return str(matplotlib.colors.to_hex(colour))
+
+
+def _lower_motions(
+    table: pd.DataFrame, at: str, colours: Mapping[float, str]
+) -> list[dict[str, Any]]:
+    """Open marks at the lower motions of a table, in one entry of the legend; none without any.
+
+    Args:
+        at: column that is their place along the figure.
+        colours: of the loads [N].
+    """
+    rows = with_lower_motion(table)
+    if rows.empty:
+        return []
+    return [
+        {
+            "type": "scatter",
+            "mode": "markers",
+            "name": LOWER,
+            "x": json_numbers(rows[at]),
+            "y": json_numbers(MICRO * rows[COLUMN]),
+            "marker": {
+                "symbol": "triangle-down-open",
+                "size": 9,
+                "color": [colours[load] for load in rows["load"]],
+            },
+            "text": [load_name(float(load)) for load in rows["load"]],
+            "hovertemplate": "load %{text}, %{y:.4g} µm<extra></extra>",
+        }
+    ]
 
 
 def _curve_traces(
@@ -157,6 +193,7 @@ def live_optimum(
         name = "resonance" if mass is None else f"damper of {1e3 * mass:.4g} g"
         colour = COLOURS[number % len(COLOURS)]
         data += _optimum_curve(finite, name, colour)
+        data += _lower_motions(finite, "load", dict.fromkeys(finite["load"], colour))
         if not named:
             continue
         exact = exact_optimum(searched, mass)

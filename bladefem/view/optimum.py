@@ -16,6 +16,7 @@ import pandas as pd
 
 from ..scene.units import newton_range, newtons
 from ..util.arrays import BooleanArray
+from .lower_motion import explain_lower, mark_lower, with_lower_motion
 from .response import load_name
 from .style import COLOURS, FAILED_COLOUR, MICRO, canvas, log_axis
 
@@ -66,6 +67,7 @@ def draw_optimum(
             axes[0].plot([], [], " ", label="no optimum is named: see the answer")
         draw_limits(axes, summary)
         draw_cut(axes, summary, points)
+        explain_lower(axes[0], summary)
         if own is not None:
             for axis in axes:
                 axis.axvline(
@@ -113,6 +115,9 @@ def _draw_curve(
             mew=2,
             label="curve with unconverged points",
         )
+    lower = with_lower_motion(finite)
+    if len(lower):
+        mark_lower(axes[0], lower["load"], lower, colour)
     draw_unknown(axes[0], finite)
 
 

@@ -1,7 +1,8 @@
 """Forced responses with friction: amplitude over frequency under several loads.
 
 Response tables have one row a point, in SI units: load [N], frequency [Hz], amplitude [m],
-converged, method, residual, iterations. Load 0 means no damper, load inf full stick.
+converged, method, residual, iterations. Load 0 means no damper, load inf full stick. A lower
+motion at the frequency of a point is in a column of its own (`bladefem.view.lower_motion`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import pandas as pd
 from scipy.interpolate import PchipInterpolator
 
 from ..scene.units import newtons
+from .lower_motion import explain_lower, mark_lower, with_lower_motion
 from .style import FAILED_COLOUR, MICRO, canvas, log_axis
 
 if TYPE_CHECKING:
@@ -74,7 +76,10 @@ def draw_responses(
                 zorder=5,
                 label=f"unstable ({len(unstable)})",
             )
+        for load, rows in with_lower_motion(points).groupby("load"):
+            mark_lower(ax, rows["frequency"], rows, colours[load])
         explain_diamonds(ax, points)
+        explain_lower(ax, points)
         ax.set(
             xlabel="excitation frequency [Hz]",
             ylabel="vibration amplitude [µm]",

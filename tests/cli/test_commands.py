@@ -55,6 +55,7 @@ def fake_curve(load, amplitude):
         layer_law=np.nan,
         error=0.013,
         interval=None,
+        lower=None,
         is_march=False,
         keeps_unstable=False,
         reaches_layer=False,
@@ -115,7 +116,7 @@ def fake_run(folder):
     return SimpleNamespace(
         mesh=mesh,
         modes=modes,
-        contact=SimpleNamespace(maps={40.0: [seat]}),
+        contact=SimpleNamespace(maps={40.0: [seat]}, own=None),
         response=response,
         reduced=reduced,
         timings={"mesh": 1.5, "modes": 4.5},

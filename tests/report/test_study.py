@@ -33,6 +33,7 @@ def curve(load, amplitude):
         layer_law=np.nan,
         error=0.01,
         interval=None,
+        lower=None,
         is_march=False,
         keeps_unstable=False,
         reaches_layer=False,

@@ -15,6 +15,7 @@ from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.checked_curve import CheckedCurve
 from bladefem.study.adaptive.family import Family, Member, family_member, family_of
 from bladefem.study.adaptive.settings import first_for
+from bladefem.study.stability import error_in_time as error_module
 from bladefem.study.stability import judged_resonance as judged_module
 from bladefem.study.stability.error_in_time import (
     LIFTING_POINTS,
@@ -25,7 +26,7 @@ from bladefem.study.stability.error_in_time import (
     error_of_doubt,
 )
 from bladefem.study.stability.judged_resonance import JudgedResonance, judged_in_time
-from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.kept_band import FEWEST_POINTS, KeptBand
 from bladefem.study.stability.verdicts import Stability
 
 OMEGA = 0.9
@@ -108,18 +109,47 @@ def test_a_doubtful_motion_is_marched_with_fewer_contact_points():
     found = error_of_doubt(Marches(family), CheckedCurve(fine, [top], {}), top)
     assert found.error == pytest.approx(truth, abs=2e-3) and found.error > 0.02
     assert found.band.points == LIFTING_POINTS
-    # balances tell more, the points are the user's, or there are no fewer
-    for other in (
-        replace(fine, error=0.05),
-        replace(fine, chosen=()),
-        replace(fine, points=LIFTING_POINTS),
-    ):
-        assert error_of_doubt(Marches(family), CheckedCurve(other, [top], {}), top) is None
+    # balances tell more
+    curve = CheckedCurve(replace(fine, error=0.05), [top], {})
+    assert error_of_doubt(Marches(family), curve, top) is None
+
+
+@pytest.mark.parametrize(
+    "given", [{"chosen": ()}, {"points": LIFTING_POINTS}, {"points": LIFTING_POINTS - 2}]
+)
+def test_so_are_points_of_the_user_and_no_more_than_these(given):
+    family = family_of(in_parts(2 * LIFTING_POINTS), [2 * LIFTING_POINTS])
+    fine = replace(settings_of(0.01, points=2 * LIFTING_POINTS), **given)
+    top = solve(family_member(family, fine).model, OMEGA, 3, 64)
+    truth = abs(size(top) / size(solve(hopping(), OMEGA, 31, 512)) - 1)
+    found = error_of_doubt(Marches(family), CheckedCurve(fine, [top], {}), top)
+    assert found.error == pytest.approx(truth, abs=2e-3) and found.error > 0.02
+    assert found.band.points == min(fine.points, LIFTING_POINTS)
+
+
+@pytest.mark.parametrize(("lifting", "unknown"), [(1.0, True), (0.5, True), (0.25, False)])
+@pytest.mark.parametrize("points", [2 * LIFTING_POINTS, FEWEST_POINTS])
+def test_the_error_is_unknown_where_most_contacts_lift_off_and_no_march_is_possible(
+    monkeypatch, points, lifting, unknown
+):
+    family = family_of(in_parts(2 * LIFTING_POINTS), [2 * LIFTING_POINTS])
+    fine = settings_of(0.01, points=points)
+    top = solve(family_member(family, fine).model, OMEGA, 3, 64)
+    top = replace(top, states=top.states | {"lift": int(lifting * len(top.w))})
+    failed = KeptBand(1.0, np.nan, np.nan, 0, "too long", too_long=True)
+    monkeypatch.setattr(error_module, "kept_band", lambda *_: failed)
+    found = error_of_doubt(Marches(family), CheckedCurve(fine, [top], {}), top)
+    assert found == (ErrorInTime(np.inf, None) if unknown else None)
 
 
 @pytest.mark.parametrize(
     ("verdict", "reason", "error"),
-    [("stable", "too long", 0.08), ("unstable", "too long", 0.03), ("stable", "", 0.03)],
+    [
+        ("stable", "too long", 0.08),
+        ("stable", "too long", np.inf),
+        ("unstable", "too long", 0.03),
+        ("stable", "", 0.03),
+    ],
 )
 def test_the_error_of_a_resonance_in_doubt_is_told_by_that_march(
     monkeypatch, verdict, reason, error
@@ -129,9 +159,10 @@ def test_the_error_of_a_resonance_in_doubt_is_told_by_that_march(
     curve = CheckedCurve(settings_of(0.03), [top], {top.omega: 0.03})
     marks = Stability(np.array([verdict]), np.ones(1))
     resonance = JudgedResonance(top, marks, KeptBand(1.0, np.nan, np.nan, 0, reason))
-    band = KeptBand(1.0, 0.9, 1.0, 100, points=LIFTING_POINTS)
+    band = KeptBand(1.0, 0.9, 1.0, 100, points=LIFTING_POINTS) if error < np.inf else None
+    told = ErrorInTime(max(error, 0.08), band)
     monkeypatch.setattr(judged_module, "error_in_time", lambda *_: None)
-    monkeypatch.setattr(judged_module, "error_of_doubt", lambda *_: ErrorInTime(0.08, band))
+    monkeypatch.setattr(judged_module, "error_of_doubt", lambda *_: told)
     scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
     found, estimated, march = judged_in_time(scene, None, curve, resonance)
     assert found.settings.error == error and estimated[0] == error

@@ -2,6 +2,8 @@
 density.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -20,6 +22,7 @@ from bladefem.study.pipeline.design_table import design_table
 from bladefem.study.pipeline.linear_limits import full_stick
 from bladefem.study.pipeline.reduced_sector import reduce_sector, with_damper_mass
 from bladefem.study.pipeline.scene_mesh import build_mesh
+from bladefem.study.stability.lower_motion import LowerMotion
 
 
 def receptance(model, omega):
@@ -85,6 +88,16 @@ def test_tables_give_each_mass_its_full_stick(two_masses):
     assert np.isfinite(data["frequency"]).all()
     stuck = data["frequency"].sel(load=[500.0, np.inf]).to_numpy()
     np.testing.assert_allclose(stuck[:, 0], stuck[:, 1], rtol=1e-4)
+
+
+def test_a_lower_motion_has_a_column_of_the_table(two_masses):
+    """Only where some load has one; empty elsewhere."""
+    light, heavy = two_masses.curves
+    table = design_table([light, replace(heavy, lower=LowerMotion(1.16e-4))], two_masses.limits)
+    np.testing.assert_array_equal(
+        table["lower_amplitude"], [np.nan, np.nan, 1.2e-4, np.nan, np.nan]
+    )
+    assert "lower_amplitude" not in design_table(two_masses.curves, two_masses.limits)
 
 
 def test_the_answer_names_the_full_stick_of_its_damper():

@@ -20,6 +20,7 @@ from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.stability import resonance_in_time as module
 from bladefem.study.stability import settled_march, uphill_climb
 from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.lower_motion import LowerMotion
 from bladefem.study.stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from bladefem.view.response import FOLLOWED, MARCHED
 
@@ -170,10 +171,17 @@ def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     )
     assert (curve.peak_frequency, curve.peak_amplitude) == (101.0, 2e-3)
     assert curve.balance_amplitude == 1e-3 and curve.error == pytest.approx(0.07)
+    # a balance of the same resonance tells what contact points change of it
+    near = replace(curve, resonance_by_march=replace(sought, highest=1.06e-3))
+    assert near.error == pytest.approx(0.07 + 0.3)
     row = points_of(curve).iloc[-1]
     assert (row["method"], row["frequency"], row["amplitude"]) == (MARCHED, 101.0, 2e-3)
     assert row["dissipated"] == curve.friction_work == 6e-3
     assert curve.input_work == pytest.approx(10e-3)
+    # the row of the resonance has the lower motion beside it
+    lower = points_of(replace(curve, lower=LowerMotion(1.16e-4)))["lower_amplitude"]
+    assert lower.tolist() == [pytest.approx(np.nan, nan_ok=True), 1.2e-4]
+    assert "lower_amplitude" not in points_of(curve)
     # of the march neither is known
     assert np.isnan([row["slipping"], row["drift"]]).all()
     assert points_of(replace(curve, resonance_by_march=None))["method"].tolist() == [1.0]

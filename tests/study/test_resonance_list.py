@@ -13,7 +13,8 @@ from bladefem.hbm.branches import find_branches
 from bladefem.hbm.solution import size
 from bladefem.hbm.sweep import response
 from bladefem.report.resonance_table import resonance_table
-from bladefem.study.pipeline.resonance_list import local_resonances, reach_sentence
+from bladefem.study.pipeline.resonance_list import local_resonances, motions_at, reach_sentence
+from bladefem.study.stability.lower_motion import LowerMotion
 
 BAND = (249.0, 431.0)
 
@@ -32,7 +33,9 @@ def curve_of(points) -> SimpleNamespace:
     }
     peak = max(columns["amplitude"])
     arrays = {name: np.array(values) for name, values in columns.items()}
-    return SimpleNamespace(**arrays, load=80.0, balance_amplitude=peak, resonance_by_march=None)
+    return SimpleNamespace(
+        **arrays, load=80.0, balance_amplitude=peak, resonance_by_march=None, lower=None
+    )
 
 
 def test_columns_give_what_the_paths_gave():
@@ -84,6 +87,9 @@ def sweep_with(*motions, branch=2) -> SimpleNamespace:
         mass=None,
         resonance_by_march=None,
         march_at_peak=None,
+        lower=None,
+        peak_frequency=frequency[abs(first).argmax()],
+        peak_amplitude=abs(first).max(),
         balance_amplitude=abs(first).max(),
         curve_amplitude=abs(first).max(),
     )
@@ -118,3 +124,33 @@ def test_a_marched_resonance_has_a_row_in_the_table():
         (table,) = resonance_table([curve]).values()
         assert list(table["reached"]) == [reached, "up and down"]
         assert list(table["amplitude"]) == [30.0, pytest.approx(curve.balance_amplitude)]
+
+
+@pytest.mark.parametrize(("doubt", "stability"), [("", "stable"), ("too long", "unknown")])
+def test_a_lower_motion_counts_at_the_resonance_and_has_a_row(doubt, stability):
+    """Under 36 N of the shipped wedge one motion was counted where the report told two."""
+    curve = sweep_with()
+    top = curve.peak_frequency
+    curve.lower = LowerMotion(0.2345 * curve.peak_amplitude, doubt)
+    (resonance,) = local_resonances(curve)
+    assert (resonance.frequency, resonance.motions) == (top, 2)
+    # elsewhere it was not sought
+    assert motions_at(curve, 1.01 * top) == 1
+    assert reach_sentence(curve) == ""
+    (table,) = resonance_table([curve]).values()
+    assert list(table["reached"]) == ["up and down", "from rest"]
+    assert list(table["motions"]) == [2, 2] and list(table["frequency"]) == [top, top]
+    # with two digits, as the report tells it
+    assert table["amplitude"][1] == float(f"{curve.lower.amplitude:.2g}") < curve.peak_amplitude
+    assert table["stability"][1] == stability
+
+
+def test_a_lower_motion_that_a_path_has_is_counted_once():
+    """A path that folds below the resonance goes through it."""
+    plain = sweep_with()
+    top = plain.peak_frequency
+    low = 0.2 * plain.peak_amplitude
+    curve = sweep_with((top - 1, low), (top + 1, low))
+    assert motions_at(curve, top) == 2
+    curve.lower = LowerMotion(1.1 * low)
+    assert motions_at(curve, top) == 2

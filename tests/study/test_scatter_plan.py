@@ -102,6 +102,7 @@ def response(*amplitudes):
             frequency=np.arange(5.0),
             converged=np.ones(5, bool),
             interval=None,
+            lower=None,
             is_march=False,
             keeps_unstable=False,
             reaches_layer=False,

@@ -22,6 +22,7 @@ from bladefem.view.contact import (
     unfold,
 )
 from bladefem.view.hysteresis import draw_loops, draw_seat_loops, loop_energy
+from bladefem.view.live_curves import live_optimum, live_responses
 from bladefem.view.live_shapes import live_motion
 from bladefem.view.mesh import (
     carry_round,
@@ -438,6 +439,43 @@ def test_the_resonance_that_is_given_is_the_one_marked(heights, verdicts, method
     explained = [text.get_text() for text in axes.get_legend().get_texts()]
     assert ("resonance marched in time" in explained) == (MARCHED in methods)
     assert ("resonance of the stiff layer" in explained) == (FOLLOWED in methods)
+
+
+def test_lower_motions_are_open_marks_below_their_resonances():
+    """Of all curves of a picture one line of the legend."""
+    points, summary = synthetic.points(), synthetic.summary()
+    shown = [(200.0, 1e-6), (400.0, 2e-6)]
+    for load, low in shown:
+        top = points.loc[points["load"] == load, "amplitude"].idxmax()
+        points.loc[top, "lower_amplitude"] = low
+        summary.loc[summary["load"] == load, "lower_amplitude"] = low
+    response, optimum = draw_responses(points).axes[0], draw_optimum(summary).axes[0]
+    frequency = points[points["lower_amplitude"].notna()]["frequency"]
+    for axes, at in ((response, frequency), (optimum, [load for load, _ in shown])):
+        marks = [x for x in axes.lines if x.get_marker() == "v" and len(x.get_xdata())]
+        xy = np.concatenate([line.get_xydata() for line in marks])
+        np.testing.assert_allclose(xy, np.stack([at, [1.0, 2.0]], axis=1))
+        assert {line.get_markerfacecolor() for line in marks} == {"white"}
+        labels = [text.get_text() for text in axes.get_legend().get_texts()]
+        assert labels.count("lower motion there, from rest") == 1
+    for figure in (draw_responses(synthetic.points()), draw_optimum(synthetic.summary())):
+        texts = figure.axes[0].get_legend().get_texts()
+        assert not any("lower motion" in text.get_text() for text in texts)
+
+
+def test_lower_motions_are_open_marks_of_live_curves_too():
+    points, summary = synthetic.points(), synthetic.summary()
+    top = points.loc[points["load"] == 200, "amplitude"].idxmax()
+    points.loc[top, "lower_amplitude"] = 1e-6
+    summary.loc[summary["load"] == 200, "lower_amplitude"] = 1e-6
+    frequency = float(points["frequency"][top])
+    for spec, at in ((live_responses(points), frequency), (live_optimum(summary), 200.0)):
+        marks = [t for t in spec["data"] if t["name"] == "lower motion there, from rest"]
+        assert [(t["x"], t["y"]) for t in marks] == [([pytest.approx(at)], [1.0])]
+        assert marks[0]["marker"]["symbol"] == "triangle-down-open"
+        assert marks[0]["text"] == ["200 N"]
+    for spec in (live_responses(synthetic.points()), live_optimum(synthetic.summary())):
+        assert not any("lower" in t["name"] for t in spec["data"])
 
 
 def test_an_optimum_chart_shows_the_estimated_errors():

@@ -69,7 +69,8 @@ class Curve:
     stability: np.ndarray
     # (k,) largest modulus of the Floquet multipliers; NaN where not computed
     multiplier: RealArray
-    # relative change of the peak's height with half as many contact points; NaN: unknown
+    # relative change of the peak's height with half of the seats' nodes; NaN: unknown, or small
+    # beside the error of contact points
     halved: float
     # the highest converged point that is not unstable, or that is left for a motion whose amplitude
     # is its own within the accuracy, or for one that is not known
@@ -129,7 +130,8 @@ class Curve:
         A march from an unstable resonance tells the error of its balance as well; one that ends
         above a resonance elsewhere adds to it, and so does the width of one that is given itself,
         and one beside the resonance that rises above it.
-        A resonance sought in time has an error of its own in place of the balance's.
+        A resonance sought in time has an error of its own in place of the balance's; what contact
+        points change is that of the balance, where that tells the same resonance.
         """
         if self.settings.error is None:
             return None
@@ -138,7 +140,9 @@ class Curve:
         balance = max(balance, self.marched) if same else balance + self.marched
         contact_mesh = self.halved if np.isfinite(self.halved) else 0.0
         if self.resonance_by_march is not None:
-            balance, contact_mesh = self.resonance_by_march.error, 0.0
+            balance = self.resonance_by_march.error
+            if abs(self.balance_amplitude / self.curve_amplitude - 1) > balance:
+                contact_mesh = 0.0
         body_mesh = 0.0 if np.isnan(self.body_mesh) else self.body_mesh
         layer_law = 0.0 if np.isnan(self.layer_law) else self.layer_law
         return balance + self.flank_rise + contact_mesh + body_mesh + layer_law

@@ -14,6 +14,7 @@ import numpy as np
 
 from ...hbm.slow_sweep import DOWN, ISOLATED, UP, Visit, reached_by, visited_pieces
 from ...scene.units import newtons
+from ..stability.lower_motion import OTHER_MOTION
 from .curve import Curve
 
 # distance of the first harmonics of two ends over the largest one, up to which pieces are joined
@@ -23,6 +24,8 @@ MAX_JOINED_DISTANCE = 0.2
 SAME_MOTION = 0.05
 # relative difference of two heights that are the same
 SAME_HEIGHT = 1e-6
+# relative difference of two frequencies that are the same
+SAME_FREQUENCY = 1e-9
 
 
 @dataclass(frozen=True)
@@ -85,7 +88,7 @@ def local_resonances(curve: Curve) -> list[LocalResonance]:
                     float(heights[i]),
                     str(curve.stability[row]),
                     str(curve.bifurcation[row]),
-                    _crossing(pieces, frequency),
+                    _crossing(curve, pieces, frequency),
                     reached_by(visited, places[int(owners[i])], frequency),
                 )
             )
@@ -118,11 +121,17 @@ def _lies_on(one: _Piece, other: _Piece) -> bool:
 
 def motions_at(curve: Curve, frequency: float) -> int:
     """Motions found at a frequency [Hz]."""
-    return _crossing(_pieces_of(curve), frequency)
+    return _crossing(curve, _pieces_of(curve), frequency)
 
 
-def _crossing(pieces: Sequence[_Piece], frequency: float) -> int:
-    return sum(p.frequency[0] <= frequency <= p.frequency[-1] for p in pieces)
+def _crossing(curve: Curve, pieces: Sequence[_Piece], frequency: float) -> int:
+    """Motions of the pieces at a frequency, and the lower one of the resonance if none is that."""
+    there = [p for p in pieces if p.frequency[0] <= frequency <= p.frequency[-1]]
+    if curve.lower is None or not np.isclose(frequency, curve.peak_frequency, SAME_FREQUENCY, 0):
+        return len(there)
+    heights = [np.interp(frequency, p.frequency, abs(p.first)) for p in there]
+    known = min(heights, default=np.inf) <= OTHER_MOTION * curve.peak_amplitude
+    return len(there) + (not known)
 
 
 def reach_sentence(curve: Curve) -> str:

@@ -36,7 +36,7 @@ class UnseenErrors:
     estimated.
     """
 
-    # with half as many contact points
+    # with half of the seats' nodes as contact points
     halved: float = np.nan
     # by the estimated error of the body's mesh
     body_mesh: float = np.nan

@@ -15,7 +15,6 @@ from ...hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
 from ...scene.units import newtons
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
-from ..stability.lower_motion import LowerMotion
 from ..stability.verdicts import model_in_time
 
 if TYPE_CHECKING:
@@ -236,19 +235,12 @@ def undriven_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
-def _rounded(lower: LowerMotion) -> str:
-    """Few contact points tell its amplitude: 120 um under 36 N of the shipped wedge, where a march
-    of all of them from rest keeps 135.
-    """
-    return f"some {float(f'{1e6 * lower.amplitude:.2g}'):g} um"
-
-
 def lower_sentence(curves: Sequence[Curve]) -> str:
     """The resonances at whose frequency the blade may keep to a far lower motion, or "": marched or
     measured from rest it may be the only one that is seen.
     """
     each = ", ".join(
-        f"{_rounded(c.lower)} in place of {1e6 * c.curve_amplitude:.4g} um at "
+        f"some {1e6 * c.lower.told:g} um in place of {1e6 * c.curve_amplitude:.4g} um at "
         f"{c.peak_frequency:.5g} Hz under {newtons(c.load)}"
         + (f" (whether it lasts is not known: {c.lower.doubt})" if c.lower.doubt else "")
         for c in curves

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...hbm.linear.condensation import condense
-from ...hbm.solution import Solution, lifts_off, size
+from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, size
 from ...hbm.solve import as_solution
 from ...hbm.solver.fallback import Attempt
 from ...hbm.solver.newton import Newton
@@ -23,6 +23,7 @@ from ..adaptive.family import Family, Member, carried_displacements, family_memb
 from ..adaptive.resonance_choice import LIFTING_POINTS
 from ..adaptive.settings import Settings
 from .kept_band import (
+    FEWEST_POINTS,
     MAX_COUNTED_LAST,
     KeptBand,
     affordable_march,
@@ -96,11 +97,11 @@ class Marches:
 class ErrorInTime:
     """Error of a resonance amplitude by a march."""
 
-    # relative
+    # relative; inf where it is not known
     error: float
     # of the march; its points are those of a model with more of them than the resonance's, None
-    # where it has the same
-    band: KeptBand
+    # where it has the same. None where no march was possible
+    band: KeptBand | None
 
 
 def error_in_time(
@@ -144,8 +145,10 @@ def error_in_time(
 
 def error_of_doubt(marches: Marches, curve: CheckedCurve, top: Solution) -> ErrorInTime | None:
     """The error of a resonance whose motion may not last and is not marched with its own contact
-    points: what LIFTING_POINTS keep after it, where that is more than balances tell; None where it
-    is not, or such a march is not possible.
+    points: what LIFTING_POINTS keep after it, where that is more than balances tell, else None.
+
+    Unknown where such a march is not possible and most contacts lift off: balances then agree on
+    motions that the blade leaves.
 
     The motion need not be solved with these points to start from it. What they lead away by is
     theirs as well, so that the error is rather too large: under 18 N and engine order 4 the shipped
@@ -157,17 +160,19 @@ def error_of_doubt(marches: Marches, curve: CheckedCurve, top: Solution) -> Erro
     """
     models, settings = marches.models, settings_in_time(marches.models, curve.settings)
     own = settings.points
-    if "points" not in settings.chosen or (own is not None and own <= LIFTING_POINTS):
-        return None
-    fewer = replace(settings, points=LIFTING_POINTS)
+    unknown = ErrorInTime(np.inf, None) if mostly_lifts_off(top) else None
+    # with the fewest a march of as many operations was tried
+    if own is not None and own <= FEWEST_POINTS:
+        return unknown
+    fewer = replace(settings, points=LIFTING_POINTS if own is None else min(own, LIFTING_POINTS))
     start = carried_motion(models, curve.settings, top, fewer)
     band = kept_band(model_in_time(models, fewer), start, MAX_COUNTED_LAST)
     if band.reason:
-        return None
+        return unknown
     error = band.farthest(size(top))
     if error <= (curve.settings.error or 0.0):
         return None
-    return ErrorInTime(error, replace(band, points=LIFTING_POINTS))
+    return ErrorInTime(error, replace(band, points=fewer.points))
 
 
 def _finer_settings(models: Family, settings: Settings) -> Settings | None:
