@@ -56,4 +56,4 @@ def _lower(curve: Curve) -> list[LocalResonance]:
     frequency = curve.peak_frequency
     stability = UNKNOWN if curve.lower.doubt else STABLE
     motions = motions_at(curve, frequency)
-    return [LocalResonance(frequency, curve.lower.told, stability, "", motions, FROM_REST)]
+    return [LocalResonance(frequency, curve.lower.rounded, stability, "", motions, FROM_REST)]

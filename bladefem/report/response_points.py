@@ -60,7 +60,7 @@ def _with_lower(table: pd.DataFrame, curve: Curve) -> pd.DataFrame:
     assert curve.lower is not None
     beside = np.full(len(table), np.nan)
     off = abs(table["amplitude"] / curve.peak_amplitude - 1).where(table["converged"].astype(bool))
-    beside[int(np.nanargmin(off))] = curve.lower.told
+    beside[int(np.nanargmin(off))] = curve.lower.rounded
     return table.assign(lower_amplitude=beside)
 
 

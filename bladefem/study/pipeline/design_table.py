@@ -25,7 +25,7 @@ def design_table(curves: list[Curve], limits: Sequence[Limit]) -> dict[str, np.n
         free = rows[0]
     table = {name: np.array([row[name] for row in rows]) for name in free}
     if any(c.lower is not None for c in curves):
-        lower = [np.nan if c.lower is None else c.lower.told for c in curves]
+        lower = [np.nan if c.lower is None else c.lower.rounded for c in curves]
         table["lower_amplitude"] = np.array([np.nan, *lower, *(np.nan for _ in stuck)])
     if any(c.mass is not None for c in curves):
         masses = [None, *(c.mass for c in curves), *(limit.mass for limit in limits[1:])]

@@ -240,7 +240,7 @@ def lower_sentence(curves: Sequence[Curve]) -> str:
     measured from rest it may be the only one that is seen.
     """
     each = ", ".join(
-        f"some {1e6 * c.lower.told:g} um in place of {1e6 * c.curve_amplitude:.4g} um at "
+        f"some {1e6 * c.lower.rounded:g} um in place of {1e6 * c.curve_amplitude:.4g} um at "
         f"{c.peak_frequency:.5g} Hz under {newtons(c.load)}"
         + (f" (whether it lasts is not known: {c.lower.doubt})" if c.lower.doubt else "")
         for c in curves

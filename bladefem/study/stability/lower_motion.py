@@ -46,8 +46,8 @@ class LowerMotion:
     doubt: str = ""
 
     @property
-    def told(self) -> float:
-        """The amplitude as it is told, with two digits, since few contact points tell it [m]: 120
+    def rounded(self) -> float:
+        """The amplitude with two digits, since few contact points give it [m]: 120
         um under 36 N of the shipped wedge, where a march of all of them from rest keeps 135.
         """
         return float(f"{self.amplitude:.2g}")
