@@ -115,9 +115,7 @@ def survey_modes(
     )
     clock = _stage_seconds(run, "effective masses, clamped blade", clock)
     if wanted.speeds is not None:
-        result = replace(
-            result, campbell=campbell_tables(bodies, wanted.speeds, _engine_orders(scene))
-        )
+        result = replace(result, campbell=_campbell(run, bodies, wanted.speeds, folder, comm))
         run.messages.append(orders_remark(scene, on_root(comm, lambda: given_fields(folder))))
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
@@ -131,6 +129,27 @@ def survey_modes(
             messages.append(method("the forced response has Coriolis forces"))
         clock = _stage_seconds(run, "forced response", clock)
     return result if other is None else _compare_modes(result, *other)
+
+
+def _campbell(
+    run: ModalRun,
+    bodies: Bodies,
+    speeds: Sequence[float],
+    folder: str | Path,
+    comm: Communicator | None,
+) -> Campbell:
+    """Campbell tables of these speeds [rad/s], which the folder keeps."""
+    orders = _engine_orders(run.scene)
+    found, seconds = cached_stage(
+        folder,
+        "campbell",
+        stage_key("campbell", run.scene, list(speeds), orders),
+        lambda: campbell_tables(bodies, speeds, orders),
+        comm,
+    )
+    if seconds is not None:
+        run.messages.append(found_remark("campbell", seconds))
+    return found
 
 
 def _convergence(
