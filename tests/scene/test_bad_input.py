@@ -60,6 +60,7 @@ REFUSED = [
     ("damper.angle=65", "expected 15 deg to 90 deg; did you mean '65 deg'?"),
     ("aerofoil.twist=10", "did you mean '10 deg'?"),
     ("mesh.size=8", "did you mean '8 mm'?"),
+    ("mesh.size=1_0", "did you mean '10 mm'?"),
     ("material.blade.E=210", "did you mean '210 GPa'?"),
     ("damper.mass=20", "did you mean '20 g'?"),
     # between fields
