@@ -331,7 +331,7 @@ def test_a_headline_tells_its_tolerance_and_the_loads_that_do_as_well(best):
     summary, table = tables(best)
     found = response_answer(summary, searched=table).numbers
     assert found[0][1] == f"{best.load:.4g} N" and "by exact search" in found[0][2]
-    assert "search closed to" in found[1][2] and "estimated error" in found[1][2]
+    assert "search ended within" in found[1][2] and "estimated error" in found[1][2]
 
 
 def test_the_range_of_the_search_is_that_of_the_friction_of_the_seats():

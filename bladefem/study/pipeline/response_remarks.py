@@ -173,7 +173,7 @@ def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
 
 
 def march_sentence(curve: Curve) -> str:
-    """How the resonance was sought where balances do not tell it, or ""."""
+    """How the resonance was sought where balances do not give it, or ""."""
     found = curve.resonance_by_march
     return "" if found is None else f"load {load_of(curve)}: {found.sentence}"
 
@@ -242,7 +242,8 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
     if unknown:
         yield (
             f"under {', '.join(unknown)} the error of the resonance amplitude is unknown: "
-            "neither richer models of it nor a march tell it; nothing was refined because of that"
+            "neither richer models of it nor an integration in time give it; no setting was made "
+            "finer for it"
         )
     # as it is reported, with two digits: no estimate is known better
     above = [
@@ -304,11 +305,11 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         tolerated = ""
         if np.isfinite([start, end]).all():
             share = f"{100 * scene.accuracy:.3g} %"
-            tolerated = f", and from {newton_range(start, end)} they keep within {share} of it"
+            tolerated = f", and from {newton_range(start, end)} it keeps within {share} of that"
         yield (
             f"search for the best load{damper}: it ended at {newtons(b.load, 4)}, between {lowest} "
             f"and {highest}, with {len(b.tried)} loads and {b.points} points; no load near it "
-            f"lowers the amplitude of these balances by more than {percent(b.tolerance)}"
+            f"lowers the amplitude, by harmonic balance, by more than {percent(b.tolerance)}"
             f"{tolerated}; "
             f"{b.settings.sentence(error_text=error)}"
         )
