@@ -263,7 +263,7 @@ def in_time_sentence(c: Curve) -> str:
     assert band is not None
     more = "" if band.points is None else f" with {band.points} contact points a seat"
     return (
-        f"under {load_of(c)} contacts lift off and balances with more harmonics do not tell the "
+        f"under {load_of(c)} contacts lift off and balances with more harmonics do not give the "
         f"error of the resonance amplitude, {1e6 * c.peak_amplitude:.4g} um; it is estimated from "
         f"a march in time from there{more}, which keeps between {1e6 * band.lowest:.4g} and "
         f"{1e6 * band.highest:.4g} um"

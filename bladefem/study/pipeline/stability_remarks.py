@@ -263,7 +263,7 @@ def lower_sentence(curves: Sequence[Curve]) -> str:
         return ""
     return (
         "contacts lift off at the resonance, and from rest the blade may keep to another, lower "
-        f"motion at the same frequency: {each}; the larger one is given, and the error told is "
+        f"motion at the same frequency: {each}; the larger one is given, and the error reported is "
         "that of this one alone"
     )
 
