@@ -249,7 +249,9 @@ def test_a_load_whose_resonance_is_hardly_known_is_not_studied_again():
         return new
 
     started = StudiedLoads(given, [curve_at(one) for one in given], [found])
-    ended = study_kept_loads(started, searches_of([found]), curve_at, 0.05)
+    ended = study_kept_loads(
+        started, searches_of([found]), lambda cases: [curve_at(one) for one in cases], 0.05
+    )
     loads = np.array([c.load for c in ended.curves])
     assert len(loads) == len(given) + 1
     assert np.all(np.diff(loads) / loads[:-1] > 0.02)
