@@ -315,10 +315,11 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         )
         if b.kept is not None:
             yield (
-                f"best load{damper}: the blade does not keep to the balance under "
-                f"{newtons(b.load, 4)}; of the motions that it keeps those under "
-                f"{newtons(b.kept.load, 4)} are the lowest, and another load lowers them by "
-                f"{percent(b.kept.tolerance)} at most, as far as they are convex there"
+                f"best load{damper}: the blade does not keep to the periodic vibration that "
+                f"harmonic balance finds under {newtons(b.load, 4)}; of the vibrations "
+                f"that it keeps those under {newtons(b.kept.load, 4)} are the lowest, and another "
+                f"load lowers them by {percent(b.kept.tolerance)} at most, if amplitude over load "
+                "is convex there"
             )
 
 

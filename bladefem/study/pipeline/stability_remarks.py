@@ -212,8 +212,8 @@ def _marched_from_flank(curve: Curve) -> str:
     end = ends.get(curve.peak_frequency)
     beyond = f"; it is the {end} point of the band, beyond which it may be higher" if end else ""
     return (
-        f"the amplitude given is that of a march from {1e6 * curve.balance_amplitude:.4g} um at "
-        f"{curve.peak_frequency:.5g} Hz{found}{beyond}"
+        "the amplitude given is that of an integration in time (a march) from "
+        f"{1e6 * curve.balance_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz{found}{beyond}"
     )
 
 
