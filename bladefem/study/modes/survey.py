@@ -119,7 +119,8 @@ def survey_modes(
         run.messages.append(orders_remark(scene, on_root(comm, lambda: given_fields(folder))))
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
-        result = replace(result, convergence=_convergence(run, wanted.sizes, comm, progress))
+        found = _convergence(run, wanted.sizes, folder, comm, progress)
+        result = replace(result, convergence=found)
         clock = _stage_seconds(run, "mesh refinement", clock)
     if wanted.loads is not None:
         result = replace(
@@ -155,16 +156,29 @@ def _campbell(
 def _convergence(
     run: ModalRun,
     sizes: Sequence[float],
+    folder: str | Path,
     comm: Communicator | None,
     progress: Progress,
 ) -> Convergence:
-    """The excited diameter on meshes of these sizes, of the usual ones where none are given."""
+    """The excited diameter on meshes of these sizes, of the usual ones where none are given, which
+    the folder keeps.
+    """
     excited = excited_set(run)
     n = excited.nodal_diameter
     # after the rigid modes, which any mesh has exactly
     count = MODES_STUDIED + int(np.count_nonzero(excited.frequencies == 0))
     wanted = list(sizes) or default_sizes(run.scene)
-    return mesh_convergence(run.scene, wanted, None if n is None else [n], count, comm, progress)
+    diameters = None if n is None else [n]
+    found, seconds = cached_stage(
+        folder,
+        "mesh_refinement",
+        stage_key("mesh_refinement", run.scene, wanted, diameters, count),
+        lambda: mesh_convergence(run.scene, wanted, diameters, count, comm, progress),
+        comm,
+    )
+    if seconds is not None:
+        run.messages.append(found_remark("mesh refinement", seconds))
+    return found
 
 
 def rigid_mode_remarks(sets: Sequence[ModeSet]) -> list[str]:

@@ -60,6 +60,12 @@ STAGE_INPUTS = {
         fields=("excitation.engine_order",),
         code=("bladefem.contact", "bladefem.study"),
     ),
+    # element sizes come with the key
+    "mesh_refinement": StageInputs(
+        after=("modes",),
+        fields=("excitation.engine_order",),
+        code=("geometry", "bladefem.study"),
+    ),
     "stress": StageInputs(
         after=("modes",), fields=("operation.speed", "excitation"), code=("bladefem.study",)
     ),
