@@ -115,7 +115,7 @@ def fake_run(folder):
     return SimpleNamespace(
         mesh=mesh,
         modes=modes,
-        contact=SimpleNamespace(maps={40.0: [seat]}),
+        contact=SimpleNamespace(maps={40.0: [seat]}, own=None),
         response=response,
         reduced=reduced,
         timings={"mesh": 1.5, "modes": 4.5},
