@@ -20,6 +20,9 @@ import bladefem
 from bladefem.fem.constraint import constrain
 from bladefem.fem.modes import modes
 from bladefem.study.modes.comparison import family_table
+from bladefem.util.script_help import help_and_exit
+
+help_and_exit(__file__)
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"

@@ -12,6 +12,9 @@ from pathlib import Path
 from mpi4py import MPI
 
 import bladefem
+from bladefem.util.script_help import help_and_exit
+
+help_and_exit(__file__)
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"

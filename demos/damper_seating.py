@@ -21,6 +21,9 @@ from mpi4py import MPI
 import bladefem
 from bladefem.contact.seating import solve_seating
 from bladefem.study.pipeline.damper_contact import contact_patches
+from bladefem.util.script_help import help_and_exit
+
+help_and_exit(__file__)
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"

@@ -27,9 +27,12 @@ from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.sweep import sweep
+from bladefem.util.script_help import help_and_exit
 from bladefem.view.paper import draw_friction_loops, draw_peaks, draw_tip_responses
 from verification.paper.blades import judge, load_curve, optimum, peak, seat_loop
 from verification.paper.plane_row import paper_model, row_of_blades, whole_model
+
+help_and_exit(__file__)
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"

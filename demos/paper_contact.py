@@ -21,7 +21,10 @@ from bladefem.study.kinds.punch import (
     ring_stiffness,
     spring_tilt,
 )
+from bladefem.util.script_help import help_and_exit
 from verification.paper.view_contact import draw_punch
+
+help_and_exit(__file__)
 
 coarse, comm = "BLADEFEM_COARSE" in os.environ, MPI.COMM_WORLD
 scenes = Path(__file__).resolve().parents[1] / "scenes"

@@ -17,9 +17,12 @@ from mpi4py import MPI
 from scipy.integrate import trapezoid
 
 from bladefem.friction.closed_form import circular_orbit_work, jenkins
+from bladefem.util.script_help import help_and_exit
 from bladefem.view.paper import draw_coupled_loops, draw_fit
 from verification.paper.element import coupled_loop, linear_fit, printed_loop, two_slope_loop, work
 from verification.paper.printed_laws import per_axis
+
+help_and_exit(__file__)
 
 if MPI.COMM_WORLD.rank:  # small enough for one rank; the others wait at the end
     raise SystemExit

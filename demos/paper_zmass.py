@@ -22,7 +22,10 @@ from bladefem.damper.loops import FoundationMotion, ratio_table, spectrum, stead
 from bladefem.report.zmass import draw_motions
 from bladefem.scene.toml import vary
 from bladefem.study.kinds.zmass import mass_on_foundation, press_mass, steady_motions
+from bladefem.util.script_help import help_and_exit
 from bladefem.view.paper import draw_footprint
+
+help_and_exit(__file__)
 
 coarse = "BLADEFEM_COARSE" in os.environ
 scenes = Path(__file__).resolve().parents[1] / "scenes"

@@ -10,6 +10,9 @@
 import numpy as np
 
 from bladefem import balance as bf
+from bladefem.util.script_help import help_and_exit
+
+help_and_exit(__file__)
 
 M = np.diag([1.0, 1.0])  # [kg]
 K = np.array([[1.5e6, -0.5e6], [-0.5e6, 1.5e6]])  # [N/m]

@@ -186,7 +186,7 @@ def _mesh_facing_bodies(
     return complete_mesh(
         mesh,
         {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3))},
-        far,
+        size.scale * far,
         flat=("seat_right", "damper_left"),
     )
 

@@ -54,7 +54,7 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
         with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)
     sector = Sector(0, np.eye(3), np.array([0.0, plane.pitch, 0.0]))
-    return replace(complete_mesh(mesh, motions, base, sector), depth=plane.depth)
+    return replace(complete_mesh(mesh, motions, size.scale * base, sector), depth=plane.depth)
 
 
 def check_plane(plane: Plane) -> None:

@@ -99,7 +99,11 @@ def wedge_sector(
         with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     mesh = complete_mesh(
-        mesh, face_motions(shape), sizes.base, next_sector_motion(disc.sectors), flat=SEATS
+        mesh,
+        face_motions(shape),
+        size.scale * sizes.base,
+        next_sector_motion(disc.sectors),
+        flat=SEATS,
     )
     return damper_moved_inwards(mesh, wedge, shape) if wedge.clearance else mesh
 

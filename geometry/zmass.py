@@ -91,7 +91,9 @@ def z_mass(
         with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     pairs = {"this": ("seat", "footprint", np.eye(3), np.zeros(3))} if depth else {}
-    return complete_mesh(mesh, pairs, base, flat=("seat", "footprint") if depth else ())
+    return complete_mesh(
+        mesh, pairs, size.scale * base, flat=("seat", "footprint") if depth else ()
+    )
 
 
 def check_z_mass(z: ZMass) -> None:

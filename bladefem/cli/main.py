@@ -126,8 +126,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # run folders, kept for this command; they see how it ends
         with ExitStack() as options.held:
             options.function(options, comm)
+        if comm is None or comm.rank == 0:
+            _warn_of_unused_options()
 
     return ranks.exit_code_of(command, options)
+
+
+def _warn_of_unused_options() -> None:
+    """Name options that PETSc got and that nothing has asked for: misspelt ones, or those of parts
+    that the command does not use.
+    """
+    # only where it has been loaded: most commands do not need it
+    compat = sys.modules.get("bladefem.fem.compat")
+    names = [] if compat is None else compat.unused_options()
+    if names:
+        print(
+            f"bladefem: warning: solver.petsc: nothing asked for -{', -'.join(names)}, which had "
+            "no effect; expected options of the parts of PETSc and SLEPc that this command uses, "
+            "such as -eps_ncv or -eps_monitor",
+            file=sys.stderr,
+            flush=True,
+        )
 
 
 def _replace_unknown_letters() -> None:

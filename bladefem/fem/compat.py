@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import locale
 import logging
+import os
 import sys
 import time
 import warnings
@@ -57,6 +58,8 @@ finally:
     sys.argv = _arguments
 
 sys.setdlopenflags = _setdlopenflags
+# options that PETSc asks for when the program ends
+READ_AT_THE_END = ("options_", "malloc_", "memory_view", "objects_dump", "mpidump")
 
 # from this size on a block of memory goes back to the system when it is freed [bytes]: smaller ones
 # come and go so often that new pages would cost more than they spare
@@ -370,6 +373,18 @@ def assemble_vector(form: Any) -> PETSc.Vec:
     vector = dolfinx.fem.petsc.assemble_vector(compile_form(form))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def unused_options() -> list[str]:
+    """Names in PETSc's database, without their dashes, that nothing has asked for, of those that
+    did not come from the environment or are read at the program's end.
+    """
+    outside = {word.lstrip("-") for word in os.environ.get("PETSC_OPTIONS", "").split()}
+    return sorted(
+        name
+        for name in PETSc.Options().getAll()
+        if not (option_used(name) or name in outside or name.startswith(READ_AT_THE_END))
+    )
 
 
 def option_used(name: str) -> bool:

@@ -405,9 +405,25 @@ def _make_solver(
     pencil.put(start.sum(axis=1, keepdims=True).astype(con.dtype), first)
     eps.setInitialSpace(first)
     if settings.options:
+        _refuse_log_options(settings.options)
         PETSc.Options().insertString(settings.options)
     eps.setFromOptions()
     return eps
+
+
+def _refuse_log_options(options: str) -> None:
+    """Refuse options that PETSc reads as the program starts; it ends in an error at their late
+    coming.
+
+    Raises:
+        InputError: the first of them.
+    """
+    for word in options.split():
+        if word.startswith("-log_"):
+            raise InputError(
+                f"solver.petsc: {word} is read when the program starts, expected in the "
+                f"environment: PETSC_OPTIONS={word}"
+            )
 
 
 def _refuse_unknown(options: str) -> None:

@@ -94,8 +94,9 @@ def follow_path(
             folds += point.fold
             if folds > limits.folds:
                 notes.append(
-                    f"a path was left at {point.solution.frequency:.6g} Hz after "
-                    f"{limits.folds} folds: there may be further motions"
+                    "the response curve was not followed beyond "
+                    f"{point.solution.frequency:.6g} Hz, after {limits.folds} folds: there may be "
+                    "further motions"
                 )
                 break
             if len(points) >= budget or _closed(points):

@@ -37,8 +37,9 @@ def next_value(
     lower end.
 
     The cubic sees smooth minima, the tangents corners, where two peaks exchange their order; of two
-    minima in a bracket neither can be trusted, nor either curve between very different heights:
-    the bracket is halved then.
+    minima in a bracket neither can be trusted, nor either curve between very different heights, nor
+    where the tangents do not meet inside, since the height then bends down between the ends: the
+    bracket is halved then.
     """
     width = search.width(low.value, high.value)
     down = low.slope * width
@@ -48,11 +49,13 @@ def next_value(
     if unlike or not down < 0 <= up:
         return search.moved(low.value, width / 2), np.inf
     meet, corner = tangents_meet(down, up, rise)
+    if not 0 < meet < 1:
+        # most that the slope at the lower end can gain
+        fall = -down if rise >= 0 else up
+        return search.moved(low.value, width / 2), fall / min(low.height, high.height)
     smooth, bottom = cubic_minimum(down, up, rise)
-    floor = low.height + bottom
-    if 0 < meet < 1:
-        floor = min(floor, low.height + corner)
-    share = meet if tangents and 0 < meet < 1 else smooth
+    floor = low.height + min(bottom, corner)
+    share = meet if tangents else smooth
     return (
         search.moved(low.value, float(np.clip(share, 0.05, 0.95)) * width),
         float(1 - floor / min(low.height, high.height)),

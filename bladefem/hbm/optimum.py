@@ -37,7 +37,7 @@ from .solver.newton import DEFAULT_OPTIONS, Options
 # values of the parameter tried before giving up
 MOST_LEVELS = 30
 # factor by which a step is shortened where no peak was solved at its end, also inside a bracket,
-# and how often at most
+# and how often in a row at most
 SHORTENING_FACTOR = 3.0
 MOST_SHORTENED = 3
 # first step, as a share of the range (of a factor: of its logarithm)
@@ -238,11 +238,23 @@ def _close_in(search: PeakSearch, levels: dict[float, list[Peak]]) -> int:
                 raise
             step /= SHORTENING_FACTOR
             continue
+        # else every later step would be as short, and no bracket would close
+        shortened = 0
         step *= 2
         points += count
-    raise NotSolvedError(
-        f"the optimum was not closed in with {MOST_LEVELS} values, the last of them "
-        f"{search.value_in_words(value)}"
+    raise NotSolvedError(_not_converged(search, levels))
+
+
+def _not_converged(search: PeakSearch, levels: dict[float, list[Peak]]) -> str:
+    """What a search that ran out of values found."""
+    tried = highest_peaks(levels)
+    best = min(tried, key=lambda peak: peak.height)
+    low, high = bracket_minimum(tried)
+    ends = [search.bounds[i] if one is None else one.value for i, one in enumerate((low, high))]
+    return (
+        f"the search did not converge within {MOST_LEVELS} values; the lowest resonance that it "
+        f"found is at {search.value_in_words(best.value)}, a minimum lies between {ends[0]:.4g} "
+        f"and {ends[1]:.4g} {search.along.unit}".rstrip()
     )
 
 

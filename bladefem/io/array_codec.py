@@ -1,4 +1,4 @@
-"""Dataclasses, arrays and plain values to one ``.npz`` file and back, without pickle.
+"""Dataclasses, arrays, tables and plain values to one ``.npz`` file and back, without pickle.
 
 The structure becomes JSON; every array is a member of its own. Only dataclasses of bladefem and
 geometry are made again on reading, so that a file from elsewhere cannot run code.
@@ -101,6 +101,9 @@ def _encode(value: Any, arrays: list[np.ndarray]) -> Any:
                 *(_array(a, arrays) for a in (csc.data, csc.indices, csc.indptr)),
             ]
         }
+    # a pandas table, without importing pandas where there is none
+    if hasattr(value, "columns") and hasattr(value, "iloc"):
+        return {"q": [[_encode(name, arrays), _column(value[name], arrays)] for name in value]}
     if isinstance(value, slice):
         return {"s": [value.start, value.stop, value.step]}
     if isinstance(value, dict):
@@ -108,8 +111,18 @@ def _encode(value: Any, arrays: list[np.ndarray]) -> Any:
     if isinstance(value, (list, tuple)):
         return {"t" if isinstance(value, tuple) else "l": [_encode(v, arrays) for v in value]}
     raise TypeError(
-        f"a {type(value).__name__} cannot be stored; expected dataclasses, arrays and plain values"
+        f"a {type(value).__name__} cannot be stored; expected dataclasses, arrays, tables "
+        "and plain values"
     )
+
+
+def _column(column: Any, arrays: list[np.ndarray]) -> Any:
+    """A column of a table whose rows are numbered from 0: numbers as an array, words as a list."""
+    if list(column.index) != list(range(len(column))):
+        raise TypeError("a table whose rows are not numbered from 0 cannot be stored")
+    if isinstance(column.dtype, np.dtype) and column.dtype != object:
+        return _array(column.to_numpy(), arrays)
+    return _encode(column.tolist(), arrays)
 
 
 def _array(value: np.ndarray, arrays: list[np.ndarray]) -> Any:
@@ -139,12 +152,26 @@ _DECODERS = {
     "c": lambda body, _: complex(float.fromhex(body[0]), float.fromhex(body[1])),
     "a": lambda body, arrays: arrays[body],
     "p": lambda body, arrays: _sparse(tuple(body[0]), *(arrays[part["a"]] for part in body[1:])),
+    "q": lambda body, arrays: _table(body, arrays),
     "s": lambda body, _: slice(*body),
     "w": lambda body, _: Message(*body),
     "m": lambda body, arrays: {_decode(k, arrays): _decode(v, arrays) for k, v in body},
     "l": lambda body, arrays: [_decode(v, arrays) for v in body],
     "t": lambda body, arrays: tuple(_decode(v, arrays) for v in body),
 }
+
+
+def _table(body: list[Any], arrays: list[np.ndarray]) -> Any:
+    import pandas as pd
+
+    columns = {_decode(name, arrays): _decode(values, arrays) for name, values in body}
+    # of a list without values pandas would make numbers
+    return pd.DataFrame(
+        {
+            name: pd.Series(values, dtype=object if isinstance(values, list) else None)
+            for name, values in columns.items()
+        }
+    )
 
 
 def _sparse(

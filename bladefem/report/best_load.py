@@ -188,7 +188,7 @@ def error_words(row: pd.Series) -> str:
     if np.isnan(error):
         return "not estimated"
     if np.isinf(error):
-        return "error unknown: neither richer models nor a march tell it"
+        return "error unknown: neither richer models nor an integration in time give it"
     parts = "model and mesh" if np.isfinite(row.get("body_mesh", np.nan)) else "model; mesh apart"
     return f"± {percent(max(error, 1e-4))} ({parts})"
 
@@ -208,7 +208,7 @@ def stress_error_words(row: pd.Series) -> str:
 
 
 def flat_range(best: pd.Series) -> str:
-    """What the loads around the best one are, which stand before it as its uncertainty."""
+    """What the loads around the best one are, which are given with it as its uncertainty."""
     low, high = best.get("tolerated_from", np.nan), best.get("tolerated_to", np.nan)
     by = "by exact search"
     if best.get("compared", BALANCES) == KEPT_MOTIONS:
@@ -223,7 +223,8 @@ def certainty(best: pd.Series) -> str:
     if "tolerance" not in best:
         return ""
     return (
-        f"estimated error {percent(best['error'])}, search closed to {percent(best['tolerance'])}"
+        f"estimated error {percent(best['error'])}, "
+        f"search ended within {percent(best['tolerance'])} of the minimum"
     )
 
 
@@ -287,7 +288,10 @@ def _below_error(best: pd.Series, summary: pd.DataFrame) -> list[str]:
     if limits.empty:
         return []
     if np.isinf(error):
-        return ["the error of its amplitude is unknown: neither richer models nor a march tell it"]
+        return [
+            "the error of its amplitude is unknown: neither richer models nor an integration in "
+            "time give it"
+        ]
     gain = 1 - best["peak_amplitude"] / limits["peak_amplitude"].min()
     if gain < 0:
         # whatever its error is

@@ -38,10 +38,11 @@ CAPTIONS = {
     "lowest mode, which no order excites.",
     "modes/mac": "Modal assurance criterion against the modes of the other run.",
     "modes/nodal_diameters": "Natural frequencies over nodal diameter, without damper, by family.",
-    "response/best_load": "The load that makes the resonance smallest, by exact search; every load "
-    "of the range in the last columns was open to it. The search compares balances; where the "
-    "blade does not keep to the one that it ended at, motions that it keeps under this and other "
-    "loads are compared. Amplitude, frequency and error are those of the response under this load.",
+    "response/best_load": "The load that makes the resonance smallest, by exact search over the "
+    "range of loads in the last columns. The search compares periodic solutions of the harmonic "
+    "balance; where the one under the load found is unstable, the steady vibrations that the blade "
+    "keeps under this and other loads are compared. Amplitude, frequency and error are those of "
+    "the response under this load.",
     "response/influences": "What the best load depends on: each parameter over its range, by exact "
     "derivatives of the balances that its search compares (bars); the two with the largest effect "
     "solved again at both ends (diamonds).",
@@ -51,10 +52,11 @@ CAPTIONS = {
     "response/influence_table": "What the best load depends on: each parameter, its range in "
     "multiples of its value, and the exact logarithmic derivatives: 0.5 means that 2 % more of the "
     "parameter give 1 % more.",
-    "response/local_resonances": "Every local maximum of each response: motions found at its "
-    "frequency, and by which slow sweep it is reached (isolated: by neither; march in time: kept "
-    "there in time, in place of an unstable balance; from rest: another, lower motion at the "
-    "frequency of the resonance, no maximum of its own). Stability is lost by a fold (the motion "
+    "response/local_resonances": "Every local maximum of each response: how many motions (steady "
+    "vibrations) were found at its frequency, and by which slow sweep it is reached (isolated: by "
+    "neither; march in time: what an integration in time keeps, in place of an unstable periodic "
+    "solution; from rest: another, lower motion at the frequency of the resonance, no maximum of "
+    "its own). Stability is lost by a fold (the motion "
     "jumps, or moves on to one that branches off beside it), period doubling (it repeats after two "
     "periods) or a torus (a ripple of another frequency grows).",
     "response/resonances": "Linear resonances without damper.",

@@ -80,7 +80,7 @@ def _mass_step(
             f"No metal damper of this shape makes the best load at this speed: it takes {wanted} "
             f"in place of {1e3 * mass:.3g} g, {density:.3g} kg/m^3 in the shape drawn, where "
             f"metals have {METAL_DENSITIES[0]:g} to {METAL_DENSITIES[1]:g}. Change its size or "
-            "flanks (damper.length, damper.base, damper.angle); study.own_load = true tells what "
+            "flanks (damper.length, damper.base, damper.angle); study.own_load = true reports what "
             "it does as drawn."
         ]
     return [

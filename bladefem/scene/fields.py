@@ -249,7 +249,8 @@ def _forgotten_unit(written: object, field: Field) -> str:
     """The tail of a message where a plain number would do in the unit that people use: 65 was meant
     as 65 deg.
     """
-    number = str(written).strip()
+    # "1_0" is a number too, which nobody writes with a unit
+    number = str(written).strip().replace("_", "")
     meta = field.meta
     unit = meta.get("unit") or "1"
     for name in readable_units(unit) if is_plain(number) else ():

@@ -34,11 +34,11 @@ def slip_of_pen(path: Path, error: ValueError) -> str:
     if any(letter in line for letter in _CURLED):
         return f'; {shortened(line.strip())}: expected straight quotation marks, "..."'
     if _BARE_LIST.search(line):
-        return f"; {shortened(line.strip())}: each value with a unit stands in quotes"
+        return f"; {shortened(line.strip())}: each value with a unit is written in quotes"
     bare = _BARE.fullmatch(line.rstrip("\r"))
     if bare is None:
         return ""
     value = bare["value"].replace(",", ".") if bare["comma"] else bare["value"]
     if re.fullmatch(r"[+-]?[\d.]+", value):
         return f"; {shortened(line.strip())}: decimals have a point, {value}"
-    return f'; {shortened(line.strip())}: a value with a unit stands in quotes, "{value}"'
+    return f'; {shortened(line.strip())}: a value with a unit is written in quotes, "{value}"'

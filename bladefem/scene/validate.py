@@ -120,8 +120,9 @@ def _check_temperature(scene: Scene) -> Iterator[str]:
         named |= {f"imported.materials, {name}": m for name, m in part_materials(scene).items()}
     hot = given.file or (given.uniform is not None and given.uniform != given.reference)
     for name, material in named.items():
+        table = f"{name}.table" if name.startswith("material.") else name
         for temperature in (coldest, hottest):
-            material_at(material, temperature)
+            material_at(material, temperature, table)
         if hot and not expands(material):
             yield (
                 f"{name}.expansion is missing: the temperature differs from "

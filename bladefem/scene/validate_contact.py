@@ -107,7 +107,7 @@ def _check_history(scene: Scene) -> Iterator[str]:
         yield f"{name}: contact.mu = 0 leaves no friction, expected 'frictionless'"
     locked = self_locking(scene)
     if locked:
-        yield f"{locked}, so that {name} does not tell its load; expected a larger angle"
+        yield f"{locked}, so that {name} does not determine its load; expected a larger angle"
 
 
 def friction_of_seats(contact: Contact) -> tuple[float, float]:

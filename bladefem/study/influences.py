@@ -217,7 +217,8 @@ def influences(
     if abs(base.height / best.amplitude - 1) > SAME_PEAK:
         raise NotSolvedError(
             f"next to the resonance of {1e6 * best.amplitude:.4g} um one of "
-            f"{1e6 * base.height:.4g} um was found: derivatives of neither tell what both do"
+            f"{1e6 * base.height:.4g} um was found: "
+            "derivatives of one do not hold for both"
         )
     sides = [
         replace(study.peak("kt", 1.0, load, base), value=load)

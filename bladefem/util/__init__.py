@@ -1,1 +1,1 @@
-"""Progress bars and names that load on first use."""
+"""Progress bars, names that load on first use, ``script_help`` of the demos."""

@@ -66,7 +66,7 @@ def read_deviations(path: str | Path, count: int, families: int) -> BladeDeviati
         InputError: the file does not fit, or a blade would have no stiffness or no mass.
     """
     names, values = read_pattern(path, count)
-    quantities = [_quantity(name) for name in names]
+    quantities = [_quantity(path, name) for name in names]
     found = {}
     single = {}
     for quantity in QUANTITIES:
@@ -75,16 +75,16 @@ def read_deviations(path: str | Path, count: int, families: int) -> BladeDeviati
         if columns.shape[1] not in (0, 1, families):
             of = "" if quantity == FREQUENCY else f" with a {quantity}"
             raise InputError(
-                f"mistuning.pattern: {columns.shape[1]} families{of}, expected 1 for all or "
+                f"{_field(path)}: {columns.shape[1]} families{of}, expected 1 for all or "
                 f"mistuning.families = {families}"
             )
-        _refuse_nothing_left(columns, quantity)
+        _refuse_nothing_left(path, columns, quantity)
         if columns.shape[1] == 0:
             columns = np.zeros((count, 1))
         found[quantity] = np.broadcast_to(columns, (count, families)).copy()
     if FREQUENCY in quantities and set(quantities) != {FREQUENCY}:
         raise InputError(
-            f"pattern file {Path(path).name}: columns of frequency next to columns of stiffness or "
+            f"{_field(path)}: columns of frequency next to columns of stiffness or "
             "mass, expected frequencies alone, or stiffnesses and masses"
         )
     return BladeDeviations(
@@ -103,11 +103,11 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
     """
     path = Path(path)
     if not path.is_file():
-        raise InputError(f"mistuning.pattern = '{path}': {missing_file(path)}")
-    rows = csv_lines(path, f"pattern file {path.name}")
+        raise InputError(f"{_field(path)}: {missing_file(path)}")
+    rows = csv_lines(path, _field(path))
     cells = [[cell.strip() for cell in row.split(",")] for row in rows if row]
     if len(cells) < 2:
-        raise InputError(f"pattern file {path.name}: expected a row of names and {count} blades")
+        raise InputError(f"{_field(path)}: expected a row of names and {count} blades")
     names = cells[0]
     values = _read_numbers(path, cells[1:], len(names))
     if set(re.findall("[a-z]+", names[0].lower())) in NUMBERING:
@@ -115,12 +115,15 @@ def read_pattern(path: str | Path, count: int) -> tuple[list[str], np.ndarray]:
         names = names[1:]
         values = values[:, 1:]
     if len(values) != count:
-        raise InputError(
-            f"pattern file {path.name}: {len(values)} blades, expected {count}, one a sector"
-        )
+        raise InputError(f"{_field(path)}: {len(values)} blades, expected {count}, one a sector")
     if not names:
-        raise InputError(f"pattern file {path.name}: expected a column of deviations")
+        raise InputError(f"{_field(path)}: expected a column of deviations")
     return names, values * [_unit(path, name) for name in names]
+
+
+def _field(path: str | Path) -> str:
+    """The field of a scene that names the file, and its value, for messages."""
+    return f"mistuning.pattern = '{path}'"
 
 
 def _unit(path: Path, name: str) -> float:
@@ -134,13 +137,12 @@ def _unit(path: Path, name: str) -> float:
     found = re.search(r"\[(.*?)\]", name)
     if found is not None and found[1].strip() not in ("", "1"):
         raise InputError(
-            f"pattern file {path.name}: column '{name}', expected relative deviations, without a "
-            "unit or in %"
+            f"{_field(path)}: column '{name}', expected relative deviations, without a unit or in %"
         )
     return 1.0
 
 
-def _quantity(name: str) -> str:
+def _quantity(path: str | Path, name: str) -> str:
     """The quantity that deviates in a column: a word of its name, be it followed by a unit.
 
     Raises:
@@ -154,19 +156,19 @@ def _quantity(name: str) -> str:
         close = close_word(word, QUANTITIES)
         if close and close != FREQUENCY:
             raise InputError(
-                f"mistuning.pattern: column '{name}': expected the name of a family, alone or with "
+                f"{_field(path)}: column '{name}': expected the name of a family, alone or with "
                 f"one of {', '.join(QUANTITIES)}; did you mean '{close}'?"
             )
     return FREQUENCY
 
 
-def _refuse_nothing_left(columns: np.ndarray, quantity: str) -> None:
+def _refuse_nothing_left(path: str | Path, columns: np.ndarray, quantity: str) -> None:
     if columns.min(initial=0.0) > -1:
         return
     blade = int(np.argmin(columns.min(axis=1)))
     left = MASS if quantity == MASS else STIFFNESS
     raise InputError(
-        f"mistuning.pattern: deviation {columns.min():.4g} of blade {blade + 1} leaves it no "
+        f"{_field(path)}: deviation {columns.min():.4g} of blade {blade + 1} leaves it no "
         f"{left}, expected relative deviations of {quantity} above -1"
     )
 
@@ -179,20 +181,18 @@ def _read_numbers(
     for i, row in enumerate(rows):
         if len(row) != columns:
             raise InputError(
-                f"pattern file {path.name}: {len(row)} columns in blade {i + 1}, expected {columns}"
+                f"{_field(path)}: {len(row)} columns in blade {i + 1}, expected {columns}"
             )
     try:
         values = np.array(rows, dtype=float)
     except ValueError as error:
-        raise InputError(f"pattern file {path.name}: {error}, expected numbers") from None
+        raise InputError(f"{_field(path)}: {error}, expected numbers") from None
     if not np.isfinite(values).all():
-        raise InputError(f"pattern file {path.name}: expected finite numbers")
+        raise InputError(f"{_field(path)}: expected finite numbers")
     return values
 
 
 def _check_order(path: Path, numbers: np.ndarray) -> None:
     expected = np.arange(len(numbers)) + numbers[0]
     if numbers[0] not in (0, 1) or not np.array_equal(numbers, expected):
-        raise InputError(
-            f"pattern file {path.name}: expected blades in order, numbered from 0 or from 1"
-        )
+        raise InputError(f"{_field(path)}: expected blades in order, numbered from 0 or from 1")

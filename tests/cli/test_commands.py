@@ -181,6 +181,33 @@ def test_letters_that_a_terminal_does_not_have_are_no_error(monkeypatch):
     assert "± ?" in written.getvalue().decode("latin-1")
 
 
+def modes_with_petsc(folder, *petsc):
+    """`bladefem modes` of a coarse blade in a process of its own: PETSc keeps its options."""
+    words = ["modes", str(SCENES / "plane.toml"), "--set", "mesh.scale=3", "-q", "--pictures", "0"]
+    return subprocess.run(
+        [sys.executable, "-m", "bladefem", *words, "-o", str(folder), "--", *petsc],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_petsc_options_that_nothing_asks_for_are_named(tmp_path):
+    """Those of SLEPc and MUMPS, and those that PETSc reads at the end, are not."""
+    known = ["-eps_ncv", "40", "-mat_mumps_icntl_14", "60", "-options_left", "no"]
+    done = modes_with_petsc(tmp_path, *known, "-mat_mumpz_icntl_4", "1", "-foo")
+    assert done.returncode == 0, done.stderr
+    (warned,) = (line for line in done.stderr.splitlines() if "warning" in line)
+    assert "nothing asked for -foo, -mat_mumpz_icntl_4, which had no effect" in warned
+
+
+def test_petsc_options_that_come_too_late_are_refused(tmp_path):
+    """PETSc ended in an error of its own at the end of the program."""
+    done = modes_with_petsc(tmp_path, "-log_view")
+    assert done.returncode == 2
+    assert done.stderr.strip().endswith("in the environment: PETSC_OPTIONS=-log_view")
+
+
 @pytest.mark.parametrize("command", ["check", "mesh"])
 def test_umlauts_in_a_locale_of_ascii(command, tmp_path):
     """In title and file name; all commands ended in a traceback, by dolfinx's log, VTK and gmsh."""

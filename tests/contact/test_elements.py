@@ -21,7 +21,13 @@ from bladefem.contact.state_table import interpolate_states, quasi_static, state
 from bladefem.data import PressureMap
 from bladefem.errors import InputError
 from bladefem.scene.tables import Contact, Material, Seat
-from bladefem.study.pipeline.state_check import check_states, platform_tilt, state_sentence
+from bladefem.study.pipeline import state_check
+from bladefem.study.pipeline.state_check import (
+    StateCheck,
+    check_states,
+    platform_tilt,
+    state_sentence,
+)
 
 
 @pytest.fixture(scope="module")
@@ -318,6 +324,15 @@ def test_the_user_is_told_whether_the_table_is_enough(problem):
     assert not wide.enough and wide.indicator > wide.error > 0.05
     assert "is enough" in state_sentence(scene, problem, [100.0, 110.0], 1e-10)
     assert "is NOT enough" in state_sentence(scene, problem, [20.0, 200.0], 5e-6)
+
+
+def test_an_interpolation_off_by_rounding_is_given_without_its_zeros(problem, monkeypatch):
+    """It was 0.000000000000056 % of the largest force."""
+    scene = bladefem.load_scene("scenes/wedge.toml")
+    for error, said in ((5.6e-16, "by less than 0.000001 % of"), (0.012, "by up to 1.2 % of")):
+        check = StateCheck(25, error, error, 1e-3)
+        monkeypatch.setattr(state_check, "check_states", lambda *_, found=check: found)
+        assert said in state_sentence(scene, problem, [100.0, 110.0], 1e-10)
 
 
 @pytest.mark.parametrize("kink", [0.4, 0.5, 0.55])

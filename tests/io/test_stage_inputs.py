@@ -12,6 +12,7 @@ import pytest
 from bladefem.contact.patch import make_patch
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.toml import load_scene
+from bladefem.study.modes.campbell import campbell_tables
 from bladefem.study.modes.clamped_aerofoil import clamped_blade
 from bladefem.study.modes.stress import mode_strength
 from bladefem.study.pipeline.bodies import Bodies
@@ -66,6 +67,9 @@ STAGES = {
         find_modes(Bodies(scene, known.mesh)),
         clamped_blade(Bodies(scene, known.mesh)),
     ),
+    "campbell": lambda scene, known: campbell_tables(
+        Bodies(scene, known.mesh), [0.0, 100.0], [scene.excitation.engine_order]
+    ),
     "stress": lambda scene, known: mode_strength(
         Bodies(scene, known.mesh), excited_modes(scene, known.mesh, known.modes)
     ),
@@ -90,6 +94,8 @@ def test_a_stage_reads_what_it_declares(stage, plane):
     [
         ("modes", "excitation.engine_order=3"),
         ("contact", "damper.mass=20 g"),
+        ("campbell", "excitation.engine_order=3"),
+        ("campbell", "operation.speed=2000 rpm"),
         ("response", "contact.mu=0.11"),
         ("mesh", "aerofoil.twist=7 deg"),
         ("mode errors", "excitation.engine_order=3"),

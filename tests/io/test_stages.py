@@ -8,6 +8,7 @@ import sys
 from dataclasses import fields
 
 import numpy as np
+import pandas as pd
 import pytest
 import scipy.sparse
 
@@ -96,6 +97,20 @@ def test_a_stored_warning_stays_a_warning(tmp_path):
     write_npz(tmp_path / "x.npz", "key", [warning("coarse"), "plain"])
     back = read_npz(tmp_path / "x.npz", "key")
     assert by_level(back) == by_level([warning("coarse"), "plain"])
+
+
+@pytest.mark.parametrize("rows", [2, 0])
+def test_tables_come_back(rows, tmp_path):
+    """With types of their columns, also of one without rows; a key sees each value."""
+    table = pd.DataFrame(
+        {"mode": [1, 2], "speed": [0.1, np.nan], "wave": ["with", None], "own": [True, False]}
+    ).head(rows)
+    write_npz(tmp_path / "t.npz", "k", table)
+    pd.testing.assert_frame_equal(read_npz(tmp_path / "t.npz", "k"), table)
+    if rows:
+        assert key_of(table) != key_of(table.assign(mode=[1, 3]))
+        with pytest.raises(TypeError, match="rows are not numbered from 0"):
+            write_npz(tmp_path / "t.npz", "k", table.iloc[1:])
 
 
 def test_sparse_matrices_come_back(tmp_path):

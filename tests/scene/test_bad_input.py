@@ -60,6 +60,7 @@ REFUSED = [
     ("damper.angle=65", "expected 15 deg to 90 deg; did you mean '65 deg'?"),
     ("aerofoil.twist=10", "did you mean '10 deg'?"),
     ("mesh.size=8", "did you mean '8 mm'?"),
+    ("mesh.size=1_0", "did you mean '10 mm'?"),
     ("material.blade.E=210", "did you mean '210 GPa'?"),
     ("damper.mass=20", "did you mean '20 g'?"),
     # between fields
@@ -190,11 +191,11 @@ def test_files_that_are_no_scenes(tmp_path):
 @pytest.mark.parametrize(
     ("line", "meant"),
     [
-        ("span = 95 mm", 'span = 95 mm: a value with a unit stands in quotes, "95 mm"'),
-        ("span = 95,5 mm  # new", 'a value with a unit stands in quotes, "95.5 mm"'),
+        ("span = 95 mm", 'span = 95 mm: a value with a unit is written in quotes, "95 mm"'),
+        ("span = 95,5 mm  # new", 'a value with a unit is written in quotes, "95.5 mm"'),
         ("fillet = 0,002", "fillet = 0,002: decimals have a point, 0.002"),
         ("span = \u201c95 mm\u201d", "expected straight quotation marks"),
-        ("loads = [9 N, 18 N]", "each value with a unit stands in quotes"),
+        ("loads = [9 N, 18 N]", "each value with a unit is written in quotes"),
         ("span = = 3", "(at line 4, column 8)"),
     ],
 )

@@ -108,7 +108,12 @@ LATE = [
     ("study.masses=12 g, 12 g", "study.masses = 12 g: given twice"),
     ("study.loads=[50 N", "study.loads = '[50 N': expected a number"),
     ("excitation.direction=1e-300, 0, 0", "expected a direction"),
-    ('material.blade.table=["600 degC: E=210"]', "material table, E = 210 Pa: expected 1 MPa"),
+    (
+        'material.blade.table=["600 degC: E=210"]',
+        "material.blade.table, row '600 degC: E=210', E = 210 Pa: expected 1 MPa",
+    ),
+    ('material.damper.table=["600 degC"]', "material.damper.table, row '600 degC': expected"),
+    ('material.blade.table=["600 degC: E=9 GPa"]', "material.blade.table: it has no properties at"),
 ]
 
 

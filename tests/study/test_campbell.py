@@ -15,6 +15,7 @@ from bladefem.fem.modes import modes
 from bladefem.hbm.linear_resonances import wave_frequencies
 from bladefem.scene.tables import Solver
 from bladefem.scene.toml import load_scene
+from bladefem.study.modes import survey as survey_module
 from bladefem.study.modes.campbell import campbell_tables, read_speeds, speed_models
 from bladefem.study.modes.survey import Wanted, survey_modes
 from bladefem.study.pipeline.bodies import Bodies
@@ -184,3 +185,28 @@ def test_the_scenes_eigensolver_solves_the_modes_of_every_command(tmp_path):
     plane = load_scene(PLANE, ["mesh.size=8 mm", "solver.petsc=-eps_monitr"])
     with pytest.raises(InputError, match="-eps_monitr"):
         survey_modes(plane, tmp_path, Wanted())
+
+
+def test_a_finished_folder_keeps_its_campbell_tables(tmp_path, monkeypatch):
+    """Of the same speeds; others, and another engine order, are computed."""
+    speeds = []
+
+    def counted(bodies, wanted, orders):
+        speeds.append(list(wanted))
+        return campbell_tables(bodies, wanted, orders)
+
+    monkeypatch.setattr(survey_module, "campbell_tables", counted)
+
+    def surveyed(speed, order=2):
+        changes = ["mesh.scale=3", f"excitation.engine_order={order}"]
+        return survey_modes(load_scene(PLANE, changes), tmp_path, Wanted(speeds=[0.0, speed]))
+
+    made, found = surveyed(100.0), surveyed(100.0)
+    assert speeds == [[0.0, 100.0]]
+    assert any(text.startswith("campbell: found in the folder") for text in found.run.messages)
+    for name in ("table", "crossings", "interference", "margins"):
+        one, other = (getattr(survey.campbell, name) for survey in (made, found))
+        pd.testing.assert_frame_equal(one, other)
+    surveyed(200.0)
+    surveyed(200.0, order=3)
+    assert speeds == [[0.0, 100.0], [0.0, 200.0], [0.0, 200.0]]

@@ -23,6 +23,7 @@ from bladefem.fem.stiffness_error import frequency_errors
 from bladefem.report.modes import _numbers
 from bladefem.scene.tables import Material
 from bladefem.scene.toml import load_scene, scene_of
+from bladefem.study.modes import survey as survey_module
 from bladefem.study.modes.effective_mass import effective_masses
 from bladefem.study.modes.frequency_error import (
     PLAUSIBLE_ORDERS,
@@ -289,8 +290,29 @@ def test_the_elastic_modes_of_a_free_body_are_studied(tmp_path):
     true = found["given"][6:] / found["limit"][6:].fillna(found["frequency"]) - 1
     assert (true < 1.1 * found["given_error"][6:]).all() and (true[:2] > 1e-4).all()
     excited = survey.run.modes[0]
-    first, *_ = _numbers(excited, [""] * len(excited.frequencies), survey)
+    first, *_ = _numbers(excited, [""] * len(excited.frequencies), survey, 0.0)
     assert first.what == "mode 7, " and "nan" not in first.uncertainty
+
+
+def test_a_finished_folder_keeps_its_mesh_refinement(tmp_path, monkeypatch):
+    """Of the same sizes; others are meshed and solved."""
+    scene = load_scene("scenes/plane.toml", ["mesh.scale=2"])
+    meshed = []
+
+    def counted(scene, sizes, *others):
+        meshed.append(list(sizes))
+        return mesh_convergence(scene, sizes, *others)
+
+    monkeypatch.setattr(survey_module, "mesh_convergence", counted)
+    sizes = [0.02, 0.014, 0.01]
+    made, found = (survey_modes(scene, tmp_path, Wanted(sizes=sizes)) for _ in range(2))
+    assert meshed == [sizes]
+    assert any(text.startswith("mesh refinement: found in") for text in found.run.messages)
+    for name in ("points", "summary"):
+        one, other = (getattr(survey.convergence, name) for survey in (made, found))
+        pd.testing.assert_frame_equal(one, other)
+    survey_modes(scene, tmp_path, Wanted(sizes=[0.02, 0.015, 0.01]))
+    assert len(meshed) == 2
 
 
 def test_cells_of_mixed_shapes_are_halved(tmp_path, monkeypatch):

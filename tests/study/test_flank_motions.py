@@ -172,7 +172,8 @@ def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
     )
     text = unstable_sentence(curve, 0.02)
     assert (
-        f"2.149 um at 1077.3 Hz, {said}, and" in text and "march from 2.05 um at 1014.2 Hz" in text
+        f"2.149 um at 1077.3 Hz, {said}, and" in text
+        and "(a march) from 2.05 um at 1014.2 Hz" in text
     )
     assert "between 1.15 and 3.6 um" in text
     assert "first point of the band" in text

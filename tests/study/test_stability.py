@@ -141,12 +141,16 @@ def test_a_ripple_is_told_apart_from_another_amplitude():
     # given in place of the balance where the mesh leaves little of the accuracy
     instead = SimpleNamespace(**vars(rippling(near)) | {"march_replaces_balance": True})
     assert ripple_sentence([instead], 0.05) == ""
-    assert "the amplitude given is that of a march from there" in unstable_sentence(instead, 0.05)
+    assert (
+        "the amplitude given is that of an integration in time (a march) from there"
+        in unstable_sentence(instead, 0.05)
+    )
     marched = SimpleNamespace(
         **vars(rippling(far)) | {"march_replaces_balance": True, "peak_amplitude": 1.2e-3}
     )
-    assert "; the amplitude given is that of a march from there; " in unstable_sentence(
-        marched, 0.05
+    assert (
+        "; the amplitude given is that of an integration in time (a march) from there; "
+        in unstable_sentence(marched, 0.05)
     )
 
 

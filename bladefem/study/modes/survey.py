@@ -115,13 +115,12 @@ def survey_modes(
     )
     clock = _stage_seconds(run, "effective masses, clamped blade", clock)
     if wanted.speeds is not None:
-        result = replace(
-            result, campbell=campbell_tables(bodies, wanted.speeds, _engine_orders(scene))
-        )
+        result = replace(result, campbell=_campbell(run, bodies, wanted.speeds, folder, comm))
         run.messages.append(orders_remark(scene, on_root(comm, lambda: given_fields(folder))))
         clock = _stage_seconds(run, "campbell", clock)
     if wanted.sizes is not None:
-        result = replace(result, convergence=_convergence(run, wanted.sizes, comm, progress))
+        found = _convergence(run, wanted.sizes, folder, comm, progress)
+        result = replace(result, convergence=found)
         clock = _stage_seconds(run, "mesh refinement", clock)
     if wanted.loads is not None:
         result = replace(
@@ -133,19 +132,53 @@ def survey_modes(
     return result if other is None else _compare_modes(result, *other)
 
 
+def _campbell(
+    run: ModalRun,
+    bodies: Bodies,
+    speeds: Sequence[float],
+    folder: str | Path,
+    comm: Communicator | None,
+) -> Campbell:
+    """Campbell tables of these speeds [rad/s], which the folder keeps."""
+    orders = _engine_orders(run.scene)
+    found, seconds = cached_stage(
+        folder,
+        "campbell",
+        stage_key("campbell", run.scene, list(speeds), orders),
+        lambda: campbell_tables(bodies, speeds, orders),
+        comm,
+    )
+    if seconds is not None:
+        run.messages.append(found_remark("campbell", seconds))
+    return found
+
+
 def _convergence(
     run: ModalRun,
     sizes: Sequence[float],
+    folder: str | Path,
     comm: Communicator | None,
     progress: Progress,
 ) -> Convergence:
-    """The excited diameter on meshes of these sizes, of the usual ones where none are given."""
+    """The excited diameter on meshes of these sizes, of the usual ones where none are given, which
+    the folder keeps.
+    """
     excited = excited_set(run)
     n = excited.nodal_diameter
     # after the rigid modes, which any mesh has exactly
     count = MODES_STUDIED + int(np.count_nonzero(excited.frequencies == 0))
     wanted = list(sizes) or default_sizes(run.scene)
-    return mesh_convergence(run.scene, wanted, None if n is None else [n], count, comm, progress)
+    diameters = None if n is None else [n]
+    found, seconds = cached_stage(
+        folder,
+        "mesh_refinement",
+        stage_key("mesh_refinement", run.scene, wanted, diameters, count),
+        lambda: mesh_convergence(run.scene, wanted, diameters, count, comm, progress),
+        comm,
+    )
+    if seconds is not None:
+        run.messages.append(found_remark("mesh refinement", seconds))
+    return found
 
 
 def rigid_mode_remarks(sets: Sequence[ModeSet]) -> list[str]:

@@ -173,7 +173,7 @@ def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
 
 
 def march_sentence(curve: Curve) -> str:
-    """How the resonance was sought where balances do not tell it, or ""."""
+    """How the resonance was sought where balances do not give it, or ""."""
     found = curve.resonance_by_march
     return "" if found is None else f"load {load_of(curve)}: {found.sentence}"
 
@@ -242,7 +242,8 @@ def resonance_warnings(curves: list[Curve], accuracy: float) -> Iterator[str]:
     if unknown:
         yield (
             f"under {', '.join(unknown)} the error of the resonance amplitude is unknown: "
-            "neither richer models of it nor a march tell it; nothing was refined because of that"
+            "neither richer models of it nor an integration in time give it; no setting was made "
+            "finer for it"
         )
     # as it is reported, with two digits: no estimate is known better
     above = [
@@ -262,7 +263,7 @@ def in_time_sentence(c: Curve) -> str:
     assert band is not None
     more = "" if band.points is None else f" with {band.points} contact points a seat"
     return (
-        f"under {load_of(c)} contacts lift off and balances with more harmonics do not tell the "
+        f"under {load_of(c)} contacts lift off and balances with more harmonics do not give the "
         f"error of the resonance amplitude, {1e6 * c.peak_amplitude:.4g} um; it is estimated from "
         f"a march in time from there{more}, which keeps between {1e6 * band.lowest:.4g} and "
         f"{1e6 * band.highest:.4g} um"
@@ -304,20 +305,21 @@ def best_load_remarks(scene: Scene, best: tuple[BestLoad, ...]) -> Iterator[str]
         tolerated = ""
         if np.isfinite([start, end]).all():
             share = f"{100 * scene.accuracy:.3g} %"
-            tolerated = f", and from {newton_range(start, end)} they keep within {share} of it"
+            tolerated = f", and from {newton_range(start, end)} it keeps within {share} of that"
         yield (
             f"search for the best load{damper}: it ended at {newtons(b.load, 4)}, between {lowest} "
             f"and {highest}, with {len(b.tried)} loads and {b.points} points; no load near it "
-            f"lowers the amplitude of these balances by more than {percent(b.tolerance)}"
+            f"lowers the amplitude, by harmonic balance, by more than {percent(b.tolerance)}"
             f"{tolerated}; "
             f"{b.settings.sentence(error_text=error)}"
         )
         if b.kept is not None:
             yield (
-                f"best load{damper}: the blade does not keep to the balance under "
-                f"{newtons(b.load, 4)}; of the motions that it keeps those under "
-                f"{newtons(b.kept.load, 4)} are the lowest, and another load lowers them by "
-                f"{percent(b.kept.tolerance)} at most, as far as they are convex there"
+                f"best load{damper}: the blade does not keep to the periodic vibration that "
+                f"harmonic balance finds under {newtons(b.load, 4)}; of the vibrations "
+                f"that it keeps those under {newtons(b.kept.load, 4)} are the lowest, and another "
+                f"load lowers them by {percent(b.kept.tolerance)} at most, if amplitude over load "
+                "is convex there"
             )
 
 

@@ -150,8 +150,13 @@ def _rippled(curve: Curve, accuracy: float) -> bool:
 def folded_sentence(curves: Sequence[Curve]) -> str:
     """The curves with several motions at one frequency, or ""."""
     pieces = {newtons(c.load): int(c.branch.max(initial=0)) for c in curves}
-    each = ", ".join(f"{load} ({count} pieces)" for load, count in pieces.items() if count > 1)
-    return f"several motions at one frequency, pieces between folds: {each}" if each else ""
+    each = ", ".join(f"{load} ({count} branches)" for load, count in pieces.items() if count > 1)
+    if not each:
+        return ""
+    return (
+        "the blade has several steady vibrations (motions) at one frequency, as the curve folds "
+        f"back over itself; branches between its folds: {each}"
+    )
 
 
 def unstable_sentence(curve: Curve, accuracy: float) -> str:
@@ -170,7 +175,7 @@ def unstable_sentence(curve: Curve, accuracy: float) -> str:
     if curve.march_replaces_balance and not curve.keeps_unstable:
         return f"{lost}; {_marched_from_flank(curve)}"
     if curve.march_replaces_balance:
-        lost += "; the amplitude given is that of a march from there"
+        lost += "; the amplitude given is that of an integration in time (a march) from there"
     elif curve.keeps_unstable and march is not None and not march.reason:
         lost += "; it is given as the resonance"
     elif curve.keeps_unstable:
@@ -206,8 +211,8 @@ def _marched_from_flank(curve: Curve) -> str:
     end = ends.get(curve.peak_frequency)
     beyond = f"; it is the {end} point of the band, beyond which it may be higher" if end else ""
     return (
-        f"the amplitude given is that of a march from {1e6 * curve.balance_amplitude:.4g} um at "
-        f"{curve.peak_frequency:.5g} Hz{found}{beyond}"
+        "the amplitude given is that of an integration in time (a march) from "
+        f"{1e6 * curve.balance_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz{found}{beyond}"
     )
 
 
@@ -250,7 +255,7 @@ def lower_sentence(curves: Sequence[Curve]) -> str:
         return ""
     return (
         "contacts lift off at the resonance, and from rest the blade may keep to another, lower "
-        f"motion at the same frequency: {each}; the larger one is given, and the error told is "
+        f"motion at the same frequency: {each}; the larger one is given, and the error reported is "
         "that of this one alone"
     )
 

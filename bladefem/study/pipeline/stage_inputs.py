@@ -54,6 +54,18 @@ STAGE_INPUTS = {
         code=("bladefem.fem",),
     ),
     "survey": StageInputs(after=("modes",), code=("bladefem.study",)),
+    # speeds come with the key
+    "campbell": StageInputs(
+        after=("modes",),
+        fields=("excitation.engine_order",),
+        code=("bladefem.contact", "bladefem.study"),
+    ),
+    # element sizes come with the key
+    "mesh_refinement": StageInputs(
+        after=("modes",),
+        fields=("excitation.engine_order",),
+        code=("geometry", "bladefem.study"),
+    ),
     "stress": StageInputs(
         after=("modes",), fields=("operation.speed", "excitation"), code=("bladefem.study",)
     ),

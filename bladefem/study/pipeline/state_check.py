@@ -24,6 +24,8 @@ STATES_PER_AXIS = 5
 SUFFICIENT_ACCURACY = 0.01
 # of the largest turn of a seat, below which a turn counts as none
 NEGLIGIBLE_ROTATION_SHARE = 1e-6
+# of the largest nodal force, below which an interpolation is off by rounding alone
+ROUNDING = 1e-8
 
 
 @dataclass(frozen=True)
@@ -131,8 +133,12 @@ def state_sentence(
     return (
         f"a table of {check.states} contact states over "
         f"{newton_range(min(loads), max(loads))} and ±{1e6 * travel:.3g} µm of tilt at the seats' "
-        f"ends {verdict}: interpolation misses nodal forces by up to {percent(check.error)} of "
-        "the largest (its indicator says "
-        f"{percent(check.indicator)}); the direct solve, used here, takes "
+        f"ends {verdict}: interpolation misses nodal forces by {_share(check.error)} of the "
+        f"largest (estimated: {_share(check.indicator)}); the direct solve, used here, takes "
         f"{1e3 * check.direct:.2g} ms a state"
     )
+
+
+def _share(error: float) -> str:
+    """An error in words: what lies below ROUNDING has too many zeros to be read."""
+    return f"up to {percent(error)}" if error > ROUNDING else "less than 0.000001 %"

@@ -84,10 +84,11 @@ class ResonanceInTime:
         """What was done and found."""
         law = " with the law of the layer" if self.by_law else ""
         return (
-            f"most contacts lift off, and balances do not tell the resonance; it was sought by "
-            f"marching in time{law}, with {self.points} contact points a seat, at "
-            f"{self.frequencies} frequencies for {self.periods} periods: at {self.frequency:.5g} "
-            f"Hz the blade keeps between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um"
+            "most contacts lift off, and the harmonic balance does not give the resonance; it was "
+            f"sought by integration in time (marching){law}, with {self.points} contact points a "
+            f"seat, at {self.frequencies} frequencies for {self.periods} periods: at "
+            f"{self.frequency:.5g} Hz the blade keeps between {1e6 * self.lowest:.4g} and "
+            f"{1e6 * self.highest:.4g} um"
         )
 
 
