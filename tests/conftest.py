@@ -86,7 +86,7 @@ def pytest_make_collect_report(collector):
 def _meshes_drawn_once(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """A mesh that several tests begin with is drawn once, for all workers.
 
-    Drawing one takes a process and a second of CPU or more. That a mesh hangs on nothing but its
+    Drawing one takes a process and a second of CPU or more. That a mesh depends on nothing but its
     key is what `tests/io/test_stage_inputs.py` shows; tests of the drawing itself call
     `build_isolated` or `build_here`, which they have imported by now.
     """

@@ -75,7 +75,7 @@ def mesh_temperatures(mesh: Mesh, given: GivenTemperatures) -> RealArray:
             f"temperature.file: {len(missing)} nodes of the bodies have no temperature{which}, "
             "expected those of all corners of the cells at least"
         )
-    # reference nodes and the like: nothing hangs on them
+    # reference nodes and the like: nothing depends on them
     found[np.isnan(found)] = given.values[0]
     _check_cut(mesh, found)
     return found

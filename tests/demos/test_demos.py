@@ -8,7 +8,7 @@ which have as many digits as a report. Remake them with: BLADEFEM_COARSE=1 ./run
 of WITH_VALUE, demos/NAME.py and the expression of VALUES.
 
 The same mesher moves them from one processor to another, by the last digits of its mathematics
-(6805 points and 6811 for one scene with and without fused multiplication). What hangs on a coarse
+(6805 points and 6811 for one scene with and without fused multiplication). What depends on a coarse
 mesh is therefore held to what meshes of this size leave open, BETWEEN_MESHES.
 """
 

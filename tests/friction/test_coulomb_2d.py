@@ -180,7 +180,7 @@ def test_jacobian_for_any_number_of_harmonics_and_samples(H, samples):
 def test_a_derivative_summed_in_single_precision_is_that_in_double(H):
     """1000 elements; half are within 7e-8, 99 in a hundred within 7e-7. Forces are equal.
 
-    The worst, up to 1e-4, slip while the load begins, where the angle hangs on the motion as
+    The worst, up to 1e-4, slip while the load begins, where the angle depends on the motion as
     1/force, or are so close to the limit that their periodic state is nearly not unique.
     """
     elements, w = random_case(10, 1000, H, 2)

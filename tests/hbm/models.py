@@ -49,7 +49,7 @@ def wedge_between_masses(force=10.0, at=0, damping=20.0, excited=True):
 
     The flanks stand at +-40 deg to x, so that without friction each carries 240 / (2 sin 40 deg) N.
     The masses move along y, on springs of 9e5 and 3e5 N/m to the ground and coupled by 1e5 N/m; the
-    wedge hangs on springs of its own. Free modes at 31.2 and 50.7 Hz.
+    wedge is held by springs of its own. Free modes at 31.2 and 50.7 Hz.
     """
     a = np.radians(40.0)
     # rows: normal out of the mass into the wedge, tangent; columns: x, y. Masses at y < 0, y > 0.

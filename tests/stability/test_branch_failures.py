@@ -129,7 +129,7 @@ def test_F31_a_damper_that_walks():
     steps = np.diff(places[-10:])
     assert abs(steps).min() > 1e-3 * size(point)
     assert len(set(np.sign(steps))) == 1
-    # the contact is 60 times as stiff as the blade: the step hangs on high harmonics
+    # the contact is 60 times as stiff as the blade: the step depends on high harmonics
     assert point.drift * 2 * np.pi / omega == pytest.approx(abs(steps).mean(), rel=0.03)
 
 

@@ -1,4 +1,4 @@
-"""What the best load hangs on: derivatives against the search repeated with changed parameters."""
+"""What the best load depends on: derivatives against the search repeated with changed parameters."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -110,7 +110,7 @@ def test_a_load_under_which_the_blade_keeps_far_more_is_not_the_best():
 
 @pytest.mark.parametrize(("mu", "count"), [("0", 0), ("0.2", 1)])
 def test_none_is_sought_without_friction(mu, count):
-    """The response hangs on the load only where contacts lift off: the wedge's best was 47 kN."""
+    """The response depends on the load only where contacts lift off: the wedge's best was 47 kN."""
     scene = load_scene("scenes/wedge.toml", [f"contact.mu={mu}"])
     space, runner = SimpleNamespace(dimension=3), SimpleNamespace(alone=print)
     study = response_stage._Study(scene, space, None, Settings(10, 3, 64, "rigid", 4), runner)

@@ -126,7 +126,8 @@ class Kind:
     meshed_here: Callable[[Scene], bool] = always
     # conditions between the fields of a scene, one sentence for each that does not hold
     conditions: Callable[[Scene], Iterator[str]] = no_conditions
-    # fields of its tables that are allowed and change nothing: told where they are not the default
+    # fields of its tables that are allowed and change nothing: reported where they are not the
+    # default
     unread: Callable[[Scene], tuple[str, ...]] = nothing_unread
     # dimension name to length [m] of the parts that an element must fit into; None: unknown
     thin_parts: Callable[[Scene], dict[str, float]] | None = None

@@ -3,8 +3,8 @@ resonance.
 
 Every variant solves the same frequencies. Its resonance is the vertex of a parabola in 1 /
 amplitude^2 over frequency^2 through the highest three, so that errors of resonance amplitude and
-frequency do not hang on the grid. The reference climbs a ladder of harmonics and samples as far as
-the time allows; the change of its last rung is its own error, below which no other error means
+frequency do not depend on the grid. The reference climbs a ladder of harmonics and samples as far
+as the time allows; the change of its last rung is its own error, below which no other error means
 anything.
 """
 

@@ -45,7 +45,7 @@ from .cpu_clock import running_clock
 
 # of the scene's own element sizes, when none are given
 SIZE_RATIOS = (1.7, 1.3, 1.0)
-# at the most: what more of them change does not hang on the mesh
+# at the most: what more of them change does not depend on the mesh
 MAX_HARMONICS = 3
 # accuracy at which the sweep looks for the peak: it is found to a tenth of it
 SEARCH_ACCURACY = 0.01

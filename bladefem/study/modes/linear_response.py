@@ -214,7 +214,7 @@ def static_offset(bodies: Bodies, load: np.ndarray | None = None) -> np.ndarray:
 
 
 def steady_state(bodies: Bodies) -> SteadyState:
-    """The state of rotation and heat that stresses are told of: the nonlinear preload where the
+    """The state of rotation and heat that stresses are of: the nonlinear preload where the
     modes vibrate about it, else the linear answer.
 
     A leaning blade straightens: at 800 rad/s the linear answer of a twisted one of 200 mm that

@@ -34,7 +34,7 @@ TOLERANCE_SHARE = 0.5
 COMPARED_ERROR_SHARE = 2.0
 # rounds in which loads are studied in addition
 MAX_ROUNDS = 4
-# digits of such a load: more of them hang on the last digits of resonances that bounce
+# digits of such a load: more of them depend on the last digits of resonances that bounce
 DIGITS = 3
 # ratio of two neighbours, one of them the lowest, from which the load between them is studied as
 # well. Lines through loads so far apart bound nothing: of the shipped wedge, from 36 to 69.7 N, the

@@ -1,4 +1,4 @@
-"""The response stage: best loads, responses of every load, what they hang on and their stresses."""
+"""The response stage: best loads, responses of every load, what they depend on, their stresses."""
 
 from __future__ import annotations
 

@@ -198,7 +198,7 @@ def all_declared(name: str, scene: Scene) -> set[str]:
 
 
 def declared_fields(name: str, scene: Scene) -> Iterator[str]:
-    """The fields and tables that a stage itself declares; those of the mesh hang on the kind."""
+    """The fields and tables that a stage itself declares; those of the mesh depend on the kind."""
     if name == "mesh":
         yield "kind"
         yield from kind_named(scene.kind).shape

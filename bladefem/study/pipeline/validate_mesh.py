@@ -34,7 +34,7 @@ def found_patches(
     ]
     if excited:
         looks.insert(0, lambda: named_nodes(mesh, scene.excitation.at))
-    _all_told(looks)
+    _all_reported(looks)
     return patches
 
 
@@ -66,7 +66,7 @@ def refuse_loads(
                 f"forced, {name}: the mesh has no such face{suggestion(name, mesh.faces)}"
             )
 
-    _all_told(
+    _all_reported(
         [
             lambda: named_nodes(mesh, scene.excitation.at),
             *(lambda name=name: face(name) for name, _ in loads if name != "excitation"),
@@ -74,7 +74,7 @@ def refuse_loads(
     )
 
 
-def _all_told(looks: Sequence[Callable[[], object]]) -> None:
+def _all_reported(looks: Sequence[Callable[[], object]]) -> None:
     """Run all checks; what they refuse becomes one message."""
     problems = []
     for look in looks:

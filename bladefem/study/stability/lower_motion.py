@@ -1,7 +1,7 @@
 """A lower motion beside a resonance with lift-off, at the same frequency.
 
 A damper that bounces holds less than one that only slips, and the blade may keep to either: which
-one hangs on how it came there. From rest the shipped wedge under 36 N keeps 131 um where its
+one depends on how it came there. From rest the shipped wedge under 36 N keeps 131 um where its
 resonance is 610 um. A curve that is not followed round folds does not show it.
 """
 

@@ -162,8 +162,8 @@ def _by_short_steps(model: ReducedModel, start: Solution, work: MarchBudget) -> 
     """The highest motion uphill of a start, and its estimated relative error but for that by the
     contact points, by steps so short that half of them change it little.
 
-    How short they have to be hangs on how stiff the contacts become where they are pressed: a layer
-    that stiffens may be some hundred times stiffer in an impact than at rest.
+    How short they have to be depends on how stiff the contacts become where they are pressed: a
+    layer that stiffens may be some hundred times stiffer in an impact than at rest.
 
     Raises:
         MarchFailedError: it was not closed in, or no steps were short enough.
@@ -174,7 +174,7 @@ def _by_short_steps(model: ReducedModel, start: Solution, work: MarchBudget) -> 
         above = top.best
         top = replace(top, best=settle(model, above.state, work, work.final_instants))
         if top.jump:
-            # the frequency of a jump hangs on the steps in time
+            # the frequency of a jump depends on the steps in time
             work.instants = work.final_instants
             top = refine_top(model, top, work)
         best = top.best
