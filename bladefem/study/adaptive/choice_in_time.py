@@ -2,8 +2,9 @@
 
 Balances with more harmonics are often not solved there, or end on another motion of several, so
 that which of them is taken would depend on the last digit of a start: 564, 656 or 685 um on the
-shipped wedge under 36 N. A march has no harmonics left out, and begins at the very motion that is judged:
-harmonics are enough once the blade, marched from the resonance of a balance, keeps its amplitude.
+shipped wedge under 36 N. A march has no harmonics left out, and begins at the very motion that is
+judged: harmonics are enough once the blade, marched from the resonance of a balance, keeps its
+amplitude.
 """
 
 from __future__ import annotations
