@@ -14,6 +14,9 @@ from .style import COLOURS, MICRO, canvas
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# columns of panels, the first of those that leave as few places empty
+WIDTHS = (4, 5, 3)
+
 
 def loop_energy(displacement: np.ndarray, force: np.ndarray) -> float:
     """Energy dissipated in one closed loop [J], the area enclosed by (displacement [m], force
@@ -74,7 +77,7 @@ def draw_seat_loops(
     Args:
         cases: name of the load -> name of the seat -> (displacement (k,) [m], force (k,) [N]).
     """
-    across = min(len(cases), 4)
+    across = _columns_of(len(cases))
     down = -(-len(cases) // across)
     with canvas(
         file, None, (3.3 * across + 0.6, 2.9 * down + 0.3), (down, across), squeeze=False
@@ -92,3 +95,10 @@ def draw_seat_loops(
         for ax in axes.flat[len(cases) :]:
             ax.set_axis_off()
         return axes[0, 0].figure
+
+
+def _columns_of(panels: int) -> int:
+    """Columns of so many panels."""
+    if panels <= WIDTHS[0]:
+        return panels
+    return min(WIDTHS, key=lambda across: -panels % across)

@@ -21,7 +21,7 @@ from bladefem.view.contact import (
     save_pressure_vtu,
     unfold,
 )
-from bladefem.view.hysteresis import draw_loops, draw_seat_loops, loop_energy
+from bladefem.view.hysteresis import _columns_of, draw_loops, draw_seat_loops, loop_energy
 from bladefem.view.live_curves import live_optimum, live_responses
 from bladefem.view.live_shapes import live_motion
 from bladefem.view.mesh import (
@@ -406,6 +406,11 @@ def test_response_charts(folder):
         min(ink(folder / f"{n}.png") for n in ("response", "optimum", "accuracy", "loops", "seats"))
         > 0.02
     )
+
+
+def test_panels_of_loads_leave_few_places_empty():
+    found = {n: _columns_of(n) for n in (1, 4, 5, 7, 9, 12, 13)}
+    assert found == {1: 1, 4: 4, 5: 5, 7: 4, 9: 3, 12: 4, 13: 5}
 
 
 @pytest.mark.parametrize(
