@@ -65,6 +65,15 @@ both sides in one run on a machine three times overbooked:
      49 632  5          curved       24.4           4.4    5.6  0.44    1.06   3.4e-07      6.4e-05
     148 773  5          curved      147.7          19.1    7.7  1.33    0.82   3.5e-07      1.3e-05
 
+With one order of elimination for blades at rest and turning, both sides in one run beside little
+other work on a faster machine:
+
+     44 892  5          curved       15.9           3.2    4.9  0.42    1.14   1.8e-07      7.6e-05
+     44 892  0          curved       16.3           2.8    5.7  0.42    1.13   3.5e-07      7.3e-05
+     44 892  0 to 12    curved      185.7           6.7   27.5  0.52    1.23   3.6e-07      8.0e-05
+     44 892  5          straight     15.0           3.0    5.1  0.42    1.14   3.4e-07      9.8e-06
+    146 769  5          curved       88.8          13.2    6.7  1.32    0.81   2.1e-07      1.6e-05
+
 Where 16.8 s at 148 773 go: 3.6 s into the Cholesky factorisation, 3.8 s into the count (another
 factorisation, 3.2 s), 3.7 s into 26 sweeps over the factors with SLEPc's one vector. The block
 iteration takes 10 sweeps of six vectors, 3.6 s in place of SLEPc's 5.4 s with all around it.
