@@ -7,6 +7,7 @@ import pandas as pd
 
 from bladefem.scene.fields import value_at
 from bladefem.scene.kinds import kind_named
+from bladefem.scene.material_table import operating_materials
 from bladefem.scene.tables import Scene
 
 from ..study.pipeline.response_remarks import TRUSTED_STRESS
@@ -18,6 +19,8 @@ from .statements import best_mass
 NEAR_OPTIMUM = 0.15
 # density [kg/m^3] of metals: magnesium to tungsten
 METAL_DENSITIES = (1700.0, 20000.0)
+# fields by which the load of a damper changes but for its mass
+DAMPER_SHAPE = ("damper.length", "damper.base", "damper.angle")
 
 
 def next_steps(
@@ -76,12 +79,18 @@ def _mass_step(
     wanted, _ = best_mass(best, mass / load, masses)
     density = _drawn_density(scene) * best["load"] / load
     if density < METAL_DENSITIES[0] or density > METAL_DENSITIES[1]:
+        kind = kind_named(scene.kind)
+        own_shape = DAMPER_SHAPE if "damper" in kind.tables else ()
+        fields = [name for name in own_shape if name not in kind.unread(scene)]
+        named = f" ({', '.join(fields)})" if fields else ""
+        drawn = (
+            "" if scene.study.own_load else "; study.own_load = true reports what it does as drawn"
+        )
         return [
             f"No metal damper of this shape makes the best load at this speed: it takes {wanted} "
             f"in place of {1e3 * mass:.3g} g, {density:.3g} kg/m^3 in the shape drawn, where "
             f"metals have {METAL_DENSITIES[0]:g} to {METAL_DENSITIES[1]:g}. Change its size or "
-            "flanks (damper.length, damper.base, damper.angle); study.own_load = true reports what "
-            "it does as drawn."
+            f"flanks{named}{drawn}."
         ]
     return [
         f"Change the damper's mass from {1e3 * mass:.3g} g to {wanted}, and confirm with "
@@ -92,7 +101,7 @@ def _mass_step(
 def _drawn_density(scene: Scene) -> float:
     """Density [kg/m^3] of the damper as drawn; NaN where its mass is given, whatever its shape."""
     given = value_at(scene, kind_named(scene.kind).damper_mass)
-    return scene.material.damper.rho if given is None else np.nan
+    return operating_materials(scene)[1].rho if given is None else np.nan
 
 
 def _stress_step(best: pd.Series) -> list[str]:

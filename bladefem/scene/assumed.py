@@ -6,6 +6,7 @@ from collections.abc import Collection
 
 from .fields import display_value, field_at, value_at
 from .kinds import kind_named
+from .material_table import property_table
 from .tables import Scene
 
 # of the blade; a table of temperatures or constants of a crystal take the place of the first two
@@ -27,8 +28,11 @@ def assumed_physics(scene: Scene, given: Collection[str] | None) -> list[str]:
     blade = scene.material.blade
     wanted = ["operation.speed"]
     # constants of named volumes may be all that there are
-    if not (blade.table or scene.imported.materials):
-        wanted += [*(() if blade.orthotropic else ELASTIC), "material.blade.rho"]
+    if not scene.imported.materials:
+        known = property_table(blade).values if blade.table else {}
+        crystal = blade.orthotropic or "orthotropic" in known
+        names = [*(() if crystal else ELASTIC), "material.blade.rho"]
+        wanted += [name for name in names if name.rsplit(".", 1)[1] not in known]
     assumed = [
         f"{name} = {display_value(value_at(scene, name), field_at(name))}"
         for name in wanted

@@ -24,6 +24,10 @@ PERCENT = ("%", "percent")
 _AMBIGUOUS_COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\s\d.,+-][^,]*?)\s*")
 
 
+# "36,80 N, 90 N": two values or three
+_MIXED_COMMAS = re.compile(r"\d,\d.*,\s|,\s.*\d,\d")
+
+
 class Field(NamedTuple):
     """A leaf of the scene."""
 
@@ -162,9 +166,15 @@ def _parse_tuple(
         raise InputError(f"{field.name} = {shortened(value)}: expected {length} values")
     if length is None and isinstance(value, str) and (comma := _AMBIGUOUS_COMMA.fullmatch(value)):
         whole, rest = comma.groups()
+        thousands = f"'{whole}{rest}', " if re.match(r"\d{3}(?!\d)", rest) else ""
         raise InputError(
-            f"{field.name} = '{shortened(value)}': one value or two, expected '{whole}.{rest}' or "
-            f"'{whole}, {rest}'"
+            f"{field.name} = '{shortened(value)}': one value or two, expected {thousands}"
+            f"'{whole}.{rest}' or '{whole}, {rest}'"
+        )
+    if length is None and isinstance(value, str) and _MIXED_COMMAS.search(value):
+        raise InputError(
+            f"{field.name} = '{shortened(value)}': some commas are followed by a space and some "
+            "are not, expected a space after each comma between values, and decimals with a point"
         )
     if not items:
         raise InputError(f"{field.name} = {shortened(value)}: expected at least one value")

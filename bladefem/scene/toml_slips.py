@@ -7,10 +7,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .units import shortened
+from .units import THOUSANDS, meant_by_comma, shortened
 
 _PLACE = re.compile(r"at line (\d+), column \d+")
 _BARE = re.compile(r"\s*[\w.]+\s*=\s*(?P<value>[+-]?[\d.]+(?P<comma>,\d+)?[^#\[\]\"']*?)\s*(#.*)?")
+_NUMBER = re.compile(r"[+-]?\d+(\.\d+)?")
+_WITH_UNIT = re.compile(_NUMBER.pattern + r"\s*[^\d\s.,].*")
 _BARE_LIST = re.compile(r"=\s*\[[^\"']*\d\s*[A-Za-z%]+[^\"']*$")
 _CURLED = "\u201c\u201d\u201e\u201f\u2018\u2019\u00ab\u00bb"
 
@@ -38,7 +40,20 @@ def slip_of_pen(path: Path, error: ValueError) -> str:
     bare = _BARE.fullmatch(line.rstrip("\r"))
     if bare is None:
         return ""
-    value = bare["value"].replace(",", ".") if bare["comma"] else bare["value"]
-    if re.fullmatch(r"[+-]?[\d.]+", value):
-        return f"; {shortened(line.strip())}: decimals have a point, {value}"
-    return f'; {shortened(line.strip())}: a value with a unit is written in quotes, "{value}"'
+    value = bare["value"]
+    here = shortened(line.strip())
+    if bare["comma"]:
+        point = value.replace(",", ".")
+        meant = meant_by_comma(value, "" if _NUMBER.fullmatch(point) else '"')
+        if THOUSANDS in meant:
+            return f"; {here}: {meant.removeprefix('; ')}"
+        if _NUMBER.fullmatch(point):
+            return f"; {here}: decimals have a point, {point}"
+        value = point
+    # TOML wants a digit before the point
+    value = re.sub(r"^([+-]?)\.", r"\g<1>0.", value)
+    if _NUMBER.fullmatch(value):
+        return f"; {here}: expected {value}"
+    if not _WITH_UNIT.fullmatch(value):
+        return ""
+    return f'; {here}: a value with a unit is written in quotes, "{value}"'

@@ -91,6 +91,12 @@ _NUMBER = re.compile(
     r"((?:1/|[^\d\s,.+-]).*?)?\s*",
     re.IGNORECASE,
 )
+# a number with one comma among its digits
+_COMMA = re.compile(r"([+-]?\d+),(\d+)(.*)")
+# between the commas of thousands
+GROUP_DIGITS = 3
+# what a message says of such commas
+THOUSANDS = "thousands have no comma"
 # one digit: no quantity has a higher power, and exact powers of millions of digits never end
 _POWER = re.compile(r"(.+?)\^?(-?\d)?")
 # letters of a unit text: longer ones are no units
@@ -238,21 +244,30 @@ def _split_number(
         raise InputError(f"{name} = {shortened(value)}: expected a number{_in_unit(unit)}")
     match = _NUMBER.fullmatch(value)
     if not match:
-        point = _with_point(value)
-        meant = f"; decimals have a point, '{point}'" if point else ""
+        meant = meant_by_comma(value)
         raise InputError(f"{name} = {shortened(repr(value))}: expected {_expected(unit)}{meant}")
     return float(match[1]), match[2] or ""
 
 
-def _with_point(text: str) -> str:
-    """A number whose decimals follow a comma, as half of the world writes it, with a point; else
-    nothing.
+def meant_by_comma(text: str, quote: str = "'") -> str:
+    """The end of a message on a number with a comma, as half of the world writes decimals and the
+    other half thousands; nothing where it has another fault.
 
-    >>> _with_point("140,5 mm"), _with_point("1, 2"), _with_point("1,2,3")
-    ('140.5 mm', '', '')
+    >>> meant_by_comma("140,5 mm"), meant_by_comma("1, 2"), meant_by_comma("1,2,3")
+    ("; decimals have a point, '140.5 mm'", '', '')
+    >>> meant_by_comma("12,000 rpm")
+    "; thousands have no comma and decimals a point, '12000 rpm' or '12.000 rpm'"
     """
-    point = re.sub(r"^(\s*[+-]?\d+),(?=\d)", r"\1.", text)
-    return point.strip() if point != text and _NUMBER.fullmatch(point) else ""
+    found = _COMMA.fullmatch(text.strip())
+    point = found.expand(r"\1.\2\3") if found else ""
+    if not found or not _NUMBER.fullmatch(point):
+        return ""
+    whole_part = found[1].lstrip("+-")
+    grouped = len(found[2]) == GROUP_DIGITS and len(whole_part) <= GROUP_DIGITS
+    if not grouped or whole_part.startswith("0"):
+        return f"; decimals have a point, {quote}{point}{quote}"
+    whole = found.expand(r"\1\2\3")
+    return f"; {THOUSANDS} and decimals a point, {quote}{whole}{quote} or {quote}{point}{quote}"
 
 
 def _parse_dimension(

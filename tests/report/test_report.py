@@ -31,7 +31,7 @@ from bladefem.report.tables import readable_texts, to_latex, to_markdown, write_
 from bladefem.report.wheel import loads_on_both_sides
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
-from bladefem.scene.toml import vary
+from bladefem.scene.toml import load_scene, vary
 from bladefem.util.message import Message, method, warning
 from bladefem.view.contact import pressure_points, pressure_summary
 from bladefem.view.optimum import at_band_end
@@ -491,6 +491,18 @@ def test_no_mass_is_advised_that_no_metal_gives_the_shape(own_load, metal):
     assert step.startswith("Change the damper's mass") == metal
     if not metal:
         assert step.startswith("No metal damper of this shape") and "171 kg/m^3" in step
+        # what the scene has already is not asked for
+        assert "(damper.length, damper.base, damper.angle); study.own_load = true" in step
+        studied = vary(Scene(), "study.own_load", True)
+        assert "study.own_load" not in next_steps(studied, [], summary, own)[0]
+        # at its temperature the damper has another density
+        rows = "material.damper.table", ["20 degC: rho=7850", "600 degC: rho=7600"]
+        warm = vary(Scene(), *rows, "material.damper.rho", 3000.0)
+        assert "171 kg/m^3" in next_steps(warm, [], summary, own)[0]
+        # an angle that the seats of a file give is no field to change
+        fitted = load_scene("scenes/own_blade.toml")
+        assert "flanks (damper.length" in next_steps(fitted, [], summary, own)[0]
+        assert "damper.angle" not in next_steps(fitted, [], summary, own)[0]
     # a mass that is given has the density that it takes
     heavy = next_steps(vary(Scene(), "damper.mass", "12 g"), [], summary, own)
     assert heavy[0].startswith("Change the damper's mass")

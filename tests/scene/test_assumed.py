@@ -101,3 +101,15 @@ def test_the_scene_to_start_from_says_what_no_mesh_tells(cantilever):
 def test_shipped_scenes_give_speed_and_material(file):
     tables = read_tables(file)
     assert assumed_physics(scene_of(tables, "scenes"), given_keys(tables)) == []
+
+
+def test_a_table_names_what_it_gives_alone():
+    """A table of E leaves nu and rho to their defaults."""
+    tables = {
+        "kind": "plane blades",
+        "operation": {"speed": 0.0},
+        "material": {"blade": {"table": ["20 degC: E=210 GPa", "600 degC: E=180 GPa"]}},
+    }
+    (said,) = assumed_physics(scene_of(tables), given_keys(tables))
+    assert "material.blade.nu = 0.3" in said and "material.blade.rho" in said
+    assert "material.blade.E" not in said

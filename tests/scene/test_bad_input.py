@@ -194,6 +194,8 @@ def test_files_that_are_no_scenes(tmp_path):
         ("span = 95 mm", 'span = 95 mm: a value with a unit is written in quotes, "95 mm"'),
         ("span = 95,5 mm  # new", 'a value with a unit is written in quotes, "95.5 mm"'),
         ("fillet = 0,002", "fillet = 0,002: decimals have a point, 0.002"),
+        ("fillet = .002", "fillet = .002: expected 0.002"),
+        ("span = 1,000 mm", '"1000 mm" or "1.000 mm"'),
         ("span = \u201c95 mm\u201d", "expected straight quotation marks"),
         ("loads = [9 N, 18 N]", "each value with a unit is written in quotes"),
         ("span = = 3", "(at line 4, column 8)"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from bladefem.report.best_load import best_load_table, found_best
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.settings import Settings
-from bladefem.study.pipeline import pipeline, response_stage
+from bladefem.study.pipeline import kept_best_load, pipeline, response_stage
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import BestLoad
 from bladefem.study.pipeline.kept_best_load import MAX_ROUNDS, study_kept_loads
@@ -288,3 +289,21 @@ def test_resonances_that_are_hardly_known_are_not_compared():
     curves[1].error = 0.9
     started = StudiedLoads(given, curves, [best(79.68)])
     assert study_kept_loads(started, searches_of(started.best), None, 0.05) == started
+
+
+def test_added_loads_stay_in_the_range_of_the_search():
+    found = replace(best(70.0), searched=(60.0, 200.0))
+    given = [case(load) for load in (10.0, 36.0, 70.0, 80.0, 300.0, 580.0)]
+    curves = [curve(c.load, kept_amplitude(c.load, 72.0), unstable="torus") for c in given]
+    added = kept_best_load._next_loads(found, curves, 0.05)
+    assert added and all(60.0 <= load <= 200.0 for load in added)
+
+
+def test_an_added_load_beside_one_that_is_studied_keeps_its_side():
+    """Three digits of 101.49 N are 101 N, on the other side of 101.2 N."""
+    loads = (60.0, 95.0, 101.2, 105.0, 150.0)
+    steep = [1e-4 * max((101.5 / load) ** 12.0, (load / 101.5) ** 12.0) for load in loads]
+    pairs = zip(loads, steep, strict=True)
+    curves = [curve(load, height, unstable="torus") for load, height in pairs]
+    added = kept_best_load._next_loads(best(101.2), curves, 0.05)
+    assert added[0] == pytest.approx(101.5, abs=0.1)

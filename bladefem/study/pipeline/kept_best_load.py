@@ -36,6 +36,8 @@ COMPARED_ERROR_SHARE = 2.0
 MAX_ROUNDS = 4
 # digits of such a load: more of them depend on the last digits of resonances that bounce
 DIGITS = 3
+# relative distance from a load studied within which they have one digit more
+TOO_NEAR = 0.01
 # ratio of two neighbours, one of them the lowest, from which the load between them is studied as
 # well. Lines through loads so far apart bound nothing: of the shipped wedge, from 36 to 69.7 N, the
 # bound was 2.4 or 2.6 % by the last digits, and the chart's line 40 % above the resonance
@@ -97,6 +99,9 @@ def _next_loads(best: BestLoad, curves: Sequence[Curve], accuracy: float) -> lis
     loads, heights = _loads_and_heights(own)
     proposal = _proposal(loads, heights)
     load = _rounded(proposal.load)
+    if any(abs(load / one - 1) < TOO_NEAR for one in loads):
+        # beside a load studied fewer digits may lead to its other side
+        load = float(f"{proposal.load:.4g}")
     if load in loads or not best.searched[0] <= load <= best.searched[1]:
         return []
     every = [c.load for c in curves if c.mass == best.mass]
@@ -106,7 +111,9 @@ def _next_loads(best: BestLoad, curves: Sequence[Curve], accuracy: float) -> lis
     if proposal.gain <= TOLERANCE_SHARE * accuracy:
         return []
     lowest = float(loads[heights.argmin()])
-    return [load, *_middles_of_gaps(sorted(every), lowest, load)]
+    middles = _middles_of_gaps(sorted(every), lowest, load)
+    low, high = best.searched
+    return [load, *(middle for middle in middles if low <= middle <= high)]
 
 
 def _middles_of_gaps(known: Sequence[float], lowest: float, added: float) -> list[float]:
