@@ -64,18 +64,7 @@ def draw_responses(
         if len(failed):
             draw_failed(ax, failed)
         if "stability" in points and (points["stability"] == "unstable").any():
-            unstable = points[points["stability"] == "unstable"]
-            ax.plot(
-                unstable["frequency"],
-                MICRO * unstable["amplitude"],
-                "s",
-                mfc="white",
-                mec=FAILED_COLOUR,
-                ms=4.5,
-                mew=1.2,
-                zorder=5,
-                label=f"unstable ({len(unstable)})",
-            )
+            _draw_unstable(ax, points[points["stability"] == "unstable"])
         for load, rows in with_lower_motion(points).groupby("load"):
             mark_lower(ax, rows["frequency"], rows, colours[load])
         explain_diamonds(ax, points)
@@ -95,6 +84,21 @@ def draw_responses(
             bbox_to_anchor=(1.0, 0.5),
         )
         return ax.figure
+
+
+def _draw_unstable(ax: Axes, unstable: pd.DataFrame) -> None:
+    """Squares at unstable motions, with their number in the legend."""
+    ax.plot(
+        unstable["frequency"],
+        MICRO * unstable["amplitude"],
+        "s",
+        mfc="white",
+        mec=FAILED_COLOUR,
+        ms=4.5,
+        mew=1.2,
+        zorder=5,
+        label=f"unstable ({len(unstable)})",
+    )
 
 
 def load_colours(loads: np.ndarray) -> dict[float, Any]:

@@ -21,6 +21,12 @@ LINEAR, BALANCE = "linear response", "balance"
 MARCH, STIFF_LAYER, UNSTABLE = "march in time", "stiff layer", "unstable balance"
 # marks of those that no stable balance gives, as in pictures of responses
 MARKS = {MARCH: "D", STIFF_LAYER: "D", UNSTABLE: "s"}
+# curves over the values by the beginning of their columns: line, colour, words of the legend
+CURVES = {
+    "free": ("--", "#777777", "no damper"),
+    "peak": ("o-", COLOURS[0], "best load"),
+    "own": ("^-.", COLOURS[1], "damper's own load"),
+}
 
 
 def draw_study(
@@ -50,28 +56,10 @@ def draw_study(
             (axes[0, 0], "amplitude", MICRO),
             (axes[1, 0], "frequency", 1.0),
         ):
-            axis.plot(
-                table["axis"],
-                scale * table[f"free_{column}"],
-                "--",
-                color="#777777",
-                label="no damper",
-            )
-            axis.plot(
-                table["axis"],
-                scale * table[f"peak_{column}"],
-                "o-",
-                color=COLOURS[0],
-                label="best load",
-            )
-            if f"own_{column}" in table:
-                axis.plot(
-                    table["axis"],
-                    scale * table[f"own_{column}"],
-                    "^-.",
-                    color=COLOURS[1],
-                    label="damper's own load",
-                )
+            for name, (style, colour, words) in CURVES.items():
+                if f"{name}_{column}" in table:
+                    heights = scale * table[f"{name}_{column}"]
+                    axis.plot(table["axis"], heights, style, color=colour, label=words)
         amplitude = MICRO * table["peak_amplitude"]
         draw_certainty(axes[0, 0], table["axis"], amplitude, table, COLOURS[0])
         axes[0, 0].set(ylabel="resonance amplitude [µm]", title=title)
