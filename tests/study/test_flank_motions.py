@@ -15,7 +15,7 @@ from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.curve import Curve
-from bladefem.study.pipeline.stability_remarks import unmarched_sentence, unstable_sentence
+from bladefem.study.pipeline.stability_remarks import unmarched_sentence, unstable_sentences
 from bladefem.study.stability import flank_motions as module
 from bladefem.study.stability import judged_resonance
 from bladefem.study.stability.error_in_time import Marches
@@ -170,11 +170,9 @@ def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
         peak_frequency=1014.2,
         march_at_peak=KeptBand(1014.2, 1.15e-6, 3.6e-6, 350),
     )
-    text = unstable_sentence(curve, 0.02)
-    assert (
-        f"2.149 um at 1077.3 Hz, {said}, and" in text
-        and "(a march) from 2.05 um at 1014.2 Hz" in text
-    )
+    (text,) = unstable_sentences([curve], 0.02)
+    assert f"the highest motion {said}, and" in text
+    assert "under 4 N, 2.149 um at 1077.3 Hz: from 2.05 um at 1014.2 Hz" in text
     assert "between 1.15 and 3.6 um" in text
     assert "first point of the band" in text
     assert Curve.marched.fget(curve) == pytest.approx(1 - 1.15 / 3.6)

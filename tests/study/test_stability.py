@@ -26,7 +26,7 @@ from bladefem.study.pipeline.loads import curve_of
 from bladefem.study.pipeline.stability_remarks import (
     ripple_sentence,
     stability_sentence,
-    unstable_sentence,
+    unstable_sentences,
 )
 from bladefem.study.stability.kept_band import KeptBand
 from bladefem.study.stability.resonance_in_time import ResonanceInTime
@@ -135,23 +135,22 @@ def rippling(kept):
 def test_a_ripple_is_told_apart_from_another_amplitude():
     near, far = (KeptBand(100.0, 0.99e-3, high, 200) for high in (1.02e-3, 1.2e-3))
     assert "within 2.0 %" in ripple_sentence([rippling(near), rippling(far)], 0.05)
-    assert unstable_sentence(rippling(near), 0.05) == ""
-    assert "keeps between 990 and 1200 um" in unstable_sentence(rippling(far), 0.05)
+    assert unstable_sentences([rippling(near)], 0.05) == []
+    (said,) = unstable_sentences([rippling(far), rippling(far)], 0.05)
+    assert said.count("keeps between 990 and 1200 um") == 2
+    assert said.count("given as the resonance") == 1
     assert ripple_sentence([rippling(far)], 0.05) == ""
     # given in place of the balance where the mesh leaves little of the accuracy
     instead = SimpleNamespace(**vars(rippling(near)) | {"march_replaces_balance": True})
     assert ripple_sentence([instead], 0.05) == ""
-    assert (
-        "the amplitude given is that of an integration in time (a march) from there"
-        in unstable_sentence(instead, 0.05)
+    given = (
+        "the amplitude given is that of an integration in time (a march): under 50 N, 1000 um at"
     )
+    assert given in unstable_sentences([instead], 0.05)[0]
     marched = SimpleNamespace(
         **vars(rippling(far)) | {"march_replaces_balance": True, "peak_amplitude": 1.2e-3}
     )
-    assert (
-        "; the amplitude given is that of an integration in time (a march) from there; "
-        in unstable_sentence(marched, 0.05)
-    )
+    assert given in unstable_sentences([marched], 0.05)[0]
 
 
 @pytest.mark.parametrize("by_law", [True, False])
@@ -186,7 +185,7 @@ def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
     again, seconds = cached_stage(tmp_path, "curve", "key", lambda: None)
     assert seconds is not None and fresh.keeps_unstable and again.keeps_unstable
     assert ripple_sentence([again], 0.05) == ripple_sentence([fresh], 0.05) != ""
-    assert unstable_sentence(again, 0.001) == unstable_sentence(fresh, 0.001) != ""
+    assert unstable_sentences([again], 0.001) == unstable_sentences([fresh], 0.001) != []
     above = replace(band, lowest=2e-3, highest=2.5e-3)
     marched = replace(again, march_at_peak=above, march_replaces_balance=True)
     assert marched.peak_amplitude == 2.5e-3 and marched.balance_amplitude == again.peak_amplitude

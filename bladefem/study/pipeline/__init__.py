@@ -18,5 +18,5 @@
 - at the resonance: ``contact_cycle`` stick and slip, ``damped_motion`` motion and stress of all
   nodes, ``utilisation`` of the endurance
 - flutter: ``flow`` damping of each wave, ``flutter`` limit cycles
-- words and tables: ``response_remarks``, ``stability_remarks``, ``design_table``
+- words and tables: ``response_remarks``, ``stability_remarks``, ``load_remarks``, ``design_table``
 """

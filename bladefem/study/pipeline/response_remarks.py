@@ -15,6 +15,7 @@ from .best_load import BestLoad, studied_load
 from .curve import Curve, load_of
 from .damped_motion import DampedStress
 from .load_interval import interval_sentence
+from .load_remarks import LoadRemark, sentences_of_kinds
 from .resonance_list import reach_sentence
 from .stability_remarks import (
     Disturbances,
@@ -26,7 +27,7 @@ from .stability_remarks import (
     undriven_sentence,
     unjudged_sentence,
     unmarched_sentence,
-    unstable_sentence,
+    unstable_sentences,
 )
 
 # largest estimated error by the mesh of a stress that is no warning
@@ -74,8 +75,8 @@ def response_remarks(
     warnings = [
         folded_sentence(curves),
         lower_sentence(curves),
-        *(unstable_sentence(c, scene.accuracy) for c in curves),
-        *map(march_sentence, curves),
+        *unstable_sentences(curves, scene.accuracy),
+        *sentences_of_kinds(map(_of_march, curves)),
         unjudged_sentence(curves),
         unmarched_sentence(curves),
         doubtful_sentence(curves, judged.reason),
@@ -172,10 +173,12 @@ def stiff_layer_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
-def march_sentence(curve: Curve) -> str:
-    """How the resonance was sought where balances do not give it, or ""."""
+def _of_march(curve: Curve) -> LoadRemark | None:
+    """How the resonance was sought where balances do not give it."""
     found = curve.resonance_by_march
-    return "" if found is None else f"load {load_of(curve)}: {found.sentence}"
+    return (
+        None if found is None else LoadRemark(found.search, f"under {load_of(curve)} {found.band}")
+    )
 
 
 def history_remarks(curves: Sequence[Curve]) -> list[str]:

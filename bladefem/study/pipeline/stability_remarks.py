@@ -16,9 +16,14 @@ from ...scene.units import newtons
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from ..stability.verdicts import model_in_time
+from .load_remarks import LoadRemark, sentences_of_kinds
 
 if TYPE_CHECKING:
     from .curve import Curve
+
+# what remarks on several loads have in common
+UNSTABLE_TOP = "the highest motion is unstable"
+MARCH_GIVEN = "the amplitude given is that of an integration in time (a march)"
 
 
 @dataclass(frozen=True)
@@ -159,60 +164,68 @@ def folded_sentence(curves: Sequence[Curve]) -> str:
     )
 
 
-def unstable_sentence(curve: Curve, accuracy: float) -> str:
-    """What became of a resonance that is unstable and not left for a ripple alone, or ""."""
+def unstable_sentences(curves: Sequence[Curve], accuracy: float) -> list[str]:
+    """What became of the resonances that are unstable and not left for a ripple alone."""
+    return sentences_of_kinds(_of_unstable(curve, accuracy) for curve in curves)
+
+
+def _of_unstable(curve: Curve, accuracy: float) -> LoadRemark | None:
     top, march = curve.unstable_peak, curve.march_at_peak
     if top is None:
         return _from_a_flank(curve)
     if _rippled(curve, accuracy):
-        return ""
+        return None
     at = _place(curve, top)
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
-    lost = (
-        f"load {newtons(curve.load)}: the highest motion, {1e6 * size(top):.4g} um at "
-        f"{top.frequency:.5g} Hz, is unstable{named}"
+    where = (
+        f"under {newtons(curve.load)}, {1e6 * size(top):.4g} um at {top.frequency:.5g} Hz{named}"
     )
     if curve.march_replaces_balance and not curve.keeps_unstable:
-        return f"{lost}; {_marched_from_flank(curve)}"
-    if curve.march_replaces_balance:
-        lost += "; the amplitude given is that of an integration in time (a march) from there"
-    elif curve.keeps_unstable and march is not None and not march.reason:
-        lost += "; it is given as the resonance"
-    elif curve.keeps_unstable:
-        lost += "; it is given as the resonance, being the larger amplitude"
-    else:
-        lost += (
-            "; the resonance given is the highest one that is not, "
-            f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
+        return LoadRemark(
+            f"{UNSTABLE_TOP}; {MARCH_GIVEN}", f"{where}: {_marched_from_flank(curve)}"
         )
-    return lost if march is None else f"{lost}; {march.sentence}"
+    marched = "" if march is None else f": {march.sentence}"
+    if curve.march_replaces_balance:
+        return LoadRemark(f"{UNSTABLE_TOP}; {MARCH_GIVEN}", f"{where}{marched}")
+    if curve.keeps_unstable and march is not None and not march.reason:
+        return LoadRemark(f"{UNSTABLE_TOP}; it is given as the resonance", f"{where}{marched}")
+    if curve.keeps_unstable:
+        given = "it is given as the resonance, being the larger amplitude"
+        return LoadRemark(f"{UNSTABLE_TOP}; {given}", f"{where}{marched}")
+    instead = f"{1e6 * curve.peak_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
+    given = "the resonance given is the highest one that is not"
+    return LoadRemark(f"{UNSTABLE_TOP}; {given}", f"{where}, given {instead}{marched}")
 
 
-def _from_a_flank(curve: Curve) -> str:
-    """A sentence where a march beside the highest motion, which is not known to be unstable, gives
-    the resonance; else "".
+def _from_a_flank(curve: Curve) -> LoadRemark | None:
+    """Where a march beside the highest motion, which is not known to be unstable, gives the
+    resonance.
     """
     if not curve.march_replaces_balance:
-        return ""
+        return None
     top = int(np.where(curve.converged, curve.amplitude, 0.0).argmax())
     judged = "was not judged" if curve.stability[top] == UNKNOWN else "lasts"
     driven = curve.march_at_peak is not None and curve.march_at_peak.drive > 1
     why = "a strong drive leads to a higher one" if driven else "motions beside it do not last"
-    return (
-        f"load {newtons(curve.load)}: the highest motion, {1e6 * curve.amplitude[top]:.4g} um at "
-        f"{curve.frequency[top]:.5g} Hz, {judged}, and {why}; {_marched_from_flank(curve)}"
+    where = (
+        f"under {newtons(curve.load)}, {1e6 * curve.amplitude[top]:.4g} um at "
+        f"{curve.frequency[top]:.5g} Hz"
+    )
+    return LoadRemark(
+        f"the highest motion {judged}, and {why}; {MARCH_GIVEN}",
+        f"{where}: {_marched_from_flank(curve)}",
     )
 
 
 def _marched_from_flank(curve: Curve) -> str:
     """What the resonance was marched from, and what was found."""
-    found = "" if curve.march_at_peak is None else f"; {curve.march_at_peak.sentence}"
+    found = "" if curve.march_at_peak is None else f", {curve.march_at_peak.sentence}"
     ends = {curve.frequency.min(): "first", curve.frequency.max(): "last"}
     end = ends.get(curve.peak_frequency)
-    beyond = f"; it is the {end} point of the band, beyond which it may be higher" if end else ""
+    beyond = f", the {end} point of the band, beyond which it may be higher" if end else ""
     return (
-        "the amplitude given is that of an integration in time (a march) from "
-        f"{1e6 * curve.balance_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz{found}{beyond}"
+        f"from {1e6 * curve.balance_amplitude:.4g} um at {curve.peak_frequency:.5g} Hz"
+        f"{beyond}{found}"
     )
 
 

@@ -80,15 +80,21 @@ class ResonanceInTime:
     by_law: bool = False
 
     @property
-    def sentence(self) -> str:
-        """What was done and found."""
+    def search(self) -> str:
+        """What was done, in words."""
         law = " with the law of the layer" if self.by_law else ""
         return (
             "most contacts lift off, and the harmonic balance does not give the resonance; it was "
             f"sought by integration in time (marching){law}, with {self.points} contact points a "
-            f"seat, at {self.frequencies} frequencies for {self.periods} periods: at "
-            f"{self.frequency:.5g} Hz the blade keeps between {1e6 * self.lowest:.4g} and "
-            f"{1e6 * self.highest:.4g} um"
+            "seat"
+        )
+
+    @property
+    def band(self) -> str:
+        """What was found, in words."""
+        return (
+            f"the blade keeps between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um at "
+            f"{self.frequency:.5g} Hz ({self.frequencies} frequencies, {self.periods} periods)"
         )
 
 
