@@ -8,11 +8,14 @@ import pytest
 from small_patch import blade_side, patch_model, patch_on_half_space, problem_of
 
 from bladefem.contact.numerical_stiffness import numerical_stiffness
+from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import softened_layer
 from bladefem.hbm.peak import find_peak
 from bladefem.hbm.solution import size
-from bladefem.hbm.solve import solve
+from bladefem.hbm.solve import solve, solve_near
+from bladefem.hbm.solver import fallback
 from bladefem.hbm.solver.newton import Options
+from bladefem.hbm.solver.residual import Balance, start_in_stick
 from bladefem.study.adaptive import stiff_layer
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.resonance_curve import resonance_curve
@@ -117,6 +120,32 @@ def test_the_change_is_that_of_the_resonances():
     shift = true.omega / soft.omega - 1
     assert shift > 5e-4
     assert found.frequency == pytest.approx(shift, abs=0.1 * shift)
+
+
+@pytest.mark.parametrize(
+    ("fallbacks", "methods"),
+    [(False, ["newton"]), (True, ["newton", "newton on the residual"])],
+)
+def test_newton_lowers_the_step_first_where_a_layer_is_split(stiff, fallbacks, methods):
+    """Its residual is badly scaled; what only judges is sought from its start alone."""
+    options = Options(iterations=1, fallbacks=fallbacks)
+
+    def tried(model):
+        balance = Balance(model, condense(model, OMEGA, 3), 64)
+        start = np.zeros_like(start_in_stick(balance))
+        attempts = fallback._newton_attempts(balance, start, options)
+        return list(dict.fromkeys(attempt.method for attempt in attempts))
+
+    assert tried(stiff) == methods
+    assert tried(softened_layer(stiff))[0] == "newton on the residual"
+
+
+def test_a_neighbour_of_a_split_layer_lowers_the_step(stiff):
+    near = solve(stiff, OMEGA, 3, 64)
+    assert solve_near(stiff, OMEGA, 3, 64, near).method == "newton"
+    soft = softened_layer(stiff)
+    other = solve_near(soft, OMEGA, 3, 64, solve(soft, OMEGA, 3, 64))
+    assert other.method == "newton on the residual"
 
 
 def top_of(model, closed):

@@ -90,7 +90,8 @@ def _newton_attempts(
     starts = [w for w in (start, start_in_stick(balance)) if w is not None]
     compiled = runs_compiled(balance)
     split = balance.model.series is not None
-    merits = NEWTON_MERITS if lowers_step_first(balance) else NEWTON_MERITS[::-1]
+    step_first = lowers_step_first(balance)
+    merits: Sequence[tuple[str, str]] = NEWTON_MERITS if step_first else NEWTON_MERITS[::-1]
     if split and not options.fallbacks and start is not None:
         # of 69 points with stiff layers that the start did not lead to, full stick led to one, in
         # a quarter of the time of all; what one merit does not find is better sought beside it
