@@ -18,6 +18,7 @@ from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import Balance, start_in_stick
 from bladefem.study.adaptive import stiff_layer
 from bladefem.study.adaptive.family import family_member, family_of
+from bladefem.study.adaptive.resonance_choice import has_final_harmonics
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.adaptive.stiff_layer import (
@@ -226,3 +227,10 @@ def test_a_curve_takes_the_softer_layer_by_itself():
     assert curve.settings.softened
     assert all(p.converged for p in curve.points)
     assert "a softer layer in place of the stiff one" in curve.settings.sentence()
+
+
+def test_harmonics_of_a_softer_layer_are_not_refined_without_end():
+    softened = replace(SETTINGS, softened=True, harmonics=15)
+    assert has_final_harmonics(softened)
+    assert not has_final_harmonics(replace(softened, harmonics=7))
+    assert not has_final_harmonics(replace(softened, softened=False))

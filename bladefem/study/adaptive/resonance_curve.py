@@ -91,7 +91,9 @@ def resonance_curve(
         lower = number == 0 and not used.softened
         used, peak, errors = _chosen(family, used, top, accuracy, lower, fixed, march)
         in_time = marched_widely(march, used, top) if errors is None else errors.in_time
-        if number == 0 and not in_time and same_settings(used, settings):
+        # what harmonics leave out a march has reported, or they are not refined for it
+        asked = not in_time and not has_final_harmonics(used)
+        if number == 0 and asked and same_settings(used, settings):
             chosen = used, peak, errors
             used, peak, errors = _with_missed(family, points, top, accuracy, fixed, chosen)
         if swept[1] != accuracy or not same_settings(swept[0], used):
@@ -110,8 +112,6 @@ def resonance_curve(
             # the flanks of a peak that is far from right need no look of their own
             return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
-        # what harmonics leave out a march has reported, or they are not refined for it
-        asked = not in_time and not has_final_harmonics(used)
         significant = _checked_significant(family, used, points, top, accuracy) if asked else {}
         found = significant | _checked_flanks(family, used, points, top, errors)
         missed = _harmonics_missed(used, points, top, significant, accuracy)
