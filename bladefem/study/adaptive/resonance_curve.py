@@ -81,18 +81,14 @@ def resonance_curve(
     Raises:
         NotSolvedError: no point converged.
     """
-    settings, points = _rough_curve(family, settings, band, mode)
-    settings, points = _with_stiff_layer(family, settings, points, band, mode, accuracy)
+    rough = _rough_curve(family, settings, band, mode)
+    settings, points = _with_stiff_layer(family, *rough, band, mode, accuracy)
     used, top = settings, peak_of(points)
     swept = settings, 1.0
     notes: list[str] = []
     for number in range(MAX_SWEEPS):
-        # points of a softened layer are swept already with what is chosen
-        lower = number == 0 and not used.softened
-        used, peak, errors = _chosen(family, used, top, accuracy, lower, fixed, march)
-        in_time = marched_widely(march, used, top) if errors is None else errors.in_time
-        # what harmonics leave out a march has reported, or they are not refined for it
-        asked = not in_time and not has_final_harmonics(used)
+        used, peak, errors = _chosen(family, used, top, accuracy, number == 0, fixed, march)
+        asked = _asks_for_harmonics(used, top, errors, march)
         if number == 0 and asked and same_settings(used, settings):
             chosen = used, peak, errors
             used, peak, errors = _with_missed(family, points, top, accuracy, fixed, chosen)
@@ -119,6 +115,19 @@ def resonance_curve(
             break
         used = missed or used
     return CheckedCurve(used, points, found, tuple(notes), _parts(errors))
+
+
+def _asks_for_harmonics(
+    settings: Settings,
+    top: Solution,
+    errors: PeakErrors | None,
+    march: March | None,
+) -> bool:
+    """Points beside the peak may ask for more harmonics: what these leave out no march has
+    reported, and they may be refined.
+    """
+    in_time = marched_widely(march, settings, top) if errors is None else errors.in_time
+    return not in_time and not has_final_harmonics(settings)
 
 
 def _rough_curve(
@@ -342,7 +351,9 @@ def _chosen(
             if choice is not None:
                 return choice
         enough = choose_at_peak(family, settings, peak, accuracy, fixed)
-        return cheaper_settings(family, *enough, accuracy) if lower else enough
+        # points of a softened layer are swept already with what is chosen
+        cheaper = lower and not settings.softened
+        return cheaper_settings(family, *enough, accuracy) if cheaper else enough
     except NotSolvedError:
         return replace(settings, error=np.inf), None, None
 
