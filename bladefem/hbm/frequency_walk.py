@@ -29,11 +29,15 @@ def walk_in_frequency(
     samples: int,
     start: Solution,
     options: Options = DEFAULT_OPTIONS,
+    enough: float = 1.0,
 ) -> list[Solution]:
     """Converged points from a solved one towards a frequency, each by Newton from the curve
     through the last ones; the step is halved where that fails.
 
     The last point is at the frequency, unless a fold or a corner of the curve ended the walk.
+
+    Args:
+        enough: share of the way after which the walk ends.
     """
     brief = replace(options, iterations=min(options.iterations, WALK_ITERATIONS))
     way = [start]
@@ -50,7 +54,8 @@ def walk_in_frequency(
             step *= 1.0 if point.iterations > WALK_ITERATIONS / 2 else 2.0
         else:
             step = (target - way[-1].omega) / 4
-        if abs(step) < shortest or way[-1].omega == omega:
+        gone = abs(way[-1].omega - start.omega)
+        if abs(step) < shortest or gone >= enough * abs(omega - start.omega):
             break
     return way[1:]
 

@@ -14,8 +14,14 @@ from .linear.condensation import Linear, condense, own_flexibility
 from .model import ReducedModel
 from .point_measures import MEASURES, count_states, measure_point
 from .solution import Solution, Work, probe_motion
-from .solver.fallback import NEWTON_MERITS, Attempt, match_harmonics, solve_balance
-from .solver.newton import DEFAULT_OPTIONS, Options, newton, runs_compiled
+from .solver.fallback import (
+    NEWTON_MERITS,
+    Attempt,
+    lowers_step_first,
+    match_harmonics,
+    solve_balance,
+)
+from .solver.newton import DEFAULT_OPTIONS, Options, newton
 from .solver.point_compiled import compiles_points, solve_each, solve_small
 from .solver.residual import Balance
 from .solver.walking import drift_speed
@@ -82,7 +88,7 @@ def solve_near(
 ) -> Solution:
     """The point by Newton from a solved neighbour alone; nothing else is tried where that fails."""
     balance = Balance(model, condense(model, omega, H), samples)
-    merit = "step" if runs_compiled(balance) else "residual"
+    merit = NEWTON_MERITS[0][1] if lowers_step_first(balance) else NEWTON_MERITS[1][1]
     end = newton(balance, match_harmonics(start.w, H), options, merit)
     method = next(name for name, lowered in NEWTON_MERITS if lowered == merit)
     return as_solution(balance, Attempt(method, end), end.iterations, end.reason)

@@ -130,6 +130,9 @@ def test_a_walk_ends_at_the_frequency_or_before_a_fold():
     *_, low = response(model, omegas, 5, 0)
     way = walk_in_frequency(model, 1.05, 5, 0, low)
     assert way[-1].omega == 1.05 and all(p.converged for p in way)
+    # the first step takes half of the way
+    begun = walk_in_frequency(model, 1.05, 5, 0, low, enough=0.1)
+    assert [p.omega for p in begun] == [pytest.approx((low.omega + 1.05) / 2)]
     beyond = walk_in_frequency(model, 3.0, 5, 0, low, Options(iterations=3))
     assert all(p.converged for p in beyond)
 

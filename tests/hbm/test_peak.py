@@ -11,6 +11,7 @@ from models import block, folding_pair, single_mass
 from bladefem.data import Elements
 from bladefem.errors import NotSolvedError
 from bladefem.hbm import peak as peak_module
+from bladefem.hbm.frequency_walk import walk_in_frequency
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.optimum import higher_from_neighbours, lowest_peak, optimum
 from bladefem.hbm.parameters import vary
@@ -54,6 +55,29 @@ def test_a_gain_that_is_too_small_for_a_walk_is_given_up(monkeypatch):
     solved.clear()
     with pytest.raises(NotSolvedError, match="peak search stopped"):
         find_peak(model, HZ * 1320, 3, 0, tolerance=1e-9)
+
+
+@pytest.mark.parametrize("fallbacks", [False, True])
+def test_a_search_that_only_judges_walks_no_farther_than_it_must(fallbacks, monkeypatch):
+    """The maximum may lie before a point that is not solved at once."""
+    model = reference_model(1e6, 0.06, 1.4, harmonics=3)
+    solved, walks = [], []
+
+    def fails_once(*args, **options):
+        solved.append(solve(*args, **options))
+        return replace(solved[-1], converged=False) if len(solved) == 3 else solved[-1]
+
+    def walk(*args):
+        walks.append(args[-1])
+        return walk_in_frequency(*args)
+
+    monkeypatch.setattr(peak_module, "solve", fails_once)
+    monkeypatch.setattr(peak_module, "walk_in_frequency", walk)
+    options = replace(DEFAULT_OPTIONS, fallbacks=fallbacks)
+    found = find_peak(model, HZ * 1320, 3, 0, options=options)
+    assert walks == [1.0 if fallbacks else peak_module.JUDGED_WALK_SHARE]
+    monkeypatch.undo()
+    assert found.height == pytest.approx(find_peak(model, HZ * 1320, 3, 0).height, rel=2e-4)
 
 
 def test_a_tracked_peak_is_the_peak_at_each_load():

@@ -186,11 +186,15 @@ def _richer_choice(
 
 
 def _near_enough(settings: Settings, errors: PeakErrors, limit: float) -> bool:
-    """The errors together keep to a limit, or more harmonics would cost minutes on a layer that is
-    a softer one anyway, for the same error.
+    """The errors together keep to a limit, or harmonics are not refined further."""
+    return has_final_harmonics(settings) or sum(errors.needs.values()) <= limit
+
+
+def has_final_harmonics(settings: Settings) -> bool:
+    """More harmonics would cost minutes on a layer that is a softer one anyway, for the same
+    error.
     """
-    settled = settings.softened and settings.harmonics >= MANY_HARMONICS
-    return settled or sum(errors.needs.values()) <= limit
+    return settings.softened and settings.harmonics >= MANY_HARMONICS
 
 
 def _harmonics_first(errors: PeakErrors, accuracy: float) -> str:

@@ -17,12 +17,13 @@ from ...errors import NotSolvedError
 from ...hbm.model import ReducedModel, in_series
 from ...hbm.peak import Peak, find_peak
 from ...hbm.solution import Solution, mostly_lifts_off
+from ...hbm.solve import solve_near
 from ...reduction.assemble import change_each
 from .band_sweep import solver_options
 from .family import Family, family_member
 from .peak_errors import peak_from
 from .resonance_choice import LIFTING_POINTS
-from .settings import Settings
+from .settings import DAMPER_MODELS, Settings
 
 # harmonics at most of the models that follow the resonance; they have LIFTING_POINTS contact points
 PATH_HARMONICS = 15
@@ -34,9 +35,12 @@ FIRST_HARMONICS = 7
 PATH_STIFFNESS_RATIO = 4.0
 # compliances in series, over those of the elements, with which harmonics are added
 SOFTENINGS = (0.0, 1.0, 2.0)
-# of the way, which is linear in the layer's compliance; a search that fails takes 7 s and more, so
-# that it ends there
-PATH_SHARES = (0.2, 0.4, 0.6, 0.8, 1.0)
+# of the way, which is linear in the layer's compliance: its first step, and the shortest one
+FIRST_STEP_SHARE = 0.2
+SHORTEST_STEP_SHARE = 0.02
+# the next step over one that was solved, and over one that was not
+LONGER_STEP = 1.5
+SHORTER_STEP = 1.0 / 3.0
 # Newton steps of a point on it
 PATH_STEPS = 15
 # relative accuracy of its heights
@@ -67,52 +71,77 @@ def softened_where_lifting(family: Family, settings: Settings, top: Solution) ->
     return replace(settings, softened=True) if split and mostly_lifts_off(top) else settings
 
 
-def with_harmonics_of_stiff_layer(
-    family: Family,
-    settings: Settings,
-    top: Solution,
-    accuracy: float,
-) -> tuple[Settings, Solution]:
-    """Settings with PATH_HARMONICS where a stiff layer is softened and all contacts lift off, with
-    FIRST_HARMONICS where some keep closed, and the resonance with them; the same as before where it
-    was not found, or the harmonics are given.
+def settings_of_stiff_layer(family: Family, settings: Settings, top: Solution) -> Settings:
+    """Settings with PATH_HARMONICS and an elastic damper where a stiff layer is softened and all
+    contacts lift off, with FIRST_HARMONICS where some keep closed; the same as before where these
+    are given.
 
-    Where they are not solved one after the other, they are added with a layer of half the stiffness
-    or less: with rigid faces under 80 N on the shipped wedge neither 7 nor 15 harmonics are solved
-    from the resonance with three.
+    A rigid damper that bounces is 3 % wrong with all stiff layers on the shipped wedge, and leaves
+    no room for the rest.
 
     Args:
         top: the highest point of a sweep with these settings.
     """
-    if not settings.softened or "harmonics" not in settings.chosen:
-        return settings, top
-    ways = (_climbed(family, settings, top, accuracy, softening) for softening in SOFTENINGS)
-    return next((found for found in ways if found is not None), (settings, top))
+    if not settings.softened:
+        return settings
+    bounces = top.states["lift"] == len(top.w)
+    more = min(PATH_HARMONICS if bounces else FIRST_HARMONICS, settings.most)
+    richer = settings
+    if "harmonics" in settings.chosen and settings.harmonics < more:
+        richer = _with_harmonics(richer, more)
+    if bounces and "damper" in settings.chosen and DAMPER_MODELS[-1] in family.dampers:
+        richer = replace(richer, damper=DAMPER_MODELS[-1])
+    return richer
+
+
+def climbed_to(
+    family: Family,
+    settings: Settings,
+    top: Solution,
+    wanted: Settings,
+    accuracy: float,
+) -> Solution | None:
+    """The resonance with the harmonics of other settings; None where it was not found.
+
+    Where harmonics are not solved one after the other, they are added with a layer of half the
+    stiffness or less: with rigid faces under 80 N on the shipped wedge neither 7 nor 15 harmonics
+    are solved from the resonance with three.
+
+    Args:
+        settings, top: of the resonance that is known, and its highest point.
+    """
+    ways = (_climbed(family, settings, top, wanted, accuracy, more) for more in SOFTENINGS)
+    return next((found for found in ways if found is not None), None)
+
+
+def _with_harmonics(settings: Settings, harmonics: int) -> Settings:
+    """So many harmonics, and the samples that they need; 0 samples are located exactly."""
+    samples = settings.samples and max(settings.samples, 8 * (harmonics + 1))
+    return replace(settings, harmonics=harmonics, samples=samples)
 
 
 def _climbed(
     family: Family,
     settings: Settings,
     top: Solution,
+    wanted: Settings,
     accuracy: float,
     softening: float,
-) -> tuple[Settings, Solution] | None:
+) -> Solution | None:
     """The resonance with more and more harmonics, found with so many times the compliance of the
     elements in series; None where one of these was not found.
     """
-    bounces = top.states["lift"] == len(top.w)
-    most = min(PATH_HARMONICS if bounces else FIRST_HARMONICS, settings.most)
+    most = wanted.harmonics
     steps = [(softening, H) for H in (3, 7) if settings.harmonics <= H < most]
-    wanted = settings
-    for more, H in [*steps, (softening, most), (0.0, most)]:
-        samples = settings.samples and max(settings.samples, 8 * (H + 1))
-        wanted = replace(settings, harmonics=H, samples=samples)
-        model = softer_model(family_member(family, wanted).model, more)
-        peak = _peak_on_the_way(model, wanted, top, accuracy)
+    last = [(softening, most), (0.0, most)] if softening else [(0.0, most)]
+    for more, H in [*steps, *last]:
+        step = _with_harmonics(replace(wanted, samples=settings.samples), H)
+        model = softer_model(family_member(family, step).model, more)
+        peak = _peak_on_the_way(model, step, top, accuracy)
         if peak is None:
             return None
         top = peak.solution
-    return wanted, top
+    return top
 
 
 def softer_model(model: ReducedModel, softening: float) -> ReducedModel:
@@ -132,8 +161,9 @@ def stiff_layer_change(
 ) -> StiffLayerChange:
     """How a resonance moves from the softer layer to the layer itself.
 
-    Where the way was not solved to its end, the largest change of the amplitude on it and the last
-    one of the frequency are taken to go on in proportion to the layer's compliance.
+    The way is solved at the frequency of the softer layer's resonance, from its end the resonance
+    is found; where that is not yet the layer itself, the way goes on from there. Where it ends
+    before, the changes are taken to go on in proportion to the layer's compliance.
 
     Args:
         settings, top: of the resonance, and its highest point.
@@ -148,24 +178,53 @@ def stiff_layer_change(
     except NotSolvedError:
         return StiffLayerChange(np.inf, np.nan)
     layer = family_member(family, replace(small, softened=False)).model
-    largest = 0.0
-    solved = 0.0
-    shift = 0.0
-    near = base.solution
-    for share in PATH_SHARES:
-        peak = _peak_on_the_way(stiffened_model(layer, share), small, near, accuracy)
-        if peak is None:
+    solved, peak = 0.0, base
+    while solved < 1.0:
+        share, point = _way_to_the_layer(layer, small, solved, peak.solution, accuracy)
+        found = _peak_on_the_way(stiffened_model(layer, share), small, point, accuracy)
+        if found is None or (share < solved + FIRST_STEP_SHARE and share < 1.0):
             break
-        change = peak.height / base.height - 1
-        shift = peak.omega / base.omega - 1
-        if share == 1.0:
-            return StiffLayerChange(PATH_ACCURACY, shift, change)
-        near = peak.solution
-        solved = share
-        largest = max(largest, abs(change))
+        solved, peak = share, found
     if solved < ENOUGH_OF_THE_WAY:
         return StiffLayerChange(np.inf, np.nan)
-    return StiffLayerChange(largest / solved, shift / solved)
+    change = peak.height / base.height - 1
+    shift = peak.omega / base.omega - 1
+    if solved == 1.0:
+        return StiffLayerChange(PATH_ACCURACY, shift, change)
+    return StiffLayerChange(PATH_ACCURACY + abs(change) / solved, shift / solved)
+
+
+def _way_to_the_layer(
+    layer: ReducedModel,
+    settings: Settings,
+    share: float,
+    point: Solution,
+    accuracy: float,
+) -> tuple[float, Solution]:
+    """How much of the way to the layer itself is solved at the frequency of a point, and the last
+    point on it.
+
+    Each point starts on the line through the last two. Resonances on the way take six times as long
+    on the shipped wedge, since flat tops have points beside them that are not solved.
+
+    Args:
+        share, point: of the way, and the point there that it goes on from.
+    """
+    options = replace(solver_options(accuracy), fallbacks=False, iterations=PATH_STEPS)
+    step = FIRST_STEP_SHARE
+    rate = np.zeros_like(point.w)
+    while share < 1.0 and step >= SHORTEST_STEP_SHARE:
+        target = min(1.0, share + step)
+        ahead = replace(point, w=point.w + (target - share) * rate)
+        model = stiffened_model(layer, target)
+        H, samples = settings.harmonics, settings.samples
+        found = solve_near(model, point.omega, H, samples, ahead, options)
+        if found.converged:
+            rate = (found.w - point.w) / (target - share)
+            share, point, step = target, found, LONGER_STEP * step
+        else:
+            step = SHORTER_STEP * (target - share)
+    return share, point
 
 
 def _peak_on_the_way(
