@@ -96,15 +96,16 @@ class FaceMap:
 
 @dataclass(frozen=True)
 class _FoldedParts:
-    """C^H S C = own + phase across + conj(phase) across^T."""
+    """C^H S C = own + phase across + conj(phase) across^T, real and imaginary part by part."""
 
     # of the maps that they were made with
     low: sp.csr_matrix
     high: sp.csr_matrix
     # (nm, nm) low^T S low + high^T S high
     own: np.ndarray
-    # (nm, nm) low^T S high
-    across: np.ndarray
+    # (nm, nm) across + across^T and across - across^T of across = low^T S high
+    even: np.ndarray
+    odd: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -307,9 +308,14 @@ def _folded_complement(core: Core, faces: FaceMap) -> np.ndarray:
     if parts is None or parts.low is not faces.low or parts.high is not faces.high:
         parts = _fold(core.S, faces.low, faces.high)
         core.folded[:] = [parts]
-    out = np.array(parts.own, np.result_type(parts.own, faces.phase))
-    out += faces.phase * parts.across
-    out += np.conj(faces.phase) * parts.across.T
+    phase = complex(faces.phase)
+    real = phase.real * parts.even
+    real += parts.own
+    if not np.iscomplexobj(faces.phase):
+        return real
+    out = np.empty(real.shape, complex)
+    out.real = real
+    np.multiply(parts.odd, phase.imag, out=out.imag)
     return out
 
 
@@ -318,9 +324,9 @@ def _fold(S: np.ndarray, low: sp.csr_matrix, high: sp.csr_matrix) -> _FoldedPart
     left, right = low.T.tocsr(), high.T.tocsr()
     # rows of products are those of S, which is symmetric
     beside = np.ascontiguousarray((right @ S).T)
-    return _FoldedParts(
-        low, high, left @ np.ascontiguousarray((left @ S).T) + right @ beside, left @ beside
-    )
+    across = left @ beside
+    own = left @ np.ascontiguousarray((left @ S).T) + right @ beside
+    return _FoldedParts(low, high, own, across + across.T, across - across.T)
 
 
 def solve_diameter(rim: Rim, B: np.ndarray) -> np.ndarray:

@@ -227,7 +227,8 @@ def elastic_pairs(
     inverse = inverse or (lambda B: compliance(flex, B))
     few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(count)
     if start is None and solver.method == "slepc" and not few:
-        first = inverse(restrict_load(flex.con, _rotation_probe(flex.con, 1)))
+        # SLEPc begins with its image under K^-1 M
+        first = restrict_load(flex.con, _rotation_probe(flex.con, 1))
         return krylov_schur(flex.con, inverse, first, count, tolerance, guard, solver)
     if start is None:
         width = min(max(8 if flex.con.dtype is float else 6, count // 3), 16)

@@ -5,13 +5,14 @@ import pytest
 from structured import box, sector
 
 from bladefem.errors import InputError, NotSolvedError
+from bladefem.fem import modes as modal
 from bladefem.fem.all_diameters import _counting_shift as common_shift
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import SLEPc
 from bladefem.fem.constraint import at_diameter, constrain, transformation
-from bladefem.fem.eigensolver import Eigensolver
-from bladefem.fem.flexibility import flexible
+from bladefem.fem.eigensolver import Eigensolver, krylov_schur
+from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.linalg import Doubled, apply_block, solve_block
 from bladefem.fem.modes import BLOCKS, SLEPC, _counting_shift, lowest_pairs, modes, pairs_together
 from bladefem.scene.tables import Material
@@ -97,6 +98,26 @@ def test_restarts_of_a_complex_pencil_keep_every_pair_single():
     np.testing.assert_allclose(lam, exact, rtol=1e-10)
     gram = X.conj().T @ apply_block(flex.con.M, X)
     np.testing.assert_allclose(gram, np.eye(10), atol=1e-10)
+
+
+@pytest.mark.parametrize("n", [0, 2])
+def test_slepc_makes_the_first_solve_itself(n, monkeypatch):
+    """A load solved for beforehand would only be one sweep more."""
+    flex = flexible(constrain(assemble(sector(8, (4, 3, 1)), "blade", Material()), "clamp", n))
+    solves, solved_before = [], []
+
+    def inverse(load):
+        solves.append(load)
+        return compliance(flex, load)
+
+    def begins(*given):
+        solved_before.append(len(solves))
+        return krylov_schur(*given)
+
+    monkeypatch.setattr(modal, "krylov_schur", begins)
+    lam, _ = lowest_pairs(flex, 4, inverse=inverse)
+    assert solved_before == [0]
+    np.testing.assert_allclose(lam, lowest_pairs(flex, 4, solver=BLOCKS)[0], rtol=1e-9)
 
 
 def test_options_of_petsc_reach_the_solver(monkeypatch):
