@@ -65,11 +65,18 @@ class Peak:
     slope: float = 0.0
     # second derivative of 1/height^2 with the frequency [1/(m^2 (rad/s)^2)]; 0: unknown
     bend: float = 0.0
+    # from the solution to the maximum, by its slope and the bend [rad/s]; 0 where it was closed in
+    ahead: float = 0.0
 
     @property
     def omega(self) -> float:
         """[rad/s]"""
         return self.solution.omega
+
+    @property
+    def vertex(self) -> float:
+        """Where the maximum is, as far as its slope tells [rad/s]."""
+        return self.omega + self.ahead
 
 
 def find_peak(
@@ -88,6 +95,8 @@ def find_peak(
     Args:
         samples: time samples a period; their ripples are no maxima.
         near: a peak of a similar model, which spares the first steps, or a solution to start from.
+            Without fallbacks, as a peak is judged, the slope of one point and the bend of that peak
+            are enough where they promise no gain.
         tolerance: relative accuracy of the height; the frequency follows with its square root.
         enough: relative gain that is given up where the point that promises it is not solved at
             once.
@@ -135,6 +144,7 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
+    judged = not options.fallbacks and _is_bend_of_mode(model, near, options.probe)
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
@@ -157,7 +167,11 @@ def _closed_in(
         else:
             best = now
             step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
-            gain = abs(now.slope * step) / now.height if bend > 0 and count > 1 else np.inf
+            known_bend = bend > 0 and (count > 1 or judged)
+            gain = abs(now.slope * step) / now.height if known_bend else np.inf
+            if count == 1 and gain < tolerance / 4:
+                peak = Peak(point, now.height, count, bend=bend, ahead=float(step))
+                return peak, np.inf
             target = omega + float(
                 np.clip(OVERSHOOT_FACTOR * step, -MAX_STEP * omega, MAX_STEP * omega)
             )
@@ -169,6 +183,13 @@ def _closed_in(
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _is_bend_of_mode(model: ReducedModel, near: Peak | Solution | None, probe: int) -> bool:
+    """A peak whose bend is known, and no sharper than a mode makes it: not that of a ripple."""
+    if not isinstance(near, Peak) or near.bend <= 0:
+        return False
+    return not may_be_ripple(model, near.solution, near.bend, probe)
 
 
 def _start_look(
