@@ -144,7 +144,11 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
-    judged = not options.fallbacks and _is_bend_of_mode(model, near, options.probe)
+    judged = None
+    if isinstance(near, Peak) and not options.fallbacks:
+        # a bend that another model has is good for a gain, and would mislead a step
+        judged = near if _is_bend_of_mode(model, near, options.probe) else None
+        bend = 0.0
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
@@ -158,6 +162,9 @@ def _closed_in(
         _require_motion(point, options.probe)
         omega = point.omega
         now = _look_at(model, point, options.probe)
+        if count == 1 and judged is not None and _promised_gain(now, judged) < tolerance / 4:
+            ahead = -now.line / judged.bend
+            return Peak(point, now.height, count, bend=judged.bend, ahead=ahead), np.inf
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)
@@ -167,11 +174,7 @@ def _closed_in(
         else:
             best = now
             step = -now.line / bend if bend > 0 else np.sign(now.slope) * reach
-            known_bend = bend > 0 and (count > 1 or judged)
-            gain = abs(now.slope * step) / now.height if known_bend else np.inf
-            if count == 1 and gain < tolerance / 4:
-                peak = Peak(point, now.height, count, bend=bend, ahead=float(step))
-                return peak, np.inf
+            gain = abs(now.slope * step) / now.height if bend > 0 and count > 1 else np.inf
             target = omega + float(
                 np.clip(OVERSHOOT_FACTOR * step, -MAX_STEP * omega, MAX_STEP * omega)
             )
@@ -185,11 +188,14 @@ def _closed_in(
     )
 
 
-def _is_bend_of_mode(model: ReducedModel, near: Peak | Solution | None, probe: int) -> bool:
-    """A peak whose bend is known, and no sharper than a mode makes it: not that of a ripple."""
-    if not isinstance(near, Peak) or near.bend <= 0:
-        return False
-    return not may_be_ripple(model, near.solution, near.bend, probe)
+def _is_bend_of_mode(model: ReducedModel, near: Peak, probe: int) -> bool:
+    """The bend of a peak is known, and no sharper than a mode makes it: not that of a ripple."""
+    return near.bend > 0 and not may_be_ripple(model, near.solution, near.bend, probe)
+
+
+def _promised_gain(now: _Look, judged: Peak) -> float:
+    """Relative gain of height from a point to the maximum, with the bend of a similar peak."""
+    return abs(now.slope * now.line / judged.bend) / now.height
 
 
 def _start_look(

@@ -28,7 +28,14 @@ from .checked_curve import CheckedCurve
 from .choice_in_time import March, choose_in_time, marched_widely
 from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
-from .peak_errors import JUDGE_STEPS, PeakErrors, compared_settings, judge_settings, peak_from
+from .peak_errors import (
+    JUDGE_STEPS,
+    OVERTONES,
+    PeakErrors,
+    compared_settings,
+    judge_settings,
+    peak_from,
+)
 from .resonance_choice import (
     FAR_BEYOND,
     choose_at_peak,
@@ -280,7 +287,7 @@ def _with_missed(
     if not lifts or too_large_to_follow(family, settings):
         return chosen
     significant = _checked_significant(family, settings, points, top, accuracy)
-    richer = _harmonics_missed(family, settings, points, top, significant, accuracy, MISSED_STEPS)
+    richer = _harmonics_missed(family, settings, points, top, significant, accuracy, 1)
     if richer is None:
         return chosen
     return _chosen(family, richer, top, accuracy, lower=False, fixed=fixed)
@@ -493,9 +500,12 @@ def _harmonics_missed(
         and np.isfinite(significant.get(point.omega, np.inf))
         and significant[point.omega] > _tolerated(point, top, accuracy)
     ]
-    richer = enriched_settings(settings, "harmonics") if wrong and most > 0 else None
+    # of a curve that is followed more are asked for by its own points only
+    followed = any(point.branch for point in points)
+    most = min(most, 1) if followed else most
+    richer = _next_for_flanks(settings, followed) if wrong and most > 0 else None
     for _ in range(most - 1):
-        more = None if richer is None else enriched_settings(richer, "harmonics")
+        more = None if richer is None else _next_for_flanks(richer, followed)
         if richer is None or more is None:
             break
         if _all_hold(family, settings, richer, wrong, top, accuracy):
@@ -504,11 +514,26 @@ def _harmonics_missed(
     return richer
 
 
+def _next_for_flanks(settings: Settings, followed: bool) -> Settings | None:
+    """One step of the harmonics, to OVERTONES before any more; None where there is none.
+
+    Args:
+        followed: the curve is followed round folds, which beyond OVERTONES takes longer than all
+            else: 42 s in place of 10 for one flank (seed 105 of benchmarks/choice_random.py).
+    """
+    richer = enriched_settings(settings, "harmonics")
+    if richer is None or richer.harmonics <= OVERTONES:
+        return richer
+    if settings.harmonics < OVERTONES:
+        return replace(richer, harmonics=OVERTONES)
+    return None if followed else richer
+
+
 def _steps_of_harmonics(poorer: Settings, richer: Settings) -> int:
-    """How many steps of `enriched_settings` lie between two numbers of harmonics."""
+    """How many steps of `_next_for_flanks` lie between two numbers of harmonics."""
     steps = 0
     while poorer.harmonics < richer.harmonics:
-        poorer = enriched_settings(poorer, "harmonics") or richer
+        poorer = _next_for_flanks(poorer, False) or richer
         steps += 1
     return steps
 
