@@ -88,6 +88,7 @@ def find_peak(
     near: Peak | Solution | None = None,
     tolerance: float = 1e-4,
     enough: float = 0.0,
+    judged_bend: float = 0.0,
     options: Options = DEFAULT_OPTIONS,
 ) -> Peak:
     """The local maximum uphill of omega [rad/s].
@@ -95,11 +96,11 @@ def find_peak(
     Args:
         samples: time samples a period; their ripples are no maxima.
         near: a peak of a similar model, which spares the first steps, or a solution to start from.
-            Without fallbacks, as a peak is judged, the slope of one point and the bend of that peak
-            are enough where they promise no gain.
         tolerance: relative accuracy of the height; the frequency follows with its square root.
         enough: relative gain that is given up where the point that promises it is not solved at
             once.
+        judged_bend: of the peak that this one judges, from whose solution `near` it starts: one
+            point is enough where its slope promises no gain with that bend; 0: unknown.
 
     Raises:
         InputError: no such probe.
@@ -107,10 +108,18 @@ def find_peak(
     """
     check_probe(model, options.probe)
     found, sharpness = _closed_in(
-        model, omega, H, samples, near=near, tolerance=tolerance, enough=enough, options=options
+        model,
+        omega,
+        H,
+        samples,
+        near=near,
+        tolerance=tolerance,
+        enough=enough,
+        judged_bend=judged_bend,
+        options=options,
     )
     # what only judges another peak (without fallbacks) is not worth more where its slope is zero
-    if np.isinf(sharpness) and not options.fallbacks:
+    if np.isinf(sharpness) and (judged_bend or not options.fallbacks):
         return found
     if not may_be_ripple(model, found.solution, sharpness, options.probe):
         return found
@@ -133,6 +142,7 @@ def _closed_in(
     near: Peak | Solution | None,
     tolerance: float,
     enough: float,
+    judged_bend: float,
     options: Options,
 ) -> tuple[Peak, float]:
     """The maximum that slopes lead to, and the largest second derivative of 1/height^2 by which
@@ -144,11 +154,9 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
-    judged = None
-    if isinstance(near, Peak) and not options.fallbacks:
-        # a bend that another model has is good for a gain, and would mislead a step
-        judged = near if _is_bend_of_mode(model, near, options.probe) else None
-        bend = 0.0
+    # a bend that another model has is good for a gain, and would mislead a step
+    if start is None or may_be_ripple(model, start, judged_bend, options.probe):
+        judged_bend = 0.0
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
@@ -162,9 +170,10 @@ def _closed_in(
         _require_motion(point, options.probe)
         omega = point.omega
         now = _look_at(model, point, options.probe)
-        if count == 1 and judged is not None and _promised_gain(now, judged) < tolerance / 4:
-            ahead = -now.line / judged.bend
-            return Peak(point, now.height, count, bend=judged.bend, ahead=ahead), np.inf
+        if count == 1 and judged_bend > 0:
+            ahead = -now.line / judged_bend
+            if abs(now.slope * ahead) / now.height < tolerance / 4:
+                return Peak(point, now.height, count, bend=judged_bend, ahead=ahead), np.inf
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)
@@ -186,16 +195,6 @@ def _closed_in(
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
-
-
-def _is_bend_of_mode(model: ReducedModel, near: Peak, probe: int) -> bool:
-    """The bend of a peak is known, and no sharper than a mode makes it: not that of a ripple."""
-    return near.bend > 0 and not may_be_ripple(model, near.solution, near.bend, probe)
-
-
-def _promised_gain(now: _Look, judged: Peak) -> float:
-    """Relative gain of height from a point to the maximum, with the bend of a similar peak."""
-    return abs(now.slope * now.line / judged.bend) / now.height
 
 
 def _start_look(

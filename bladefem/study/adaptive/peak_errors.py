@@ -117,7 +117,7 @@ def peak_from(
     """The peak of a model with other settings, uphill of a point solved with the old ones.
 
     Args:
-        near: that point, or the peak of the old settings, whose bend spares points.
+        near: that point, or the peak of the old settings, whose bend may spare points.
         fallbacks: where Newton's method fails from that point; without them it takes at most
             JUDGE_STEPS steps a point, since a peak that only estimates an error is not worth more.
 
@@ -139,9 +139,10 @@ def peak_from(
         point.omega,
         new.harmonics,
         new.samples,
-        near=replace(near, solution=start) if isinstance(near, Peak) else start,
+        near=start,
         tolerance=share * accuracy,
         enough=0.0 if fallbacks else enough * accuracy,
+        judged_bend=near.bend if isinstance(near, Peak) and not fallbacks else 0.0,
         options=options,
     )
 
