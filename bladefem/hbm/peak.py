@@ -20,7 +20,7 @@ from .model import ReducedModel
 from .parameters import vary
 from .peak_ripples import above_ripples, may_be_ripple
 from .sensitivity import sensitivities
-from .solution import Solution, size
+from .solution import Solution, lifts_off, size
 from .solve import solve
 from .solver.newton import DEFAULT_OPTIONS, Options
 from .validate_model import check_probe
@@ -154,8 +154,9 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
-    # a bend that another model has is good for a gain, and would mislead a step
-    if start is None or may_be_ripple(model, start, judged_bend, options.probe):
+    # a bend that another model has is good for a gain, and would mislead a step; where contacts lift
+    # off the peak may be a fold
+    if start is None or lifts_off(start) or may_be_ripple(model, start, judged_bend, options.probe):
         judged_bend = 0.0
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)

@@ -197,7 +197,9 @@ def _swept(
     paths = not too_large_to_follow(family, settings)
     # paths are followed anew
     again = any(p.branch for p in points) or not _same_points(swept, (settings, accuracy))
-    known = _with_peak([] if again else list(points), peak)
+    # with lift-off a sweep finds its motion from its own neighbours
+    one_motion = peak is not None and not lifts_off(peak.solution)
+    known = _with_peak([] if again else list(points), peak if one_motion else None)
     model = family_member(family, settings).model
     return covered_band(
         model,
