@@ -20,7 +20,7 @@ from .model import ReducedModel
 from .parameters import vary
 from .peak_ripples import above_ripples, may_be_ripple
 from .sensitivity import sensitivities
-from .solution import Solution, lifts_off, size
+from .solution import Solution, size
 from .solve import solve
 from .solver.newton import DEFAULT_OPTIONS, Options
 from .validate_model import check_probe
@@ -154,9 +154,8 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
-    # a bend that another model has is good for a gain, and would mislead a step; where contacts lift
-    # off the peak may be a fold
-    if start is None or lifts_off(start) or may_be_ripple(model, start, judged_bend, options.probe):
+    # a bend that another model has is good for a gain, and would mislead a step
+    if start is None or not _trusted_bend(model, start, judged_bend, options.probe):
         judged_bend = 0.0
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
@@ -171,7 +170,7 @@ def _closed_in(
         _require_motion(point, options.probe)
         omega = point.omega
         now = _look_at(model, point, options.probe)
-        if count == 1 and judged_bend > 0:
+        if count == 1 and judged_bend:
             ahead = -now.line / judged_bend
             if abs(now.slope * ahead) / now.height < tolerance / 4:
                 return Peak(point, now.height, count, bend=judged_bend, ahead=ahead), np.inf
@@ -196,6 +195,14 @@ def _closed_in(
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _trusted_bend(model: ReducedModel, top: Solution, bend: float, probe: int) -> bool:
+    """No ripple has made the bend of a peak, and no normal load follows the motion, which makes
+    folds.
+    """
+    one_motion = model.directions == model.elements.tangents
+    return one_motion and bend > 0 and not may_be_ripple(model, top, bend, probe)
 
 
 def _start_look(

@@ -197,10 +197,10 @@ def _swept(
     paths = not too_large_to_follow(family, settings)
     # paths are followed anew
     again = any(p.branch for p in points) or not _same_points(swept, (settings, accuracy))
-    # with lift-off a sweep finds its motion from its own neighbours
-    one_motion = peak is not None and not lifts_off(peak.solution)
-    known = _with_peak([] if again else list(points), peak if one_motion else None)
     model = family_member(family, settings).model
+    # where there may be several a sweep finds its motion from its own neighbours
+    one_motion = model.directions == model.elements.tangents
+    known = _with_peak([] if again else list(points), peak if one_motion else None)
     return covered_band(
         model,
         settings,
