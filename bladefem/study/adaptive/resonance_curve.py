@@ -198,9 +198,9 @@ def _swept(
     # paths are followed anew
     again = any(p.branch for p in points) or not _same_points(swept, (settings, accuracy))
     model = family_member(family, settings).model
-    # where there may be several a sweep finds its motion from its own neighbours
-    one_motion = model.directions == model.elements.tangents
-    known = _with_peak([] if again else list(points), peak if one_motion else None)
+    # where there may be several motions a sweep finds one from its own neighbours
+    kept = peak if _has_one_motion(family, settings) else None
+    known = _with_peak([] if again else list(points), kept)
     return covered_band(
         model,
         settings,
@@ -413,16 +413,17 @@ def _checked_significant(
     accuracy: float,
 ) -> dict[float, float]:
     """Circular frequency -> estimated relative error by more harmonics, among the MAX_CHECKED_PEAKS
-    points where harmonics that were left out move the contacts most: of those that are no
-    neighbours of each other, and not at the resonance, which was judged.
+    points where harmonics that were left out move the contacts most; where there is one motion, of
+    those that are no neighbours of each other, and not at the resonance, which was judged.
     """
+    alike = _has_one_motion(family, settings)
     share = heights_of(points) / size(top)
     significant = left_out_motion(family, [settings] * len(points), points) * share
     order = np.argsort(-significant)[:MAX_CHECKED_PEAKS]
     kept: list[int] = []
     for i in order[significant[order] > MIN_SHARE_OF_ACCURACY * accuracy].tolist():
-        beside = any(abs(i - j) == 1 for j in kept)
-        if points[i].converged and points[i] is not top and not beside:
+        known = points[i] is top or any(abs(i - j) == 1 for j in kept)
+        if points[i].converged and not (alike and known):
             kept.append(i)
     chosen = [points[i] for i in kept]
     other = richer_settings(family, settings, "harmonics")
@@ -502,9 +503,9 @@ def _harmonics_missed(
         and np.isfinite(significant.get(point.omega, np.inf))
         and significant[point.omega] > _tolerated(point, top, accuracy)
     ]
-    # of a curve that is followed more are asked for by its own points only
     followed = any(point.branch for point in points)
-    most = min(most, 1) if followed else most
+    # where there may be several motions, more are asked for by the points of the next curve only
+    most = most if _has_one_motion(family, settings) else min(most, 1)
     richer = _next_for_flanks(settings, followed) if wrong and most > 0 else None
     for _ in range(most - 1):
         more = None if richer is None else _next_for_flanks(richer, followed)
@@ -514,6 +515,12 @@ def _harmonics_missed(
             break
         richer = more
     return richer
+
+
+def _has_one_motion(family: Family, settings: Settings) -> bool:
+    """No normal load follows the motion, which makes several motions at one frequency."""
+    model = family_member(family, settings).model
+    return model.directions == model.elements.tangents
 
 
 def _next_for_flanks(settings: Settings, followed: bool) -> Settings | None:
