@@ -267,14 +267,14 @@ def test_steps_of_harmonics_are_counted():
 
 
 def test_a_followed_curve_takes_the_samples_that_cost_nothing(monkeypatch):
-    """With 128 it has 195 points, with 512 it has 117: each sample may make a fold."""
-    _, curve = curve_of_seed(79)
+    """With 64 it has 347 points, with 512 it has 120: each sample may make a fold."""
+    _, curve = curve_of_seed(153)
     assert curve.settings.samples == curve_module.FREE_SAMPLES
     monkeypatch.setattr(curve_module, "PYTHON_OPERATIONS", 0.0)
-    _, few = curve_of_seed(79)
+    _, few = curve_of_seed(153)
     assert few.settings.samples < curve_module.FREE_SAMPLES
-    assert len(curve.points) < 0.8 * len(few.points)
-    assert size(peak_of(curve.points)) == pytest.approx(size(peak_of(few.points)), rel=2e-3)
+    assert len(curve.points) < 0.5 * len(few.points)
+    assert size(peak_of(curve.points)) == pytest.approx(size(peak_of(few.points)), rel=5e-3)
 
 
 def test_the_peak_of_a_choice_is_not_closed_in_again(monkeypatch):
