@@ -42,6 +42,9 @@ JUMP_WIDTH = 1e-4
 # of the largest rise of 1/height^2 that slopes may leave out, beyond which there is a jump: 1 at
 # the limit of a corner next to the peak, 18 and 37 at the peaks of a bouncing mass
 JUMP_RISE_SHARE = 0.75
+# of the tolerance: difference of height up to which one point judges a peak: beyond it an overtone
+# may have split the resonance, with a lower maximum next to that point
+ALIKE = 5.0
 # of the frequency: where a search begins instead when its first point is not solved
 RETRY_RATIOS = (1.005, 1.01, 1.02, 0.99)
 # the same first, of a search that only judges another peak, which has a solution nearby: on the
@@ -88,7 +91,7 @@ def find_peak(
     near: Peak | Solution | None = None,
     tolerance: float = 1e-4,
     enough: float = 0.0,
-    judged_bend: float = 0.0,
+    judged: Peak | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> Peak:
     """The local maximum uphill of omega [rad/s].
@@ -99,8 +102,8 @@ def find_peak(
         tolerance: relative accuracy of the height; the frequency follows with its square root.
         enough: relative gain that is given up where the point that promises it is not solved at
             once.
-        judged_bend: of the peak that this one judges, from whose solution `near` it starts: one
-            point is enough where its slope promises no gain with that bend; 0: unknown.
+        judged: the peak that this one judges, from whose solution `near` it starts: one point of
+            about its height is enough where its slope promises no gain with that peak's bend.
 
     Raises:
         InputError: no such probe.
@@ -115,11 +118,11 @@ def find_peak(
         near=near,
         tolerance=tolerance,
         enough=enough,
-        judged_bend=judged_bend,
+        judged=judged,
         options=options,
     )
     # what only judges another peak (without fallbacks) is not worth more where its slope is zero
-    if np.isinf(sharpness) and (judged_bend or not options.fallbacks):
+    if np.isinf(sharpness) and (judged or not options.fallbacks):
         return found
     if not may_be_ripple(model, found.solution, sharpness, options.probe):
         return found
@@ -142,7 +145,7 @@ def _closed_in(
     near: Peak | Solution | None,
     tolerance: float,
     enough: float,
-    judged_bend: float,
+    judged: Peak | None,
     options: Options,
 ) -> tuple[Peak, float]:
     """The maximum that slopes lead to, and the largest second derivative of 1/height^2 by which
@@ -155,8 +158,8 @@ def _closed_in(
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
     # a bend that another model has is good for a gain, and would mislead a step
-    if start is None or not _trusted_bend(model, start, judged_bend, options.probe):
-        judged_bend = 0.0
+    if judged and not (start and _trusted_bend(model, start, judged.bend, options.probe)):
+        judged = None
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
@@ -170,10 +173,10 @@ def _closed_in(
         _require_motion(point, options.probe)
         omega = point.omega
         now = _look_at(model, point, options.probe)
-        if count == 1 and judged_bend:
-            ahead = -now.line / judged_bend
+        if count == 1 and judged and abs(now.height / judged.height - 1) < ALIKE * tolerance:
+            ahead = -now.line / judged.bend
             if abs(now.slope * ahead) / now.height < tolerance / 4:
-                return Peak(point, now.height, count, bend=judged_bend, ahead=ahead), np.inf
+                return Peak(point, now.height, count, bend=judged.bend, ahead=ahead), np.inf
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)

@@ -372,11 +372,14 @@ def test_a_judging_peak_is_one_point_where_bend_and_slope_promise_no_gain(sharpe
     peak = find_peak(model, HZ * 1320, 3, 128, tolerance=1e-5)
     judging = replace(DEFAULT_OPTIONS, fallbacks=False)
     start = {"near": peak.solution, "tolerance": 4e-3, "options": judging}
-    found = find_peak(model, peak.omega, 3, 512, judged_bend=sharper * peak.bend, **start)
+    judged = replace(peak, bend=sharper * peak.bend)
+    found = find_peak(model, peak.omega, 3, 512, judged=judged, **start)
     truth = find_peak(model, peak.omega, 3, 512, tolerance=1e-6)
     assert (found.points == 1) == (sharper == 1.0)
     assert found.height == pytest.approx(truth.height, rel=1e-3)
     if sharper == 1.0:
         assert abs(found.vertex - truth.omega) < 0.3 * HZ
-    # without a bend it is enclosed
+    # without a bend it is enclosed, and where the heights differ
     assert find_peak(model, peak.omega, 3, 512, **start).points > 1
+    other = replace(judged, height=1.1 * peak.height)
+    assert find_peak(model, peak.omega, 3, 512, judged=other, **start).points > 1

@@ -136,13 +136,13 @@ def peak_from(
         share = JUDGE_ACCURACY_SHARE
     return find_peak(
         after.model,
-        point.omega,
+        near.vertex if isinstance(near, Peak) else point.omega,
         new.harmonics,
         new.samples,
         near=start,
         tolerance=share * accuracy,
         enough=0.0 if fallbacks else enough * accuracy,
-        judged_bend=near.bend if isinstance(near, Peak) and not fallbacks else 0.0,
+        judged=near if isinstance(near, Peak) and not fallbacks else None,
         options=options,
     )
 
