@@ -270,6 +270,9 @@ def _height_beyond_judge(
     if other is None or other.harmonics <= judge.harmonics:
         return found.height
     model = family_member(family, other).model
+    # where normal loads follow the motion the richer peak is often another motion's
+    if model.directions > model.elements.tangents:
+        return found.height
     left_out = truncation_indicator(model, [found.solution], other.harmonics)
     large = too_large(family, other, found.solution, LIFTING_JUDGE)
     if large or left_out[0] <= MIN_SHARE_OF_ACCURACY * accuracy:
