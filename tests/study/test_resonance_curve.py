@@ -277,21 +277,6 @@ def test_a_followed_curve_takes_the_samples_that_cost_nothing(monkeypatch):
     assert size(peak_of(curve.points)) == pytest.approx(size(peak_of(few.points)), rel=5e-3)
 
 
-def test_the_peak_of_a_choice_is_not_closed_in_again(monkeypatch):
-    """It is a point of the sweep that follows."""
-    known = []
-    covered = curve_module.covered_band
-
-    def kept(*args, **given):
-        known.append(args[8] if len(args) > 8 else [])
-        return covered(*args, **given)
-
-    monkeypatch.setattr(curve_module, "covered_band", kept)
-    _, curve = curve_of_seed(132)
-    assert len(known[-1]) == 1 and any(p is known[-1][0] for p in curve.points)
-    assert known[-1][0].samples == curve.settings.samples
-
-
 def test_what_the_judging_harmonics_leave_out_is_judged():
     """A floating damper: 15 harmonics change the height of seven by 0.5 %, and are 1.6 % too high
     themselves, as 31 tell.

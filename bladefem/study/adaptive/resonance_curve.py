@@ -108,7 +108,7 @@ def resonance_curve(
         if swept[1] != accuracy or not same_settings(swept[0], used):
             finer = _with_fewer_folds(used, peak) if number == 0 else None
             limits = USUAL_LIMITS if finer is None else PathLimits(MANY_FOLDS, MANY_POINTS)
-            points = _swept(family, used, points, swept, band, mode, accuracy, notes, limits, peak)
+            points = _swept(family, used, points, swept, band, mode, accuracy, notes, limits)
             swept = used, accuracy
             if finer is not None and limits.given_up(points):
                 used, top = _refined_top(family, used, peak_of(points), finer, accuracy)
@@ -183,7 +183,6 @@ def _swept(
     accuracy: float,
     notes: list[str],
     limits: PathLimits = USUAL_LIMITS,
-    peak: Peak | None = None,
 ) -> list[Solution]:
     """The curve with chosen settings, over the band of the points that an earlier sweep solved.
 
@@ -191,16 +190,13 @@ def _swept(
         swept: settings and accuracy of that one.
         notes: takes what the sweep could not do.
         limits: folds and points after which following the paths is given up.
-        peak: with these settings, which need not be closed in again.
     """
     span = band or (points[0].frequency, points[-1].frequency)
     paths = not too_large_to_follow(family, settings)
     # paths are followed anew
     again = any(p.branch for p in points) or not _same_points(swept, (settings, accuracy))
     model = family_member(family, settings).model
-    # where there may be several motions a sweep finds one from its own neighbours
-    kept = peak if _has_one_motion(family, settings) else None
-    known = _with_peak([] if again else list(points), kept)
+    known = [] if again else points
     return covered_band(
         model,
         settings,
