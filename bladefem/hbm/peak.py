@@ -42,6 +42,9 @@ JUMP_WIDTH = 1e-4
 # of the largest rise of 1/height^2 that slopes may leave out, beyond which there is a jump: 1 at
 # the limit of a corner next to the peak, 18 and 37 at the peaks of a bouncing mass
 JUMP_RISE_SHARE = 0.75
+# of the tolerance: difference of height up to which one point judges a peak: beyond it an overtone
+# may have split the resonance, with a lower maximum next to that point
+ALIKE = 5.0
 # of the frequency: where a search begins instead when its first point is not solved
 RETRY_RATIOS = (1.005, 1.01, 1.02, 0.99)
 # the same first, of a search that only judges another peak, which has a solution nearby: on the
@@ -69,11 +72,18 @@ class Peak:
     slope: float = 0.0
     # second derivative of 1/height^2 with the frequency [1/(m^2 (rad/s)^2)]; 0: unknown
     bend: float = 0.0
+    # from the solution to the maximum, by its slope and the bend [rad/s]; 0 where it was closed in
+    ahead: float = 0.0
 
     @property
     def omega(self) -> float:
         """[rad/s]"""
         return self.solution.omega
+
+    @property
+    def vertex(self) -> float:
+        """Where the maximum is, as far as its slope tells [rad/s]."""
+        return self.omega + self.ahead
 
 
 def find_peak(
@@ -85,6 +95,7 @@ def find_peak(
     near: Peak | Solution | None = None,
     tolerance: float = 1e-4,
     enough: float = 0.0,
+    judged: Peak | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> Peak:
     """The local maximum uphill of omega [rad/s].
@@ -95,6 +106,8 @@ def find_peak(
         tolerance: relative accuracy of the height; the frequency follows with its square root.
         enough: relative gain that is given up where the point that promises it is not solved at
             once.
+        judged: the peak that this one judges, from whose solution `near` it starts: one point of
+            about its height is enough where its slope promises no gain with that peak's bend.
 
     Raises:
         InputError: no such probe.
@@ -102,10 +115,18 @@ def find_peak(
     """
     check_probe(model, options.probe)
     found, sharpness = _closed_in(
-        model, omega, H, samples, near=near, tolerance=tolerance, enough=enough, options=options
+        model,
+        omega,
+        H,
+        samples,
+        near=near,
+        tolerance=tolerance,
+        enough=enough,
+        judged=judged,
+        options=options,
     )
     # what only judges another peak (without fallbacks) is not worth more where its slope is zero
-    if np.isinf(sharpness) and not options.fallbacks:
+    if np.isinf(sharpness) and (judged or not options.fallbacks):
         return found
     if not may_be_ripple(model, found.solution, sharpness, options.probe):
         return found
@@ -128,6 +149,7 @@ def _closed_in(
     near: Peak | Solution | None,
     tolerance: float,
     enough: float,
+    judged: Peak | None,
     options: Options,
 ) -> tuple[Peak, float]:
     """The maximum that slopes lead to, and the largest second derivative of 1/height^2 by which
@@ -139,6 +161,9 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
+    # a bend that another model has is good for a gain, and would mislead a step
+    if judged and not (start and _trusted_bend(model, start, judged.bend, options.probe)):
+        judged = None
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
@@ -152,6 +177,10 @@ def _closed_in(
         _require_motion(point, options.probe)
         omega = point.omega
         now = _look_at(model, point, options.probe)
+        if count == 1 and judged and abs(now.height / judged.height - 1) < ALIKE * tolerance:
+            ahead = -now.line / judged.bend
+            if abs(now.slope * ahead) / now.height < tolerance / 4:
+                return Peak(point, now.height, count, bend=judged.bend, ahead=ahead), np.inf
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)
@@ -173,6 +202,14 @@ def _closed_in(
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _trusted_bend(model: ReducedModel, top: Solution, bend: float, probe: int) -> bool:
+    """No ripple has made the bend of a peak, and no normal load follows the motion, which makes
+    folds.
+    """
+    one_motion = model.directions == model.elements.tangents
+    return one_motion and bend > 0 and not may_be_ripple(model, top, bend, probe)
 
 
 def _start_look(

@@ -22,7 +22,7 @@ from .sensitivity import sensitivities
 from .solution import Solution, lifts_off, size
 from .solve import leading_stuck_solutions
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .solver.point_compiled import solve_along
+from .solver.point_compiled import solve_along, solve_started
 from .validate_model import check_point, check_probe
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
@@ -46,6 +46,7 @@ def response(
     *,
     options: Options = DEFAULT_OPTIONS,
     keep: Keep = lambda omega, compute: compute(),
+    similar: Sequence[Solution] = (),
 ) -> Iterator[Solution]:
     """Solve one point after the other, each started from the curve through the last ones.
 
@@ -54,6 +55,8 @@ def response(
 
     Args:
         keep: is given each frequency and what solves it; see `bladefem.hbm.checkpoint`.
+        similar: points of a poorer model, from which a point of a small model is solved where the
+            last ones do not lead to it.
     """
     omegas = list(omegas)
     last: list[Solution] = []
@@ -67,12 +70,11 @@ def response(
                     _at_once(model, omegas[i : i + POINTS_AT_ONCE], H, samples, last, options), i
                 )
             )
-        return (
-            ready[i]
-            if i in ready
-            else solve_off_resonance(
-                model, omegas[i], H, samples, predicted_start(last, omegas[i], H), options
-            )
+        if i in ready:
+            return ready[i]
+        found = _from_similar(model, omegas[i], H, samples, similar, options)
+        return found or solve_off_resonance(
+            model, omegas[i], H, samples, predicted_start(last, omegas[i], H), options
         )
 
     for i, omega in enumerate(omegas):
@@ -100,6 +102,25 @@ def _at_once(
     sticks = not last or all_stick(last[-1])
     found = leading_stuck_solutions(model, omegas, H) if options.frugal and sticks else []
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
+
+
+def _from_similar(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    similar: Sequence[Solution],
+    options: Options,
+) -> Solution | None:
+    """The point from the nearest one of a poorer model; None where that does not lead to it.
+
+    Where a damper floats, points from stick take hundreds of steps: two of 43 took three quarters
+    of a curve (seed 158 of benchmarks/choice_random.py).
+    """
+    starts = nearest_neighbours(similar, omega)
+    if not starts or starts[0].w.shape[:2] != model.springs.shape:
+        return None
+    return solve_started(model, omega, H, samples, starts[0].w, options)
 
 
 def _close_in_maxima(
@@ -163,6 +184,7 @@ def sweep(
     paths: bool = True,
     known: Sequence[Solution] = (),
     limits: PathLimits = USUAL_LIMITS,
+    similar: Sequence[Solution] = (),
 ) -> Iterator[Solution]:
     """Solve a band of circular frequencies [rad/s]; points come in the order of need.
 
@@ -184,6 +206,7 @@ def sweep(
         known: converged points of the band, of this model with these harmonics and samples, which
             are not solved again; they come first.
         limits: of these paths.
+        similar: points of a poorer model, to start from where neighbours do not lead to a point.
 
     Raises:
         InputError: the band is empty or not positive.
@@ -195,7 +218,9 @@ def sweep(
     notes = [] if notes is None else notes
     lost: list[float] = []
     look = [omega for omega in first_look(model, band) if omega not in solved]
-    for solution in _first_solutions(model, look, solved, H, samples, options, paths, lost):
+    for solution in _first_solutions(
+        model, look, solved, H, samples, options, paths, lost, similar
+    ):
         solved[solution.omega] = solution
         yield solution
     followed = yield from _close_in_maxima(
@@ -226,6 +251,7 @@ def _first_solutions(
     options: Options,
     paths: bool,
     lost: list[float],
+    similar: Sequence[Solution],
 ) -> Iterator[Solution]:
     """The first look of a sweep: upwards without fallbacks, then the points that the neighbour
     below does not lead to; but not where the response is followed, since paths may lead to them.
@@ -234,10 +260,11 @@ def _first_solutions(
         look: circular frequencies of the first look.
         known: points that are solved already.
         lost: takes the circular frequencies of those points.
+        similar: points of a poorer model, to start from where neighbours do not lead to a point.
     """
     simply = replace(options, fallbacks=False)
     solved = dict(known)
-    for solution in response(model, look, H, samples, options=simply):
+    for solution in response(model, look, H, samples, options=simply, similar=similar):
         if options.fallbacks and not solution.converged:
             lost.append(solution.omega)
             continue

@@ -387,3 +387,23 @@ def test_a_probe_that_does_not_move_has_no_curve_to_refine(model):
     points = list(sweep(model, (0.5, 2.0), notes=notes))
     assert 0 < len(points) < 20 and not notes
     assert all(size(point) == 0 for point in points)
+
+
+@pytest.mark.parametrize("sharper", [1.0, 100.0])
+def test_a_judging_peak_is_one_point_where_bend_and_slope_promise_no_gain(sharper):
+    """With four times the samples, from the peak with fewer; but not by the bend of a ripple."""
+    model = reference_model(1e6, 0.06, 1.4, harmonics=3)
+    peak = find_peak(model, HZ * 1320, 3, 128, tolerance=1e-5)
+    judging = replace(DEFAULT_OPTIONS, fallbacks=False)
+    start = {"near": peak.solution, "tolerance": 4e-3, "options": judging}
+    judged = replace(peak, bend=sharper * peak.bend)
+    found = find_peak(model, peak.omega, 3, 512, judged=judged, **start)
+    truth = find_peak(model, peak.omega, 3, 512, tolerance=1e-6)
+    assert (found.points == 1) == (sharper == 1.0)
+    assert found.height == pytest.approx(truth.height, rel=1e-3)
+    if sharper == 1.0:
+        assert abs(found.vertex - truth.omega) < 0.3 * HZ
+    # without a bend it is enclosed, and where the heights differ
+    assert find_peak(model, peak.omega, 3, 512, **start).points > 1
+    other = replace(judged, height=1.1 * peak.height)
+    assert find_peak(model, peak.omega, 3, 512, judged=other, **start).points > 1

@@ -18,9 +18,12 @@ from bladefem.study.adaptive.settings import DIRECTIONS, first_for
 
 
 def search_by(monkeypatch, found):
-    """Peaks are those that a stand-in gives, for judging as for choosing."""
+    """Peaks are those that a stand-in gives, for judging as for choosing; their judges leave out no
+    motion.
+    """
     for module in (peak_errors, resonance_choice):
         monkeypatch.setattr(module, "peak_from", found)
+    monkeypatch.setattr(peak_errors, "truncation_indicator", lambda *given: np.zeros(1))
 
 
 @dataclass(frozen=True)
@@ -32,6 +35,11 @@ class KnownPeak:
     solution: SimpleNamespace
     # second derivative of 1/height^2; 0: unknown
     bend: float = 0.0
+
+    @property
+    def vertex(self):
+        """It was closed in."""
+        return self.omega
 
 
 def peak_of_settings(settings):

@@ -48,6 +48,22 @@ def solve_small(
     return None
 
 
+def solve_started(
+    model: ReducedModel,
+    omega: float,
+    H: int,
+    samples: int,
+    start: np.ndarray,
+    options: Options,
+) -> Solution | None:
+    """The converged solution from displacements (n, d, *) alone; None if there is none, or if
+    compiled points do not apply.
+    """
+    at = np.array([omega])
+    found = _solve_points(model, at, H, samples, [(omega, start)], options)
+    return found[0] if found else None
+
+
 def solve_each(
     model: ReducedModel,
     omegas: np.ndarray,

@@ -32,6 +32,7 @@ def covered_band(
     notes: list[str] | None = None,
     known: Sequence[Solution] = (),
     limits: PathLimits = USUAL_LIMITS,
+    similar: Sequence[Solution] = (),
 ) -> list[Solution]:
     """A sweep of a band [Hz], or of one round the resonances; that one is widened until its highest
     point lies inside.
@@ -42,20 +43,23 @@ def covered_band(
         notes: takes what the last sweep could not do, in sentences.
         known: points of this model with these settings and solver options, not to be solved again.
         limits: of the paths on which the response is followed.
+        similar: points of a poorer model, to start from where neighbours do not lead to a point.
 
     Raises:
         NotSolvedError: no point converged.
     """
     swept = band or default_band(model, mode)
-    between = _halfway(model, mode)
-    for _ in range(1 if band and not widen else MAX_BAND_WIDENINGS):
+    fixed = band is not None and not widen
+    for _ in range(MAX_BAND_WIDENINGS):
         left_open: list[str] = []
-        points = response_points(model, settings, swept, accuracy, paths, left_open, known, limits)
+        points = response_points(
+            model, settings, swept, accuracy, paths, left_open, known, limits, similar
+        )
         good = [p.omega for p in points if p.converged]
         top = peak_of(points).omega
-        if good[0] < top < good[-1] or limits.given_up(points):
+        if fixed or good[0] < top < good[-1] or limits.given_up(points):
             break
-        swept = _doubled_band(swept, top == good[0], between)
+        swept = _doubled_band(swept, top == good[0], _halfway(model, mode))
     if notes is not None:
         notes[:] = left_open
     return points
@@ -70,6 +74,7 @@ def response_points(
     notes: list[str] | None = None,
     known: Sequence[Solution] = (),
     limits: PathLimits = USUAL_LIMITS,
+    similar: Sequence[Solution] = (),
 ) -> list[Solution]:
     """A sweep of a band [Hz], sorted by frequency; an accuracy of 1 asks for no more than the place
     of the peak.
@@ -80,6 +85,7 @@ def response_points(
     Args:
         known: points of this model with these settings and solver options, not to be solved again.
         limits: of the paths on which the response is followed.
+        similar: points of a poorer model, to start from where neighbours do not lead to a point.
 
     Raises:
         NotSolvedError: no point converged.
@@ -98,6 +104,7 @@ def response_points(
         paths=not rough if paths is None else paths,
         known=[p for p in known if p.converged and ends[0] <= p.omega <= ends[1]],
         limits=limits,
+        similar=similar,
     )
     options = solver_options(accuracy)
     points = list(swept(options=replace(options, fallbacks=not rough)))

@@ -57,11 +57,11 @@ def cheaper_settings(
         if expected > left or not _saves(family, settings, poorer):
             continue
         try:
-            found = peak_from(family, settings, peak.solution, poorer, accuracy, fallbacks=False)
+            found = peak_from(family, settings, peak, poorer, accuracy, fallbacks=False)
         except NotSolvedError:
             continue
         height = abs(found.height / peak.height - 1)
-        shift = abs(found.omega / peak.omega - 1)
+        shift = abs(found.vertex / peak.vertex - 1)
         if max(height, SHIFT_WEIGHT * shift) > left or lacks_harmonics_for_lift_off(
             poorer, found.solution
         ):

@@ -14,7 +14,7 @@ from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, size
 from ...hbm.sweep import MAX_PATH_UNKNOWNS
 from .band_sweep import covered_band, solver_options
 from .branch_choice import peak_error
-from .cheaper_settings import cheaper_settings
+from .cheaper_settings import PYTHON_OPERATIONS, cheaper_settings
 from .check_points import (
     CHECKED_HEIGHT_SHARES,
     MAX_CHECKED_PEAKS,
@@ -28,7 +28,14 @@ from .checked_curve import CheckedCurve
 from .choice_in_time import March, choose_in_time, marched_widely
 from .family import Family, family_member, with_excited_harmonics
 from .indicators import moved_solution, richer_settings
-from .peak_errors import JUDGE_STEPS, PeakErrors, compared_settings, judge_settings, peak_from
+from .peak_errors import (
+    JUDGE_STEPS,
+    OVERTONES,
+    PeakErrors,
+    compared_settings,
+    judge_settings,
+    peak_from,
+)
 from .resonance_choice import (
     FAR_BEYOND,
     choose_at_peak,
@@ -43,6 +50,8 @@ from .stiff_layer import climbed_to, settings_of_stiff_layer, softened_where_lif
 MAXIMUM_SHARE = 0.1
 # sweeps of one curve with ever richer settings
 MAX_SWEEPS = 3
+# steps of the harmonics that points beside the peak may ask for, one after the other or at once
+MISSED_STEPS = 2
 # share of a resonance with poor settings below which richer ones, whose points were not solved
 # there, have lost it: their highest solved point is then another one beside it
 LOST_HEIGHT_SHARE = 0.5
@@ -53,6 +62,10 @@ MANY_FOLDS = 6
 MANY_POINTS = 100
 FOLDED_SAMPLES = 256
 FOLDED_POINTS = 16
+# samples at most of a curve that is followed round folds, where they take no longer than Python
+# does: each of them may make a fold (seed 67 of benchmarks/choice_random.py: 780 points with 96
+# samples, 251 with 512, each in less time)
+FREE_SAMPLES = 512
 
 
 def resonance_curve(
@@ -86,12 +99,14 @@ def resonance_curve(
     used, top = settings, peak_of(points)
     swept = settings, 1.0
     notes: list[str] = []
+    left = MISSED_STEPS
     for number in range(MAX_SWEEPS):
         used, peak, errors = _chosen(family, used, top, accuracy, number == 0, fixed, march)
         asked = _asks_for_harmonics(used, top, errors, march)
         if number == 0 and asked and same_settings(used, settings):
             chosen = used, peak, errors
             used, peak, errors = _with_missed(family, points, top, accuracy, fixed, chosen)
+        used, peak = _with_free_samples(family, used, peak, points, accuracy)
         if swept[1] != accuracy or not same_settings(swept[0], used):
             finer = _with_fewer_folds(used, peak) if number == 0 else None
             limits = USUAL_LIMITS if finer is None else PathLimits(MANY_FOLDS, MANY_POINTS)
@@ -110,9 +125,10 @@ def resonance_curve(
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
         significant = _checked_significant(family, used, points, top, accuracy) if asked else {}
         found = significant | _checked_flanks(family, used, points, top, errors)
-        missed = _harmonics_missed(used, points, top, significant, accuracy)
+        missed = _harmonics_missed(family, used, points, top, significant, accuracy, left)
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
+        left -= _steps_of_harmonics(used, missed or used)
         used = missed or used
     return CheckedCurve(used, points, found, tuple(notes), _parts(errors))
 
@@ -221,11 +237,49 @@ def _swept(
     paths = not too_large_to_follow(family, settings)
     # paths are followed anew
     again = any(p.branch for p in points) or not _same_points(swept, (settings, accuracy))
-    known = [] if again else points
     model = family_member(family, settings).model
+    known = [] if again else points
     return covered_band(
-        model, settings, span, mode, accuracy, band is None, paths, notes, known, limits
+        model,
+        settings,
+        span,
+        mode,
+        accuracy,
+        band is None,
+        paths,
+        notes,
+        known,
+        limits,
+        similar=points,
     )
+
+
+def _with_free_samples(
+    family: Family,
+    settings: Settings,
+    peak: Peak | None,
+    points: Sequence[Solution],
+    accuracy: float,
+) -> tuple[Settings, Peak | None]:
+    """More samples, and the peak with them, where the curve will be followed round folds and they
+    take no longer than Python does; the same as before where that peak is not found.
+    """
+    lifts = any(lifts_off(p) for p in points if p.converged)
+    open_samples = "samples" in settings.chosen and settings.samples > 0
+    if peak is None or not (lifts and open_samples) or too_large_to_follow(family, settings):
+        return settings, peak
+    model = family_member(family, settings).model
+    each = model.unknowns(settings.harmonics) * model.directions
+    samples = settings.samples
+    while 2 * samples <= FREE_SAMPLES and 2 * samples * each <= PYTHON_OPERATIONS:
+        samples *= 2
+    if samples == settings.samples:
+        return settings, peak
+    finer = replace(settings, samples=samples)
+    try:
+        return finer, peak_from(family, settings, peak, finer, accuracy, fallbacks=False)
+    except NotSolvedError:
+        return settings, peak
 
 
 def _with_fewer_folds(settings: Settings, peak: Peak | None) -> Settings | None:
@@ -273,7 +327,7 @@ def _with_missed(
     if not lifts or too_large_to_follow(family, settings):
         return chosen
     significant = _checked_significant(family, settings, points, top, accuracy)
-    richer = _harmonics_missed(settings, points, top, significant, accuracy)
+    richer = _harmonics_missed(family, settings, points, top, significant, accuracy, 1)
     if richer is None:
         return chosen
     return _chosen(family, richer, top, accuracy, lower=False, fixed=fixed)
@@ -398,17 +452,20 @@ def _checked_significant(
     top: Solution,
     accuracy: float,
 ) -> dict[float, float]:
-    """Circular frequency -> estimated relative error by more harmonics, of the MAX_CHECKED_PEAKS
-    points where harmonics that were left out move the contacts.
+    """Circular frequency -> estimated relative error by more harmonics, among the MAX_CHECKED_PEAKS
+    points where harmonics that were left out move the contacts most; where there is one motion, of
+    those that are no neighbours of each other, and not at the resonance, which was judged.
     """
+    alike = _has_one_motion(family, settings)
     share = heights_of(points) / size(top)
     significant = left_out_motion(family, [settings] * len(points), points) * share
     order = np.argsort(-significant)[:MAX_CHECKED_PEAKS]
-    chosen = [
-        points[i]
-        for i in order[significant[order] > MIN_SHARE_OF_ACCURACY * accuracy]
-        if points[i].converged
-    ]
+    kept: list[int] = []
+    for i in order[significant[order] > MIN_SHARE_OF_ACCURACY * accuracy].tolist():
+        known = points[i] is top or any(abs(i - j) == 1 for j in kept)
+        if points[i].converged and not (alike and known):
+            kept.append(i)
+    chosen = [points[i] for i in kept]
     other = richer_settings(family, settings, "harmonics")
     if other is None:
         return {}
@@ -462,20 +519,99 @@ def _change(
 
 
 def _harmonics_missed(
+    family: Family,
     settings: Settings,
     points: Sequence[Solution],
     top: Solution,
-    significant: dict[float, float],
+    significant: Mapping[float, float],
     accuracy: float,
+    most: int,
 ) -> Settings | None:
-    """Settings with more harmonics where a significant point away from the peak is wrong beyond its
-    tolerance; None where all hold, or harmonics are not to be chosen.
+    """Settings with more harmonics where significant points away from the peak are wrong beyond
+    their tolerance, with as many as these points ask for; None where all hold, or harmonics are not
+    to be chosen.
+
+    Args:
+        most: steps of the harmonics that are taken at once.
     """
     if "harmonics" not in settings.chosen:
         return None
+    wrong = [
+        point
+        for point in points
+        if point is not top
+        and np.isfinite(significant.get(point.omega, np.inf))
+        and significant[point.omega] > _tolerated(point, top, accuracy)
+    ]
+    followed = any(point.branch for point in points)
+    # where there may be several motions, more are asked for by the points of the next curve only
+    most = most if _has_one_motion(family, settings) else min(most, 1)
+    richer = _next_for_flanks(settings, followed) if wrong and most > 0 else None
+    for _ in range(most - 1):
+        more = None if richer is None else _next_for_flanks(richer, followed)
+        if richer is None or more is None:
+            break
+        if _all_hold(family, settings, richer, wrong, top, accuracy):
+            break
+        richer = more
+    return richer
+
+
+def _has_one_motion(family: Family, settings: Settings) -> bool:
+    """No normal load follows the motion, which makes several motions at one frequency."""
+    model = family_member(family, settings).model
+    return model.directions == model.elements.tangents
+
+
+def _next_for_flanks(settings: Settings, followed: bool) -> Settings | None:
+    """One step of the harmonics, to OVERTONES before any more; None where there is none.
+
+    Args:
+        followed: the curve is followed round folds, which beyond OVERTONES takes longer than all
+            else: 42 s in place of 10 for one flank (seed 105 of benchmarks/choice_random.py).
+    """
+    richer = enriched_settings(settings, "harmonics")
+    if richer is None or richer.harmonics <= OVERTONES:
+        return richer
+    if settings.harmonics < OVERTONES:
+        return replace(richer, harmonics=OVERTONES)
+    return None if followed else richer
+
+
+def _steps_of_harmonics(poorer: Settings, richer: Settings) -> int:
+    """How many steps of `_next_for_flanks` lie between two numbers of harmonics."""
+    steps = 0
+    while poorer.harmonics < richer.harmonics:
+        poorer = _next_for_flanks(poorer, False) or richer
+        steps += 1
+    return steps
+
+
+def _tolerated(point: Solution, top: Solution, accuracy: float) -> float:
+    """Relative error of a point that is the accuracy of the peak."""
+    return accuracy * size(top) / max(size(point), 1e-6 * size(top))
+
+
+def _all_hold(
+    family: Family,
+    settings: Settings,
+    richer: Settings,
+    points: Sequence[Solution],
+    top: Solution,
+    accuracy: float,
+) -> bool:
+    """None of the points is known to be wrong beyond its tolerance with richer settings: a sweep
+    with these costs far more than the points.
+    """
+    other = richer_settings(family, richer, "harmonics")
+    if other is None:
+        return True
+    options = replace(solver_options(1e-2), fallbacks=False, iterations=JUDGE_STEPS)
     for point in points:
-        error = significant.get(point.omega, 0.0)
-        tolerated = accuracy * size(top) / max(size(point), 1e-6 * size(top))
-        if point is not top and np.isfinite(error) and error > tolerated:
-            return enriched_settings(settings, "harmonics")
-    return None
+        moved = moved_solution(family, settings, point, richer, options)
+        if not moved.converged:
+            continue
+        error = _change(family, richer, moved, other, "harmonics", 1.0, moved)
+        if np.isfinite(error) and error > _tolerated(moved, top, accuracy):
+            return False
+    return True
