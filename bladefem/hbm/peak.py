@@ -161,9 +161,7 @@ def _closed_in(
     best: _Look | None = None
     gain = np.inf
     bend, start = (near.bend, near.solution) if isinstance(near, Peak) else (0.0, near)
-    # a bend that another model has is good for a gain, and would mislead a step
-    if judged and not (start and _trusted_bend(model, start, judged.bend, options.probe)):
-        judged = None
+    trusted = judged and start and _trusted_bend(model, start, judged.bend, options.probe)
     reach = FIRST_STEP * omega
     frequency = omega / (2 * np.pi)
     for count in range(1, MAX_PEAK_POINTS + 1):
@@ -177,10 +175,9 @@ def _closed_in(
         _require_motion(point, options.probe)
         omega = point.omega
         now = _look_at(model, point, options.probe)
-        if count == 1 and judged and abs(now.height / judged.height - 1) < ALIKE * tolerance:
-            ahead = -now.line / judged.bend
-            if abs(now.slope * ahead) / now.height < tolerance / 4:
-                return Peak(point, now.height, count, bend=judged.bend, ahead=ahead), np.inf
+        at_once = _judging_point(now, judged, tolerance) if trusted and count == 1 else None
+        if at_once:
+            return at_once, np.inf
         low, high = (now, high) if now.slope > 0 else (low, now)
         if last is not None:
             bend = (now.line - last.line) / (omega - last.solution.omega)
@@ -202,6 +199,18 @@ def _closed_in(
     raise NotSolvedError(
         f"peak search found no maximum in {MAX_PEAK_POINTS} points, last at {frequency:.6g} Hz"
     )
+
+
+def _judging_point(now: _Look, judged: Peak | None, tolerance: float) -> Peak | None:
+    """A point as the peak that judges another one, whose bend is good for a gain, and would mislead
+    a step; None where its height is another, or its slope promises a gain.
+    """
+    if judged is None or abs(now.height / judged.height - 1) >= ALIKE * tolerance:
+        return None
+    ahead = -now.line / judged.bend
+    if abs(now.slope * ahead) / now.height >= tolerance / 4:
+        return None
+    return Peak(now.solution, now.height, 1, bend=judged.bend, ahead=ahead)
 
 
 def _trusted_bend(model: ReducedModel, top: Solution, bend: float, probe: int) -> bool:

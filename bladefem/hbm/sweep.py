@@ -218,19 +218,16 @@ def sweep(
     notes = [] if notes is None else notes
     lost: list[float] = []
     look = [omega for omega in first_look(model, band) if omega not in solved]
-    for solution in _first_solutions(
-        model, look, solved, H, samples, options, paths, lost, similar
-    ):
-        solved[solution.omega] = solution
-        yield solution
-    followed = yield from _close_in_maxima(
-        model, solved, H, samples, (peak, curve), options, paths, notes
-    )
+    first = _first_solutions(model, look, solved, H, samples, options, paths, lost, similar)
+    for point in first:
+        solved[point.omega] = point
+        yield point
+    ends = peak, curve
+    followed = yield from _close_in_maxima(model, solved, H, samples, ends, options, paths, notes)
     if followed:
         points = list(solved.values())
-        found = find_branches(
-            model, band, points, H, samples, peak=peak, options=options, limits=limits
-        )
+        limited = partial(find_branches, peak=peak, options=options, limits=limits)
+        found = limited(model, band, points, H, samples)
         notes.extend(found.notes)
         yield from found.points
         yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)

@@ -22,7 +22,7 @@ from bladefem.hbm.solver import newton as newton_module
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
 from bladefem.hbm.sweep import sweep
-from bladefem.study.adaptive import check_points
+from bladefem.study.adaptive import check_points, flank_checks, followed_settings
 from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.family import Family, Member
@@ -82,7 +82,7 @@ def test_every_choice_at_the_peak_knows_what_is_fixed(monkeypatch):
     monkeypatch.setattr(curve_module, "lifts_off", lambda _: True)
     monkeypatch.setattr(curve_module, "too_large_to_follow", lambda *_: False)
     richer = iter([replace(first_for(10), points=None, harmonics=7)])
-    monkeypatch.setattr(curve_module, "_harmonics_missed", lambda *_: next(richer, None))
+    monkeypatch.setattr(curve_module, "harmonics_missed", lambda *_: next(richer, None))
     curve_of_seed(63, fixed=("modes",))
     assert len(asked) > 2 * once
     assert set(asked) == {("modes",)}
@@ -131,10 +131,10 @@ def test_flanks_are_judged_by_a_model_as_large_as_that_of_the_peak(monkeypatch):
     def compared(family, settings, other, name, point):
         asked.append(point)
 
-    monkeypatch.setattr(curve_module, "compared_settings", compared)
-    monkeypatch.setattr(curve_module, "judge_settings", lambda *_: first_for(4))
+    monkeypatch.setattr(flank_checks, "compared_settings", compared)
+    monkeypatch.setattr(flank_checks, "judge_settings", lambda *_: first_for(4))
     errors = PeakErrors({"points": 0.1}, {"points": 0.0}, {"points": SimpleNamespace(omega=103.0)})
-    found = curve_module._checked_flanks(None, first_for(4), points, top, errors)
+    found = flank_checks.checked_flanks(None, first_for(4), points, top, errors)
     assert len(found) > 1 and len(asked) == len(found) - 1
     assert all(point is top for point in asked)
 
@@ -155,16 +155,16 @@ def test_many_folds_are_looked_at_with_more_samples(found, monkeypatch):
     monkeypatch.setattr(curve_module, "covered_band", counted)
     monkeypatch.setattr(curve_module, "MANY_FOLDS", 0)
     # more samples are not for nothing
-    monkeypatch.setattr(curve_module, "PYTHON_OPERATIONS", 0.0)
+    monkeypatch.setattr(followed_settings, "PYTHON_OPERATIONS", 0.0)
     if not found:
-        monkeypatch.setattr(curve_module, "peak_from", _refusing(curve_module.peak_from))
+        monkeypatch.setattr(followed_settings, "peak_from", _refusing(followed_settings.peak_from))
     _, curve = curve_of_seed(17)
     few = asked[-2][0]
-    assert few < curve_module.FOLDED_SAMPLES and asked[-2] == (
+    assert few < followed_settings.FOLDED_SAMPLES and asked[-2] == (
         few,
         PathLimits(0, curve_module.MANY_POINTS),
     )
-    wanted = curve_module.FOLDED_SAMPLES if found else few
+    wanted = followed_settings.FOLDED_SAMPLES if found else few
     assert asked[-1] == (wanted, USUAL_LIMITS)
     assert curve.settings.samples == wanted
     assert {p.samples for p in curve.points if p.converged} == {wanted}
@@ -174,7 +174,7 @@ def _refusing(peak_from):
     """The search for a peak, which does not find that with FOLDED_SAMPLES."""
 
     def search(family, old, point, new, *args, **given):
-        if new.samples == curve_module.FOLDED_SAMPLES:
+        if new.samples == followed_settings.FOLDED_SAMPLES:
             raise NotSolvedError("not found")
         return peak_from(family, old, point, new, *args, **given)
 
@@ -262,17 +262,17 @@ def test_a_curve_is_swept_once_with_the_harmonics_that_a_flank_asks_for(monkeypa
 
 def test_steps_of_harmonics_are_counted():
     one = replace(first_for(10), harmonics=2)
-    assert curve_module._steps_of_harmonics(one, replace(one, harmonics=11)) == 2
-    assert curve_module._steps_of_harmonics(one, one) == 0
+    assert flank_checks.steps_of_harmonics(one, replace(one, harmonics=11)) == 2
+    assert flank_checks.steps_of_harmonics(one, one) == 0
 
 
 def test_a_followed_curve_takes_the_samples_that_cost_nothing(monkeypatch):
     """With 64 it has 347 points, with 512 it has 120: each sample may make a fold."""
     _, curve = curve_of_seed(153)
-    assert curve.settings.samples == curve_module.FREE_SAMPLES
-    monkeypatch.setattr(curve_module, "PYTHON_OPERATIONS", 0.0)
+    assert curve.settings.samples == followed_settings.FREE_SAMPLES
+    monkeypatch.setattr(followed_settings, "PYTHON_OPERATIONS", 0.0)
     _, few = curve_of_seed(153)
-    assert few.settings.samples < curve_module.FREE_SAMPLES
+    assert few.settings.samples < followed_settings.FREE_SAMPLES
     assert len(curve.points) < 0.5 * len(few.points)
     assert size(peak_of(curve.points)) == pytest.approx(size(peak_of(few.points)), rel=5e-3)
 

@@ -10,30 +10,28 @@ import numpy as np
 from ...errors import NotSolvedError
 from ...hbm.band_path import USUAL_LIMITS, PathLimits
 from ...hbm.peak import Peak
-from ...hbm.solution import Solution, lifts_off, mostly_lifts_off, size
-from ...hbm.sweep import MAX_PATH_UNKNOWNS
+from ...hbm.solution import Solution, lifts_off, size
 from .band_sweep import covered_band, solver_options
 from .branch_choice import peak_error
-from .cheaper_settings import PYTHON_OPERATIONS, cheaper_settings
+from .cheaper_settings import cheaper_settings
 from .check_points import (
-    CHECKED_HEIGHT_SHARES,
-    MAX_CHECKED_PEAKS,
-    MIN_SHARE_OF_ACCURACY,
-    heights_of,
     lasting_peak,
-    left_out_motion,
     peak_of,
 )
 from .checked_curve import CheckedCurve
 from .choice_in_time import March, choose_in_time, marched_widely
 from .family import Family, family_member, with_excited_harmonics
-from .indicators import moved_solution, richer_settings
+from .flank_checks import checked_flanks, checked_significant, harmonics_missed, steps_of_harmonics
+from .followed_settings import (
+    MANY_FOLDS,
+    MANY_POINTS,
+    refined_top,
+    too_large_to_follow,
+    with_fewer_folds,
+    with_free_samples,
+)
 from .peak_errors import (
-    JUDGE_STEPS,
-    OVERTONES,
     PeakErrors,
-    compared_settings,
-    judge_settings,
     peak_from,
 )
 from .resonance_choice import (
@@ -43,7 +41,7 @@ from .resonance_choice import (
     lacks_harmonics_for_lift_off,
     settings_of_lift_off,
 )
-from .settings import Settings, enriched_settings, same_settings
+from .settings import Settings, same_settings
 from .stiff_layer import climbed_to, settings_of_stiff_layer, softened_where_lifting
 
 # of the accuracy: to which a sweep closes in its maxima
@@ -55,17 +53,6 @@ MISSED_STEPS = 2
 # share of a resonance with poor settings below which richer ones, whose points were not solved
 # there, have lost it: their highest solved point is then another one beside it
 LOST_HEIGHT_SHARE = 0.5
-# folds or points of a curve from which it is given up: many folds are mostly those of few samples
-# and contact points, and it is followed with more of both (docs/verification.md, "Limits of marches
-# and balances")
-MANY_FOLDS = 6
-MANY_POINTS = 100
-FOLDED_SAMPLES = 256
-FOLDED_POINTS = 16
-# samples at most of a curve that is followed round folds, where they take no longer than Python
-# does: each of them may make a fold (seed 67 of benchmarks/choice_random.py: 780 points with 96
-# samples, 251 with 512, each in less time)
-FREE_SAMPLES = 512
 
 
 def resonance_curve(
@@ -97,23 +84,20 @@ def resonance_curve(
     rough = _rough_curve(family, settings, band, mode)
     settings, points = _with_stiff_layer(family, *rough, band, mode, accuracy)
     used, top = settings, peak_of(points)
-    swept = settings, 1.0
+    swept, left = (settings, 1.0), MISSED_STEPS
     notes: list[str] = []
-    left = MISSED_STEPS
     for number in range(MAX_SWEEPS):
-        used, peak, errors = _chosen(family, used, top, accuracy, number == 0, fixed, march)
-        asked = _asks_for_harmonics(used, top, errors, march)
-        if number == 0 and asked and same_settings(used, settings):
-            chosen = used, peak, errors
-            used, peak, errors = _with_missed(family, points, top, accuracy, fixed, chosen)
-        used, peak = _with_free_samples(family, used, peak, points, accuracy)
+        begun = settings if number == 0 else None
+        (used, peak, errors), asked = _chosen_for_curve(
+            family, used, begun, points, top, accuracy, fixed, march
+        )
         if swept[1] != accuracy or not same_settings(swept[0], used):
-            finer = _with_fewer_folds(used, peak) if number == 0 else None
+            finer = with_fewer_folds(used, peak) if number == 0 else None
             limits = USUAL_LIMITS if finer is None else PathLimits(MANY_FOLDS, MANY_POINTS)
             points = _swept(family, used, points, swept, band, mode, accuracy, notes, limits)
             swept = used, accuracy
             if finer is not None and limits.given_up(points):
-                used, top = _refined_top(family, used, peak_of(points), finer, accuracy)
+                used, top = refined_top(family, used, peak_of(points), finer, accuracy)
                 # it was given up, and is swept again in any case
                 swept = used, 1.0
                 continue
@@ -123,14 +107,39 @@ def resonance_curve(
             # the flanks of a peak that is far from right need no look of their own
             return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
-        significant = _checked_significant(family, used, points, top, accuracy) if asked else {}
-        found = significant | _checked_flanks(family, used, points, top, errors)
-        missed = _harmonics_missed(family, used, points, top, significant, accuracy, left)
+        significant = checked_significant(family, used, points, top, accuracy) if asked else {}
+        found = significant | checked_flanks(family, used, points, top, errors)
+        missed = harmonics_missed(family, used, points, top, significant, accuracy, left)
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
-        left -= _steps_of_harmonics(used, missed or used)
+        left -= steps_of_harmonics(used, missed or used)
         used = missed or used
     return CheckedCurve(used, points, found, tuple(notes), _parts(errors))
+
+
+def _chosen_for_curve(
+    family: Family,
+    settings: Settings,
+    begun: Settings | None,
+    points: Sequence[Solution],
+    top: Solution,
+    accuracy: float,
+    fixed: tuple[str, ...],
+    march: March | None,
+) -> tuple[tuple[Settings, Peak | None, PeakErrors | None], bool]:
+    """Settings that hold at the peak, with what a sweep needs beyond; and whether points beside the
+    peak may ask for more harmonics.
+
+    Args:
+        begun: settings of the rough sweep, whose points these are; None after it.
+    """
+    chosen = _chosen(family, settings, top, accuracy, begun is not None, fixed, march)
+    asked = _asks_for_harmonics(chosen[0], top, chosen[2], march)
+    if begun is not None and asked and same_settings(chosen[0], begun):
+        chosen = _with_missed(family, points, top, accuracy, fixed, chosen)
+    used, peak, errors = chosen
+    used, peak = with_free_samples(family, used, peak, points, accuracy)
+    return (used, peak, errors), asked
 
 
 def _asks_for_harmonics(
@@ -254,63 +263,6 @@ def _swept(
     )
 
 
-def _with_free_samples(
-    family: Family,
-    settings: Settings,
-    peak: Peak | None,
-    points: Sequence[Solution],
-    accuracy: float,
-) -> tuple[Settings, Peak | None]:
-    """More samples, and the peak with them, where the curve will be followed round folds and they
-    take no longer than Python does; the same as before where that peak is not found.
-    """
-    lifts = any(lifts_off(p) for p in points if p.converged)
-    open_samples = "samples" in settings.chosen and settings.samples > 0
-    if peak is None or not (lifts and open_samples) or too_large_to_follow(family, settings):
-        return settings, peak
-    model = family_member(family, settings).model
-    each = model.unknowns(settings.harmonics) * model.directions
-    samples = settings.samples
-    while 2 * samples <= FREE_SAMPLES and 2 * samples * each <= PYTHON_OPERATIONS:
-        samples *= 2
-    if samples == settings.samples:
-        return settings, peak
-    finer = replace(settings, samples=samples)
-    try:
-        return finer, peak_from(family, settings, peak, finer, accuracy, fallbacks=False)
-    except NotSolvedError:
-        return settings, peak
-
-
-def _with_fewer_folds(settings: Settings, peak: Peak | None) -> Settings | None:
-    """Settings with more samples and contact points, where folds of a curve may be of too few of
-    them; None where they are the user's, no fewer, or most contacts lift off, whose folds are real.
-    """
-    if peak is None or mostly_lifts_off(peak.solution):
-        return None
-    finer = settings
-    if "samples" in settings.chosen and settings.samples:
-        finer = replace(finer, samples=max(settings.samples, FOLDED_SAMPLES))
-    if "points" in settings.chosen and settings.points is not None:
-        finer = replace(finer, points=max(settings.points, FOLDED_POINTS))
-    return None if finer == settings else finer
-
-
-def _refined_top(
-    family: Family,
-    settings: Settings,
-    top: Solution,
-    finer: Settings,
-    accuracy: float,
-) -> tuple[Settings, Solution]:
-    """Finer settings and the peak with them; the same as before where it is not found."""
-    try:
-        peak = peak_from(family, settings, top, finer, accuracy, fallbacks=False)
-    except NotSolvedError:
-        return settings, top
-    return finer, peak.solution
-
-
 def _with_missed(
     family: Family,
     points: Sequence[Solution],
@@ -326,8 +278,8 @@ def _with_missed(
     lifts = any(lifts_off(p) for p in points if p.converged)
     if not lifts or too_large_to_follow(family, settings):
         return chosen
-    significant = _checked_significant(family, settings, points, top, accuracy)
-    richer = _harmonics_missed(family, settings, points, top, significant, accuracy, 1)
+    significant = checked_significant(family, settings, points, top, accuracy)
+    richer = harmonics_missed(family, settings, points, top, significant, accuracy, 1)
     if richer is None:
         return chosen
     return _chosen(family, richer, top, accuracy, lower=False, fixed=fixed)
@@ -375,13 +327,6 @@ def _same_points(one: tuple[Settings, float], other: tuple[Settings, float]) -> 
     return same_settings(one[0], other[0]) and solver_options(one[1]) == solver_options(other[1])
 
 
-def too_large_to_follow(family: Family, settings: Settings) -> bool:
-    """The balance has too many unknowns for following its motions round folds in a curve of many
-    points.
-    """
-    return family_member(family, settings).model.unknowns(settings.harmonics) > MAX_PATH_UNKNOWNS
-
-
 def _chosen(
     family: Family,
     settings: Settings,
@@ -417,201 +362,3 @@ def _with_peak(points: list[Solution], peak: Peak | None) -> list[Solution]:
     if peak is None or any(p.omega == peak.omega for p in points):
         return points
     return sorted([*points, peak.solution], key=lambda p: p.omega)
-
-
-def _checked_flanks(
-    family: Family,
-    settings: Settings,
-    points: Sequence[Solution],
-    top: Solution,
-    errors: PeakErrors | None,
-) -> dict[float, float]:
-    """Circular frequency -> estimated relative error: of the peak, and of one point on each flank
-    for each of CHECKED_HEIGHT_SHARES of its height.
-
-    A flank is judged in the respect that is worst at the peak, as far from the peak of the richer
-    present model from its own.
-    """
-    found = {top.omega: np.inf if settings.error is None else settings.error}
-    if errors is None or not errors.better:
-        return found
-    worst = max(errors.better, key=lambda name: errors.needs[name])
-    other = judge_settings(family, settings, worst, top)
-    if other is None:
-        return found
-    shift = errors.better[worst].omega / top.omega
-    for point in _flanks(points, heights_of(points), top):
-        found[point.omega] = _change(family, settings, point, other, worst, shift, top)
-    return found
-
-
-def _checked_significant(
-    family: Family,
-    settings: Settings,
-    points: Sequence[Solution],
-    top: Solution,
-    accuracy: float,
-) -> dict[float, float]:
-    """Circular frequency -> estimated relative error by more harmonics, among the MAX_CHECKED_PEAKS
-    points where harmonics that were left out move the contacts most; where there is one motion, of
-    those that are no neighbours of each other, and not at the resonance, which was judged.
-    """
-    alike = _has_one_motion(family, settings)
-    share = heights_of(points) / size(top)
-    significant = left_out_motion(family, [settings] * len(points), points) * share
-    order = np.argsort(-significant)[:MAX_CHECKED_PEAKS]
-    kept: list[int] = []
-    for i in order[significant[order] > MIN_SHARE_OF_ACCURACY * accuracy].tolist():
-        known = points[i] is top or any(abs(i - j) == 1 for j in kept)
-        if points[i].converged and not (alike and known):
-            kept.append(i)
-    chosen = [points[i] for i in kept]
-    other = richer_settings(family, settings, "harmonics")
-    if other is None:
-        return {}
-    return {p.omega: _change(family, settings, p, other, "harmonics", 1.0, p) for p in chosen}
-
-
-def _flanks(
-    points: Sequence[Solution],
-    heights: np.ndarray,
-    top: Solution,
-) -> list[Solution]:
-    """The points on each side of the peak whose heights are nearest to CHECKED_HEIGHT_SHARES of
-    it.
-    """
-    omegas = np.array([p.omega for p in points])
-    chosen = []
-    for side in (omegas < top.omega, omegas > top.omega):
-        good = np.flatnonzero(side & (heights > 0))
-        for share in CHECKED_HEIGHT_SHARES if len(good) else ():
-            chosen.append(good[np.argmin(abs(heights[good] - share * size(top)))])
-    return [points[i] for i in dict.fromkeys(chosen)]
-
-
-def _change(
-    family: Family,
-    settings: Settings,
-    point: Solution,
-    other: Settings,
-    name: str,
-    shift: float,
-    largest: Solution,
-) -> float:
-    """Relative change of the amplitude in a model that is richer in the respect of this name, at a
-    frequency shifted by a factor; infinite where that is not solved, or too large to be.
-
-    Args:
-        largest: whose contacts tell how large a model may be; of a flank those of the resonance,
-            which that model judged (11 900 unknowns in place of 6000 took half of a curve's time
-            under 190 N on an imported wedge).
-    """
-    pair = compared_settings(family, settings, other, name, largest)
-    if pair is None:
-        return np.inf
-    own, judge, factor = pair
-    options = replace(solver_options(1e-2), fallbacks=False, iterations=JUDGE_STEPS)
-    base = point if own == settings else moved_solution(family, settings, point, own, options)
-    if not base.converged:
-        return np.inf
-    better = moved_solution(family, own, replace(base, omega=base.omega * shift), judge, options)
-    return factor * abs(size(base) / size(better) - 1) if better.converged else np.inf
-
-
-def _harmonics_missed(
-    family: Family,
-    settings: Settings,
-    points: Sequence[Solution],
-    top: Solution,
-    significant: Mapping[float, float],
-    accuracy: float,
-    most: int,
-) -> Settings | None:
-    """Settings with more harmonics where significant points away from the peak are wrong beyond
-    their tolerance, with as many as these points ask for; None where all hold, or harmonics are not
-    to be chosen.
-
-    Args:
-        most: steps of the harmonics that are taken at once.
-    """
-    if "harmonics" not in settings.chosen:
-        return None
-    wrong = [
-        point
-        for point in points
-        if point is not top
-        and np.isfinite(significant.get(point.omega, np.inf))
-        and significant[point.omega] > _tolerated(point, top, accuracy)
-    ]
-    followed = any(point.branch for point in points)
-    # where there may be several motions, more are asked for by the points of the next curve only
-    most = most if _has_one_motion(family, settings) else min(most, 1)
-    richer = _next_for_flanks(settings, followed) if wrong and most > 0 else None
-    for _ in range(most - 1):
-        more = None if richer is None else _next_for_flanks(richer, followed)
-        if richer is None or more is None:
-            break
-        if _all_hold(family, settings, richer, wrong, top, accuracy):
-            break
-        richer = more
-    return richer
-
-
-def _has_one_motion(family: Family, settings: Settings) -> bool:
-    """No normal load follows the motion, which makes several motions at one frequency."""
-    model = family_member(family, settings).model
-    return model.directions == model.elements.tangents
-
-
-def _next_for_flanks(settings: Settings, followed: bool) -> Settings | None:
-    """One step of the harmonics, to OVERTONES before any more; None where there is none.
-
-    Args:
-        followed: the curve is followed round folds, which beyond OVERTONES takes longer than all
-            else: 42 s in place of 10 for one flank (seed 105 of benchmarks/choice_random.py).
-    """
-    richer = enriched_settings(settings, "harmonics")
-    if richer is None or richer.harmonics <= OVERTONES:
-        return richer
-    if settings.harmonics < OVERTONES:
-        return replace(richer, harmonics=OVERTONES)
-    return None if followed else richer
-
-
-def _steps_of_harmonics(poorer: Settings, richer: Settings) -> int:
-    """How many steps of `_next_for_flanks` lie between two numbers of harmonics."""
-    steps = 0
-    while poorer.harmonics < richer.harmonics:
-        poorer = _next_for_flanks(poorer, False) or richer
-        steps += 1
-    return steps
-
-
-def _tolerated(point: Solution, top: Solution, accuracy: float) -> float:
-    """Relative error of a point that is the accuracy of the peak."""
-    return accuracy * size(top) / max(size(point), 1e-6 * size(top))
-
-
-def _all_hold(
-    family: Family,
-    settings: Settings,
-    richer: Settings,
-    points: Sequence[Solution],
-    top: Solution,
-    accuracy: float,
-) -> bool:
-    """None of the points is known to be wrong beyond its tolerance with richer settings: a sweep
-    with these costs far more than the points.
-    """
-    other = richer_settings(family, richer, "harmonics")
-    if other is None:
-        return True
-    options = replace(solver_options(1e-2), fallbacks=False, iterations=JUDGE_STEPS)
-    for point in points:
-        moved = moved_solution(family, settings, point, richer, options)
-        if not moved.converged:
-            continue
-        error = _change(family, richer, moved, other, "harmonics", 1.0, moved)
-        if np.isfinite(error) and error > _tolerated(moved, top, accuracy):
-            return False
-    return True

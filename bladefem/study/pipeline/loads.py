@@ -18,7 +18,7 @@ from ...util.progress import Progress, without_progress
 from ..adaptive.check_points import peak_of
 from ..adaptive.checked_curve import CheckedCurve, checked_points, estimated_errors
 from ..adaptive.family import Family, family_member
-from ..adaptive.resonance_curve import too_large_to_follow
+from ..adaptive.followed_settings import too_large_to_follow
 from ..adaptive.settings import Settings
 from ..stability.error_in_time import Marches
 from ..stability.judged_resonance import JudgedResonance, judged_in_time, judged_resonance
