@@ -34,7 +34,8 @@ def walk_in_frequency(
     """Converged points from a solved one towards a frequency, each by Newton from the curve
     through the last ones; the step is halved where that fails.
 
-    The last point is at the frequency, unless a fold or a corner of the curve ended the walk.
+    The last point is at the frequency, unless a fold or a corner of the curve ended the walk, or
+    enough of the way was gone.
 
     Args:
         enough: share of the way after which the walk ends.

@@ -127,7 +127,7 @@ def history_interval(
     """
     here = _Place(peak, admissible_tractions(model, peak.solution, options.probe))
     search = _Search(model, tolerance, most, options, [here], 0, [])
-    if model.directions == model.elements.tangents or not model.coupled:
+    if model.loads_prescribed or not model.coupled:
         # a prescribed normal load or fixed mean displacements: nothing acts back
         return _interval(search, here, True)
     for pattern in _extreme_loads(model, peak):

@@ -121,6 +121,13 @@ class ReducedModel:
         """Displacements of a node that enter the balance: the normal one does where some kn > 0."""
         return self.elements.tangents + bool(np.any(self.elements.kn > 0))
 
+    @property
+    def loads_prescribed(self) -> bool:
+        """Normal loads do not follow the motion: then each motion is the only one at its frequency,
+        without folds.
+        """
+        return self.directions == self.elements.tangents
+
     @cached_property
     def rows(self) -> np.ndarray:
         """(nodes directions,) rows of the contact port that enter the balance."""
@@ -131,11 +138,7 @@ class ReducedModel:
     def springs(self) -> np.ndarray:
         """(nodes, directions) stiffness of the contact in full stick [N/m]."""
         tangents = np.repeat(self.elements.kt[:, None], self.elements.tangents, axis=1)
-        return (
-            tangents
-            if self.directions == self.elements.tangents
-            else np.column_stack([self.elements.kn, tangents])
-        )
+        return tangents if self.loads_prescribed else np.column_stack([self.elements.kn, tangents])
 
     def unknowns(self, H: int) -> int:
         """Real unknowns of the balance with harmonics 0..H."""

@@ -135,7 +135,7 @@ def _rate_by_differences(
     """Derivative for laws that need not be homogeneous, by central differences of the forces."""
     model = balance.model
     walk = walk_ramp(balance, state.w)
-    if name == "gap" and model.directions == model.elements.tangents:
+    if name == "gap" and model.loads_prescribed:
         raise InputError("gap: a prescribed normal load has no gap, expected elements.kn > 0")
     step = DIFFERENCE_STEP * (model.compression if name == "gap" else 1.0)
     ends = []

@@ -72,7 +72,7 @@ class Peak:
     slope: float = 0.0
     # second derivative of 1/height^2 with the frequency [1/(m^2 (rad/s)^2)]; 0: unknown
     bend: float = 0.0
-    # from the solution to the maximum, by its slope and the bend [rad/s]; 0 where it was closed in
+    # from the solution to the maximum, by its slope and the bend [rad/s]; 0: unknown
     ahead: float = 0.0
 
     @property
@@ -107,7 +107,8 @@ def find_peak(
         enough: relative gain that is given up where the point that promises it is not solved at
             once.
         judged: the peak that this one judges, from whose solution `near` it starts: one point of
-            about its height is enough where its slope promises no gain with that peak's bend.
+            about its height is enough where its slope promises no gain with that peak's bend. For
+            searches without fallbacks.
 
     Raises:
         InputError: no such probe.
@@ -126,7 +127,7 @@ def find_peak(
         options=options,
     )
     # what only judges another peak (without fallbacks) is not worth more where its slope is zero
-    if np.isinf(sharpness) and (judged or not options.fallbacks):
+    if np.isinf(sharpness) and not options.fallbacks:
         return found
     if not may_be_ripple(model, found.solution, sharpness, options.probe):
         return found
@@ -137,6 +138,7 @@ def find_peak(
         height=size(top.solution, options.probe),
         points=found.points + top.points,
         bend=top.bend or found.bend,
+        ahead=0.0,
     )
 
 
@@ -217,8 +219,8 @@ def _trusted_bend(model: ReducedModel, top: Solution, bend: float, probe: int) -
     """No ripple has made the bend of a peak, and no normal load follows the motion, which makes
     folds.
     """
-    one_motion = model.directions == model.elements.tangents
-    return one_motion and bend > 0 and not may_be_ripple(model, top, bend, probe)
+    trusted = model.loads_prescribed and bend > 0
+    return trusted and not may_be_ripple(model, top, bend, probe)
 
 
 def _start_look(
@@ -246,7 +248,12 @@ def _as_peak(
     high: _Look | None,
 ) -> tuple[Peak, float]:
     """The peak, and how sharp it is between the points that enclose it."""
-    peak = Peak(best.solution, best.height, points, bend=float(max(bend, 0.0)))
+    ahead = -best.line / bend if bend > 0 else 0.0
+    if low and high:
+        # no farther than the other side of the maximum
+        below, above = (look.solution.omega - best.solution.omega for look in (low, high))
+        ahead = float(np.clip(ahead, below, above))
+    peak = Peak(best.solution, best.height, points, bend=float(max(bend, 0.0)), ahead=ahead)
     if low is None or high is None:
         return peak, np.inf
     if low.solution.omega == high.solution.omega:

@@ -238,7 +238,7 @@ def state_of_solution(
         InputError: normal loads are prescribed, a friction law is not Coulomb's, or the wave does
             not repeat within the harmonics that the model has bodies for.
     """
-    if model.directions == model.elements.tangents:
+    if model.loads_prescribed:
         raise InputError("normal loads are prescribed, expected ones that follow the motion")
     if model.elements.law is not None:
         raise InputError("a friction law of its own, expected Coulomb's")

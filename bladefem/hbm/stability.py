@@ -112,7 +112,7 @@ def _needs_a_closer_look(leading: complex) -> bool:
 
 def has_one_motion(model: ReducedModel) -> bool:
     """Normal loads are prescribed, and the bodies lose work by themselves in every motion."""
-    prescribed = model.directions == model.elements.tangents
+    prescribed = model.loads_prescribed
     return prescribed and model.damped and not model.circulatory
 
 

@@ -312,7 +312,7 @@ def _slope_of(model: ReducedModel, solved: Mapping[float, Solution], probe: int)
 
 def _normal_loads_follow(model: ReducedModel) -> bool:
     """Whether normal loads follow the motion, so that there may be several motions."""
-    return model.directions > model.elements.tangents
+    return not model.loads_prescribed
 
 
 def _needs_continuation(

@@ -203,18 +203,36 @@ def test_a_way_that_is_not_solved_to_its_end_is_extrapolated(stiff, monkeypatch)
     options = Options(tolerance=1e-6, fallbacks=False)
     soft = find_peak(model, OMEGA, 3, 64, tolerance=1e-2, options=options)
 
-    def ends_at(share):
-        monkeypatch.setattr(stiff_layer, "_way_to_the_layer", lambda *_: (share, soft.solution))
+    def ends_at(*ways, heights):
+        """Shares of each way, and heights of its resonances over the first one; None: not found."""
+        shares, found = iter(ways), iter(heights)
+
+        def peak_next(*_):
+            height = next(found)
+            return None if height is None else replace(soft, height=height * soft.height)
+
+        monkeypatch.setattr(
+            stiff_layer,
+            "_way_to_the_layer",
+            lambda *_: [(share, soft.solution) for share in next(shares, ())],
+        )
+        monkeypatch.setattr(stiff_layer, "_peak_on_the_way", peak_next)
+        monkeypatch.setattr(stiff_layer, "peak_from", lambda *_, **__: soft)
         return stiff_layer_change(family, settings, soft.solution, 0.05)
 
-    monkeypatch.setattr(
-        stiff_layer, "_peak_on_the_way", lambda *_: replace(soft, height=0.9 * soft.height)
-    )
-    partly = ends_at(0.8)
-    # the peak with the settings of the way is found anew, to the accuracy of one that judges
-    assert partly.error == pytest.approx(0.01 + 0.1 / 0.8, abs=0.02)
+    partly = ends_at((0.4, 0.8), heights=[0.9])
+    assert partly.error == pytest.approx(0.01 + 0.1 / 0.8)
     assert np.isnan(partly.height)
-    assert np.isinf(ends_at(0.4).error)
+    assert np.isinf(ends_at((0.4,), heights=[0.9]).error)
+    # no resonance next to the end of the way, one next to the point before
+    assert ends_at((0.6, 1.0), heights=[None, 0.9]).error == pytest.approx(0.01 + 0.1 / 0.6)
+    # the second way leads little farther, which counts all the same
+    little = ends_at((0.45,), (0.55,), heights=[0.9, 0.9])
+    assert little.error == pytest.approx(0.01 + 0.1 / 0.55)
+    # what the height changed by on the way may change again
+    back = ends_at((0.5,), (0.8,), heights=[0.9, 1.0])
+    assert back.error == pytest.approx(0.01 + 0.1 / 0.8)
+    assert ends_at((1.0,), heights=[0.9]).height == pytest.approx(-0.1)
 
 
 def test_a_curve_takes_the_softer_layer_by_itself():

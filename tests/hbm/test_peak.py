@@ -38,6 +38,16 @@ def test_peak_of_a_fine_sweep(load):
     assert abs(peak.omega - fine[np.argmax(heights)]) < HZ * 0.5
 
 
+def test_the_vertex_is_nearer_to_the_maximum_than_the_highest_point():
+    """Of two such searches the frequencies are compared: what they leave is no change of it."""
+    model = reference_model(1e6, 0.06, 1.4, harmonics=3)
+    truth = find_peak(model, HZ * 1320, 3, 0, tolerance=1e-10).omega
+    for start in (1290, 1320):
+        peak = find_peak(model, HZ * start, 3, 0, tolerance=1e-2)
+        assert abs(peak.omega - truth) > 0.5 * HZ
+        assert abs(peak.vertex - truth) < 0.3 * abs(peak.omega - truth)
+
+
 def test_a_gain_that_is_too_small_for_a_walk_is_given_up(monkeypatch):
     """Where the next point is not solved: a peak that only judges another one needs no more."""
     model = reference_model(1e6, 0.06, 1.4, harmonics=3)

@@ -159,6 +159,7 @@ def test_a_higher_march_beside_a_marched_resonance_is_given(curve, marks, monkey
 def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
     curve = SimpleNamespace(
         load=4.0,
+        mass=None,
         unstable_peak=None,
         march_replaces_balance=True,
         # what was not solved is no motion

@@ -15,7 +15,7 @@ import pytest
 
 from bladefem.errors import NotSolvedError
 from bladefem.hbm.band_path import USUAL_LIMITS, PathLimits
-from bladefem.hbm.peak import find_peak
+from bladefem.hbm.peak import Peak, find_peak
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver import newton as newton_module
@@ -82,7 +82,7 @@ def test_every_choice_at_the_peak_knows_what_is_fixed(monkeypatch):
     monkeypatch.setattr(curve_module, "lifts_off", lambda _: True)
     monkeypatch.setattr(curve_module, "too_large_to_follow", lambda *_: False)
     richer = iter([replace(first_for(10), points=None, harmonics=7)])
-    monkeypatch.setattr(curve_module, "harmonics_missed", lambda *_: next(richer, None))
+    monkeypatch.setattr(curve_module, "harmonics_missed", lambda *_, **__: next(richer, None))
     curve_of_seed(63, fixed=("modes",))
     assert len(asked) > 2 * once
     assert set(asked) == {("modes",)}
@@ -126,17 +126,34 @@ def test_flanks_are_judged_by_a_model_as_large_as_that_of_the_peak(monkeypatch):
         for k, amplitude in enumerate((0.3, 0.6, 0.9, 1.0, 0.9, 0.6, 0.3))
     ]
     top = points[3]
-    asked = []
+    asked, shifts = [], []
 
     def compared(family, settings, other, name, point):
         asked.append(point)
+        return settings, other, 1.0
+
+    def moved(family, settings, point, *given):
+        shifts.append(point.omega)
+        return SimpleNamespace(converged=False)
 
     monkeypatch.setattr(flank_checks, "compared_settings", compared)
     monkeypatch.setattr(flank_checks, "judge_settings", lambda *_: first_for(4))
-    errors = PeakErrors({"points": 0.1}, {"points": 0.0}, {"points": SimpleNamespace(omega=103.0)})
-    found = flank_checks.checked_flanks(None, first_for(4), points, top, errors)
+
+    def changed(record, **given):
+        if isinstance(record, SimpleNamespace):
+            return SimpleNamespace(**vars(record) | given)
+        return replace(record, **given)
+
+    monkeypatch.setattr(flank_checks, "moved_solution", moved)
+    monkeypatch.setattr(flank_checks, "replace", changed)
+    # both solved beside their maxima, which lie at 103.5 and 102.5
+    better, peak = (Peak(SimpleNamespace(omega=103.0), 1.0, 1, ahead=a) for a in (0.5, -0.5))
+    errors = PeakErrors({"points": 0.1}, {"points": 0.0}, {"points": better})
+    found = flank_checks.checked_flanks(None, first_for(4), points, top, peak, errors)
     assert len(found) > 1 and len(asked) == len(found) - 1
     assert all(point is top for point in asked)
+    flanks = [omega for omega in found if omega != top.omega]
+    assert shifts == pytest.approx([omega * 103.5 / 102.5 for omega in flanks])
 
 
 @pytest.mark.parametrize("found", [True, False])

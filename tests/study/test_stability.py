@@ -126,7 +126,7 @@ def rippling(kept):
     """A curve of one unstable point of 1 mm."""
     top = SimpleNamespace(frequency=100.0, probe=np.array([[0.0], [1e-3]]), harmonics=1)
     return SimpleNamespace(
-        load=50.0, frequency=np.array([100.0]), amplitude=np.array([1e-3]), bifurcation=np.array(["torus"]), peak=top,
+        load=50.0, mass=None, frequency=np.array([100.0]), amplitude=np.array([1e-3]), bifurcation=np.array(["torus"]), peak=top,
         unstable_peak=top, march_at_peak=kept, peak_amplitude=1e-3, peak_frequency=100.0,
         keeps_unstable=True, march_replaces_balance=False,
     )  # fmt: skip

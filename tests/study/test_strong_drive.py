@@ -86,7 +86,7 @@ def test_both_amplitudes_are_told(folding):
     point, kept = found.point, found.kept
     assert point is low and kept.highest > 2 * size(low)
     assert "after 16 times its excitation" in kept.sentence
-    assert f"without such a start it keeps {1e6 * size(low):.4g} um" in kept.sentence
+    assert f"without such a start {1e6 * size(low):.4g} um" in kept.sentence
 
 
 def test_the_highest_of_these_motions_lies_where_no_strong_drive_was_made(folding, motions):

@@ -116,7 +116,7 @@ def lasting_peak(model: ReducedModel, points: Sequence[Solution]) -> Solution:
     not known to be otherwise.
     """
     good = sorted((p for p in points if p.converged), key=size, reverse=True)
-    if model.directions == model.elements.tangents:
+    if model.loads_prescribed:
         return good[0]
     for point in good[:MAX_JUDGED_POINTS]:
         verdict = stability_verdict(model, point, AFFORDABLE_OPERATIONS).verdict

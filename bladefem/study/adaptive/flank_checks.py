@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...hbm.peak import Peak
 from ...hbm.solution import Solution, size
 from .band_sweep import solver_options
 from .check_points import (
@@ -27,22 +28,27 @@ def checked_flanks(
     settings: Settings,
     points: Sequence[Solution],
     top: Solution,
+    peak: Peak | None,
     errors: PeakErrors | None,
 ) -> dict[float, float]:
     """Circular frequency -> estimated relative error: of the peak, and of one point on each flank
     for each of CHECKED_HEIGHT_SHARES of its height.
 
     A flank is judged in the respect that is worst at the peak, as far from the peak of the richer
-    present model from its own.
+    model as it is from its own.
+
+    Args:
+        top: the highest point.
+        peak: the one that was judged, and its errors.
     """
     found = {top.omega: np.inf if settings.error is None else settings.error}
-    if errors is None or not errors.better:
+    if peak is None or errors is None or not errors.better:
         return found
     worst = max(errors.better, key=lambda name: errors.needs[name])
     other = judge_settings(family, settings, worst, top)
     if other is None:
         return found
-    shift = errors.better[worst].omega / top.omega
+    shift = errors.better[worst].vertex / peak.vertex
     for point in _flanks(points, heights_of(points), top):
         found[point.omega] = _change(family, settings, point, other, worst, shift, top)
     return found
@@ -59,16 +65,18 @@ def checked_significant(
     points where harmonics that were left out move the contacts most; where there is one motion, of
     those that are no neighbours of each other, and not at the resonance, which was judged.
     """
-    alike = _has_one_motion(family, settings)
+    alike = family_member(family, settings).model.loads_prescribed
     share = heights_of(points) / size(top)
     significant = left_out_motion(family, [settings] * len(points), points) * share
-    order = np.argsort(-significant)[:MAX_CHECKED_PEAKS]
+    order = np.argsort(-significant)
     kept: list[int] = []
     for i in order[significant[order] > MIN_SHARE_OF_ACCURACY * accuracy].tolist():
-        known = points[i] is top or any(abs(i - j) == 1 for j in kept)
-        if points[i].converged and not (alike and known):
+        known = alike and (points[i] is top or any(abs(i - j) == 1 for j in kept))
+        if not known:
             kept.append(i)
-    chosen = [points[i] for i in kept]
+        if len(kept) == MAX_CHECKED_PEAKS:
+            break
+    chosen = [points[i] for i in kept if points[i].converged]
     other = richer_settings(family, settings, "harmonics")
     if other is None:
         return {}
@@ -129,6 +137,7 @@ def harmonics_missed(
     significant: Mapping[float, float],
     accuracy: float,
     most: int,
+    followed: bool = False,
 ) -> Settings | None:
     """Settings with more harmonics where significant points away from the peak are wrong beyond
     their tolerance, with as many as these points ask for; None where all hold, or harmonics are not
@@ -136,6 +145,7 @@ def harmonics_missed(
 
     Args:
         most: steps of the harmonics that are taken at once.
+        followed: the curve will be followed round folds.
     """
     if "harmonics" not in settings.chosen:
         return None
@@ -146,9 +156,9 @@ def harmonics_missed(
         and np.isfinite(significant.get(point.omega, np.inf))
         and significant[point.omega] > _tolerated(point, top, accuracy)
     ]
-    followed = any(point.branch for point in points)
+    followed = followed or any(point.branch for point in points)
     # where there may be several motions, more are asked for by the points of the next curve only
-    most = most if _has_one_motion(family, settings) else min(most, 1)
+    most = most if family_member(family, settings).model.loads_prescribed else min(most, 1)
     richer = _next_for_flanks(settings, followed) if wrong and most > 0 else None
     for _ in range(most - 1):
         more = None if richer is None else _next_for_flanks(richer, followed)
@@ -158,12 +168,6 @@ def harmonics_missed(
             break
         richer = more
     return richer
-
-
-def _has_one_motion(family: Family, settings: Settings) -> bool:
-    """No normal load follows the motion, which makes several motions at one frequency."""
-    model = family_member(family, settings).model
-    return model.directions == model.elements.tangents
 
 
 def _next_for_flanks(settings: Settings, followed: bool) -> Settings | None:

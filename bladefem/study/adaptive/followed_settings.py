@@ -57,7 +57,7 @@ def with_free_samples(
         return settings, peak
     finer = replace(settings, samples=samples)
     try:
-        return finer, peak_from(family, settings, peak, finer, accuracy, fallbacks=False)
+        return finer, peak_from(family, settings, peak, finer, accuracy)
     except NotSolvedError:
         return settings, peak
 

@@ -192,7 +192,7 @@ def _first_settings(
         for error in (accuracy, max(accuracy, FIRST_SWEEP_ACCURACY))
     )
     model = family_member(family, fine).model
-    if model.directions == model.elements.tangents:
+    if model.loads_prescribed:
         return fine
     led = replace(fine, harmonics=coarse.harmonics, samples=coarse.samples)
     return (

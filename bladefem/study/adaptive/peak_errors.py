@@ -242,7 +242,8 @@ def _change_by(
         except NotSolvedError:
             continue
         height = factor * abs(base.height / found.height - 1)
-        if name == "harmonics" and height <= accuracy:
+        richer = judge.harmonics > own.harmonics
+        if name == "harmonics" and richer and height <= accuracy:
             beyond = _height_beyond_judge(family, judge, found, accuracy)
             height = max(height, factor * abs(base.height / beyond - 1))
         shift = factor * abs(base.vertex / found.vertex - 1)
@@ -271,10 +272,10 @@ def _height_beyond_judge(
         return found.height
     model = family_member(family, other).model
     # where normal loads follow the motion the richer peak is often another motion's
-    if model.directions > model.elements.tangents:
+    if not model.loads_prescribed:
         return found.height
     left_out = truncation_indicator(model, [found.solution], other.harmonics)
-    large = too_large(family, other, found.solution, LIFTING_JUDGE)
+    large = model.unknowns(other.harmonics) > LIFTING_JUDGE
     if large or left_out[0] <= MIN_SHARE_OF_ACCURACY * accuracy:
         return found.height
     here = moved_solution(family, judge, found.solution, other, ESTIMATE_OPTIONS)

@@ -48,7 +48,8 @@ from .stiff_layer import climbed_to, settings_of_stiff_layer, softened_where_lif
 MAXIMUM_SHARE = 0.1
 # sweeps of one curve with ever richer settings
 MAX_SWEEPS = 3
-# steps of the harmonics that points beside the peak may ask for, one after the other or at once
+# steps of the harmonics that points of the sweeps may ask for beside the peak, one after the other
+# or at once, beyond the one that those of the rough sweep may ask for
 MISSED_STEPS = 2
 # share of a resonance with poor settings below which richer ones, whose points were not solved
 # there, have lost it: their highest solved point is then another one beside it
@@ -108,7 +109,7 @@ def resonance_curve(
             return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(family, used, peak, points, top, accuracy)
         significant = checked_significant(family, used, points, top, accuracy) if asked else {}
-        found = significant | checked_flanks(family, used, points, top, errors)
+        found = significant | checked_flanks(family, used, points, top, peak, errors)
         missed = harmonics_missed(family, used, points, top, significant, accuracy, left)
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
@@ -170,7 +171,11 @@ def _rough_curve(
     suited = _suited_to_lift_off(family, settings, top)
     if suited == settings:
         return settings, points
-    richer = covered_band(family_member(family, suited).model, suited, band, mode, 1.0)
+    try:
+        richer = covered_band(family_member(family, suited).model, suited, band, mode, 1.0)
+    except NotSolvedError:
+        # no point converged
+        return settings, points
     return (settings, points) if _is_lost(top, richer) else (suited, richer)
 
 
@@ -193,9 +198,14 @@ def _with_stiff_layer(
     richer = settings_of_stiff_layer(family, settings, top)
     if richer == settings:
         return settings, points
-    found = covered_band(family_member(family, richer).model, richer, band, mode, 1.0)
-    if not _is_lost(top, found):
-        return richer, found
+    found: list[Solution] = []
+    try:
+        found = covered_band(family_member(family, richer).model, richer, band, mode, 1.0)
+        if not _is_lost(top, found):
+            return richer, found
+    except NotSolvedError:
+        # no point converged
+        pass
     climbed = climbed_to(family, settings, top, richer, accuracy)
     if climbed is None:
         return settings, points
@@ -279,7 +289,9 @@ def _with_missed(
     if not lifts or too_large_to_follow(family, settings):
         return chosen
     significant = checked_significant(family, settings, points, top, accuracy)
-    richer = harmonics_missed(family, settings, points, top, significant, accuracy, 1)
+    richer = harmonics_missed(
+        family, settings, points, top, significant, accuracy, 1, followed=True
+    )
     if richer is None:
         return chosen
     return _chosen(family, richer, top, accuracy, lower=False, fixed=fixed)

@@ -41,6 +41,8 @@ SHORTEST_STEP_SHARE = 0.02
 # the next step over one that was solved, and over one that was not
 LONGER_STEP = 1.5
 SHORTER_STEP = 1.0 / 3.0
+# points from its end on next to which a resonance is looked for
+TRIED_BACK = 2
 # Newton steps of a point on it
 PATH_STEPS = 15
 # relative accuracy of its heights
@@ -101,7 +103,8 @@ def climbed_to(
     wanted: Settings,
     accuracy: float,
 ) -> Solution | None:
-    """The resonance with the harmonics of other settings; None where it was not found.
+    """The resonance with other settings, of more harmonics and perhaps an elastic damper; None
+    where it was not found.
 
     Where harmonics are not solved one after the other, they are added with a layer of half the
     stiffness or less: with rigid faces under 80 N on the shipped wedge neither 7 nor 15 harmonics
@@ -115,8 +118,12 @@ def climbed_to(
 
 
 def _with_harmonics(settings: Settings, harmonics: int) -> Settings:
-    """So many harmonics, and the samples that they need; 0 samples are located exactly."""
-    samples = settings.samples and max(settings.samples, 8 * (harmonics + 1))
+    """So many harmonics, and the samples that they need where these are not given; 0 samples are
+    located exactly.
+    """
+    samples = settings.samples
+    if samples and "samples" in settings.chosen:
+        samples = max(samples, 8 * (harmonics + 1))
     return replace(settings, harmonics=harmonics, samples=samples)
 
 
@@ -145,7 +152,11 @@ def _climbed(
 
 
 def softer_model(model: ReducedModel, softening: float) -> ReducedModel:
-    """The model with so many times the compliance of its elements in series with them."""
+    """The model with so many times the compliance of its elements in series with them; the same one
+    for none.
+    """
+    if softening == 0:
+        return model
     e = model.elements
     own = np.column_stack([e.kn, *[e.kt] * e.tangents])
     more = softening * np.divide(1.0, own, out=np.zeros_like(own), where=own > 0)
@@ -163,7 +174,7 @@ def stiff_layer_change(
 
     The way is solved at the frequency of the softer layer's resonance, from its end the resonance
     is found; where that is not yet the layer itself, the way goes on from there. Where it ends
-    before, the changes are taken to go on in proportion to the layer's compliance.
+    before, the largest change seen is taken to go on in proportion to the layer's compliance.
 
     Args:
         settings, top: of the resonance, and its highest point.
@@ -179,19 +190,26 @@ def stiff_layer_change(
         return StiffLayerChange(np.inf, np.nan)
     layer = family_member(family, replace(small, softened=False)).model
     solved, peak = 0.0, base
-    while solved < 1.0:
-        share, point = _way_to_the_layer(layer, small, solved, peak.solution, accuracy)
-        found = _peak_on_the_way(stiffened_model(layer, share), small, point, accuracy)
-        if found is None or (share < solved + FIRST_STEP_SHARE and share < 1.0):
-            break
-        solved, peak = share, found
+    changes = []
+    begun = -1.0
+    # ways that lead hardly farther are the last ones
+    while solved < 1.0 and solved >= begun + FIRST_STEP_SHARE:
+        begun = solved
+        way = _way_to_the_layer(layer, small, solved, peak.solution, accuracy)
+        # where no resonance is found at its end, next to an earlier point there may be one
+        for share, point in way[: -1 - TRIED_BACK : -1]:
+            found = _peak_on_the_way(stiffened_model(layer, share), small, point, accuracy)
+            if found is not None:
+                solved, peak = share, found
+                changes.append(found.height / base.height - 1)
+                break
     if solved < ENOUGH_OF_THE_WAY:
         return StiffLayerChange(np.inf, np.nan)
-    change = peak.height / base.height - 1
     shift = peak.omega / base.omega - 1
     if solved == 1.0:
-        return StiffLayerChange(PATH_ACCURACY, shift, change)
-    return StiffLayerChange(PATH_ACCURACY + abs(change) / solved, shift / solved)
+        return StiffLayerChange(PATH_ACCURACY, shift, changes[-1])
+    largest = max(map(abs, changes))
+    return StiffLayerChange(PATH_ACCURACY + largest / solved, shift / solved)
 
 
 def _way_to_the_layer(
@@ -200,9 +218,9 @@ def _way_to_the_layer(
     share: float,
     point: Solution,
     accuracy: float,
-) -> tuple[float, Solution]:
-    """How much of the way to the layer itself is solved at the frequency of a point, and the last
-    point on it.
+) -> list[tuple[float, Solution]]:
+    """The points that are solved on the way to the layer itself, at the frequency of a point, each
+    with the share of the way where it is.
 
     Each point starts on the line through the last two. Resonances on the way take six times as long
     on the shipped wedge, since flat tops have points beside them that are not solved.
@@ -213,6 +231,7 @@ def _way_to_the_layer(
     options = replace(solver_options(accuracy), fallbacks=False, iterations=PATH_STEPS)
     step = FIRST_STEP_SHARE
     rate = np.zeros_like(point.w)
+    way = []
     while share < 1.0 and step >= SHORTEST_STEP_SHARE:
         target = min(1.0, share + step)
         ahead = replace(point, w=point.w + (target - share) * rate)
@@ -222,9 +241,10 @@ def _way_to_the_layer(
         if found.converged:
             rate = (found.w - point.w) / (target - share)
             share, point, step = target, found, LONGER_STEP * step
+            way.append((share, point))
         else:
             step = SHORTER_STEP * (target - share)
-    return share, point
+    return way
 
 
 def _peak_on_the_way(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +15,8 @@ from ...scene.units import newtons
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from ..stability.verdicts import model_in_time
+from .curve import Curve, load_of
 from .load_remarks import LoadRemark, sentences_of_kinds
-
-if TYPE_CHECKING:
-    from .curve import Curve
 
 # what remarks on several loads have in common
 UNSTABLE_TOP = "the highest motion is unstable"
@@ -177,9 +174,7 @@ def _of_unstable(curve: Curve, accuracy: float) -> LoadRemark | None:
         return None
     at = _place(curve, top)
     named = f" ({curve.bifurcation[at]})" if curve.bifurcation[at] else ""
-    where = (
-        f"under {newtons(curve.load)}, {1e6 * size(top):.4g} um at {top.frequency:.5g} Hz{named}"
-    )
+    where = f"under {load_of(curve)}, {1e6 * size(top):.4g} um at {top.frequency:.5g} Hz{named}"
     if curve.march_replaces_balance and not curve.keeps_unstable:
         return LoadRemark(
             f"{UNSTABLE_TOP}; {MARCH_GIVEN}", f"{where}: {_marched_from_flank(curve)}"
@@ -208,7 +203,7 @@ def _from_a_flank(curve: Curve) -> LoadRemark | None:
     driven = curve.march_at_peak is not None and curve.march_at_peak.drive > 1
     why = "a strong drive leads to a higher one" if driven else "motions beside it do not last"
     where = (
-        f"under {newtons(curve.load)}, {1e6 * curve.amplitude[top]:.4g} um at "
+        f"under {load_of(curve)}, {1e6 * curve.amplitude[top]:.4g} um at "
         f"{curve.frequency[top]:.5g} Hz"
     )
     return LoadRemark(

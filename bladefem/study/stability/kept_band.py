@@ -133,7 +133,7 @@ class KeptBand:
         more = ", and the band still widens" if self.widens else ""
         if self.drive > 1:
             coarse += f" after {self.drive:g} times its excitation"
-            more += f"; without such a start it keeps {1e6 * self.without_drive:.4g} um at most"
+            more += f", without such a start {1e6 * self.without_drive:.4g} um at most"
         if self.highest <= (1 + ONE_MOTION) * self.lowest:
             return (
                 f"marched in time{coarse}, it ends on a motion of {1e6 * self.highest:.4g} um there"
