@@ -172,7 +172,7 @@ def _closed_in(
         known = last if best is None else _start_look(last, low, high, omega)
         point = _solved_near(model, omega, H, samples, start, known, options, near_enough)
         if near_enough and not point.converged and best is not None:
-            return _as_peak(best, count, bend, low, high)
+            return _as_peak(model, best, count, bend, low, high)
         frequency = point.frequency
         _require_motion(point, options.probe)
         omega = point.omega
@@ -195,7 +195,7 @@ def _closed_in(
             )
             reach = 2 * reach
         if gain < tolerance / 4:
-            return _as_peak(best, count, bend, low, high)
+            return _as_peak(model, best, count, bend, low, high)
         last = now
         omega = target
     raise NotSolvedError(
@@ -241,6 +241,7 @@ def _start_look(
 
 
 def _as_peak(
+    model: ReducedModel,
     best: _Look,
     points: int,
     bend: float,
@@ -248,7 +249,8 @@ def _as_peak(
     high: _Look | None,
 ) -> tuple[Peak, float]:
     """The peak, and how sharp it is between the points that enclose it."""
-    ahead = -best.line / bend if bend > 0 else 0.0
+    # a bend may be that of a fold where normal loads follow the motion
+    ahead = -best.line / bend if bend > 0 and model.loads_prescribed else 0.0
     if low and high:
         # no farther than the other side of the maximum
         below, above = (look.solution.omega - best.solution.omega for look in (low, high))

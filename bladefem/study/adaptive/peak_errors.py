@@ -136,7 +136,7 @@ def peak_from(
         share = JUDGE_ACCURACY_SHARE
     return find_peak(
         after.model,
-        near.vertex if isinstance(near, Peak) else point.omega,
+        point.omega,
         new.harmonics,
         new.samples,
         near=start,
