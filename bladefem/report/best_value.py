@@ -33,7 +33,7 @@ def value_headlines(
     Args:
         table: see the head of this file.
         columns: name of a field to its column of texts.
-        studied: name of a field to all its values, in their order.
+        studied: name of a field to the values of it that were run, in their order.
     """
     best = table.loc[table["peak_amplitude"].idxmin()]
     near = within_errors(table)
@@ -77,11 +77,15 @@ def place_of_value(best: str, values: Sequence[str]) -> str:
     'best of 3 values'
     >>> place_of_value("60 deg", ["40 deg", "50 deg", "60 deg"])
     'best of 3 values, the last: better ones may lie beyond'
+    >>> place_of_value("60 deg", ["60 deg"])
+    'the only value studied'
     """
+    if len(values) == 1:
+        return "the only value studied"
     words = f"best of {len(values)} values"
     # words such as "coupled" have no order
     ordered = all(value.lstrip("+-.")[:1].isdigit() for value in values)
-    if not ordered or len(values) < 2 or best not in (values[0], values[-1]):
+    if not ordered or best not in (values[0], values[-1]):
         return words
     end = "first" if best == values[0] else "last"
     return f"{words}, the {end}: better ones may lie beyond"

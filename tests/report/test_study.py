@@ -12,7 +12,7 @@ from limit_stubs import linear_limits
 
 from bladefem.report.best_value import best_value_lines, within_errors
 from bladefem.report.study import Variant, best_values, study_tables, write_study
-from bladefem.report.study_map import write_map
+from bladefem.report.study_map import write_map, write_scatter
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.view.study import draw_study
@@ -128,6 +128,30 @@ def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
     assert "best damper.angle: **30 deg**, best of 2 values, the first" in page
     assert "best contact.mu: **0.3**, best of 3 values\n" in page
     assert "with 40 N on each seat)" in page
+
+
+def test_an_unfinished_study_says_what_it_is_the_best_of(tmp_path):
+    """The page is written after each run: values that were not run yet are none of those compared."""
+    names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3"))
+    done = [
+        Variant(
+            f"30 deg; {m}",
+            vary(vary(Scene(), names[0], "30 deg"), names[1], m),
+            response(5e-5, (3 - (m == "0.3")) * 1e-5, 6e-5),
+        )
+        for m in values[1]
+    ]
+    _, files = write_map(names, values, done, tmp_path)
+    page = files[-1].read_text(encoding="utf-8")
+    assert "runs finished: **2 of 4**, what follows is of these alone" in page
+    assert "best damper.angle: **30 deg**, the only value studied" in page
+    assert "best contact.mu: **0.3**, best of 2 values, the last" in page
+    some = of_values((2e-5,), (0.01,))
+    for write, name in ((write_study, "contact.mu"), (write_scatter, ["contact.mu"])):
+        _, files = write(name, some, tmp_path, 3)
+        assert "runs finished: **1 of 3**" in files[-1].read_text(encoding="utf-8")
+        _, files = write(name, some, tmp_path, 1)
+        assert "runs finished" not in files[-1].read_text(encoding="utf-8")
 
 
 def of_values(amplitudes, errors):
