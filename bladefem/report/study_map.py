@@ -11,7 +11,7 @@ import pandas as pd
 from ..scene.units import newtons
 from ..view.study_map import LEAST_FOR_SHARES, draw_band, draw_map
 from .best_load import error_words
-from .best_value import are_determined, value_headlines
+from .best_value import SPEED, are_determined, value_headlines, worst_speed_headlines
 from .headlines import Headline
 from .study import (
     UNPRINTED,
@@ -63,11 +63,23 @@ def write_map(
             load_words(top["load"], loads),
         )
     )
-    numbers += own
+    numbers += [*own, *_all_speeds(names, values, best)]
     loads = with_texts(loads, names, variants)
     numbers = unfinished_headlines(len(variants), len(values[0]) * len(values[1])) + numbers
     pages = _page(names, variants, (best, loads), picture, numbers, folder, "response/study_map")
     return best, [*files, picture, *pages]
+
+
+def _all_speeds(
+    names: tuple[str, str], values: tuple[Sequence[str], Sequence[str]], best: pd.DataFrame
+) -> list[Headline]:
+    """The value that does for all speeds, where one of the fields is the speed and the damper is
+    studied under its own load.
+    """
+    if SPEED not in names or "own_amplitude" not in best:
+        return []
+    other = 1 - names.index(SPEED)
+    return worst_speed_headlines(best, names[other], values[other])
 
 
 def best_pair(

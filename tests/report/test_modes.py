@@ -186,7 +186,6 @@ def test_a_wheel_is_not_compared_with_a_single_blade(folder):
 
 
 def test_arrays_keep_the_scene_they_are_of(folder):
-
     kept = xr.open_dataset(folder / "modes.nc", engine="h5netcdf").attrs["scene"]
     assert kept.splitlines() == (folder / "scene.toml").read_text().splitlines()
 

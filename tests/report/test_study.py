@@ -10,7 +10,7 @@ import pandas as pd
 import pytest
 from limit_stubs import linear_limits
 
-from bladefem.report.best_value import best_value_lines, within_errors
+from bladefem.report.best_value import best_value_lines, within_errors, worst_speed_headlines
 from bladefem.report.study import Variant, best_values, study_tables, write_study
 from bladefem.report.study_map import write_map, write_scatter
 from bladefem.scene.tables import Scene
@@ -106,7 +106,9 @@ def test_the_damper_as_it_is_stands_beside_the_best_load(tmp_path):
         for mu in mus
     ]
     _, files = write_map(("operation.speed", "contact.mu"), (texts, mus), four, tmp_path)
-    assert "(9000 rpm; 0.2: 60 N on each seat)" in files[-1].read_text(encoding="utf-8")
+    page = files[-1].read_text(encoding="utf-8")
+    assert "(9000 rpm; 0.2: 60 N on each seat)" in page
+    assert "best contact.mu for all speeds, under the damper's own load: **not determined**" in page
     # not where nobody asked for it
     assert "own_load" not in study_tables([replace(one, own=None) for one in variants])[0]
 
@@ -128,6 +130,44 @@ def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
     assert "best damper.angle: **30 deg**, best of 2 values, the first" in page
     assert "best contact.mu: **0.3**, best of 3 values\n" in page
     assert "with 40 N on each seat)" in page
+
+
+def own_loads(amplitudes, errors):
+    """Two masses at two speeds under their own loads, as a study's table has them."""
+    return pd.DataFrame(
+        {
+            "damper.mass": ["4 g", "4 g", "8 g", "8 g"],
+            "operation.speed": ["4000 rpm", "5000 rpm"] * 2,
+            "own_amplitude": amplitudes,
+            "own_error": errors,
+            "peak_amplitude": 1e-5,
+            "error": 0.0,
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "errors", "value", "uncertainty"),
+    [
+        # 4 g has the smallest of all amplitudes, and the largest
+        ((1e-5, 9e-5, 5e-5, 6e-5), (0.1, 0.1, 0.1, 0.1), "8 g", "best of 2 values, the last"),
+        ((1e-5, 9e-5, 5e-5, 6e-5), (0.1, 0.3, 0.1, 0.1), "not determined", "do not separate"),
+        # at 4000 rpm it may be 85 um, as far as is known
+        ((5e-5, 6e-5, 7e-5, 9e-5), (0.7, 0.1, 0.1, 0.1), "not determined", "do not separate"),
+        ((1e-5, 9e-5, 5e-5, 6e-5), (0.1, 0.1, np.inf, 0.1), "not determined", "do not separate"),
+        ((1e-5, 9e-5, np.nan, 6e-5), (0.1, 0.1, 0.1, 0.1), None, None),
+    ],
+)
+def test_the_value_for_all_speeds_has_the_smallest_largest_amplitude(
+    amplitudes, errors, value, uncertainty
+):
+    found = worst_speed_headlines(own_loads(amplitudes, errors), "damper.mass", ["4 g", "8 g"])
+    assert [one.value for one in found] == ([value] if value else [])
+    for one in found:
+        assert uncertainty in one.uncertainty
+        assert "4 g: " in one.remark and "8 g: " in one.remark
+    if value == "8 g":
+        assert "4 g: 90 µm ± 10 %, at 5000 rpm; 8 g: 60 µm ± 10 %, at 5000 rpm" in found[0].remark
 
 
 def test_an_unfinished_study_says_what_it_is_the_best_of(tmp_path):
