@@ -149,12 +149,20 @@ def warnings_of_variant(response: Response, messages: Sequence[str]) -> list[str
 
 
 def warnings_of_all(names: Sequence[str], variants: Sequence[Variant]) -> list[str]:
-    """The warnings of all runs, each with the values that it belongs to, the same sentence once."""
+    """The warnings of all runs, each with the values that it belongs to, the same sentence once;
+    first those of every run, where listing more than two would bury the sentence.
+    """
     belongs: dict[str, list[str]] = {}
     for variant in variants:
         for text in variant.warnings:
             belongs.setdefault(text, []).append(_label(names, variant))
-    return [warning(f"{'; '.join(of)}: {text}") for text, of in belongs.items()]
+    every = len(variants) if len(variants) > 2 else 0
+    shared = [text for text, of in belongs.items() if len(of) == every]
+    some = {text: of for text, of in belongs.items() if len(of) != every}
+    return [
+        *(warning(f"all {every} runs: {text}") for text in shared),
+        *(warning(f"{'; '.join(of)}: {text}") for text, of in some.items()),
+    ]
 
 
 def _label(names: Sequence[str], variant: Variant) -> str:

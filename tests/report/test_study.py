@@ -11,7 +11,13 @@ import pytest
 from limit_stubs import linear_limits
 
 from bladefem.report.best_value import best_value_lines, within_errors, worst_speed_headlines
-from bladefem.report.study import Variant, best_values, study_tables, write_study
+from bladefem.report.study import (
+    Variant,
+    best_values,
+    study_tables,
+    warnings_of_all,
+    write_study,
+)
 from bladefem.report.study_map import write_map, write_scatter
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
@@ -259,6 +265,14 @@ def test_warnings_of_all_values_are_on_the_page_each_once(tmp_path):
     page = files[-1].read_text(encoding="utf-8")
     assert "- contact.mu = 0.2; contact.mu = 0.3: 2 of 40 points did not converge\n" in page
     assert "- contact.mu = 0.2: a torus\n" in page
+    # three labels before a sentence would bury it
+    four = [
+        replace(one, warnings=(*(("a torus",) if number else ()), "a coarse mesh"))
+        for number, one in enumerate(of_values(4 * (2e-5,), 4 * (0.01,)))
+    ]
+    said = warnings_of_all(["contact.mu"], four)
+    assert said[0] == "all 4 runs: a coarse mesh"
+    assert said[1] == "contact.mu = 0.3; contact.mu = 0.4; contact.mu = 0.5: a torus"
 
 
 def test_bars_and_marks_tell_how_sure_each_resonance_is():
