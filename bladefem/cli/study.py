@@ -165,7 +165,7 @@ def _make_plan(options: argparse.Namespace) -> Plan:
     if len(runs) > MOST_RUNS:
         raise InputError(f"--vary: {len(runs)} runs, expected at most {MOST_RUNS}")
     if len(fields) == 1:
-        return Plan(names, runs, _write_one(names[0]), partial(_value_table, names[0]))
+        return Plan(names, runs, _write_one(names[0], len(runs)), partial(_value_table, names[0]))
     return Plan(names, runs, _write_map(names, values), partial(_map_table, names, values))
 
 
@@ -180,16 +180,16 @@ def _scatter_plan(options: argparse.Namespace) -> Plan:
     def write(variants: Sequence[Any], folder: Path) -> tuple[Any, list[Path]]:
         from ..report.study_map import write_scatter
 
-        return write_scatter(names, variants, folder)
+        return write_scatter(names, variants, folder, options.samples)
 
     return Plan(names, halton_values(ranges, options.samples), write, tables.report_table)
 
 
-def _write_one(name: str) -> Callable[[Sequence[Any], Path], tuple[Any, list[Path]]]:
+def _write_one(name: str, planned: int) -> Callable[[Sequence[Any], Path], tuple[Any, list[Path]]]:
     def write(variants: Sequence[Any], folder: Path) -> tuple[Any, list[Path]]:
         from ..report.study import write_study
 
-        return write_study(name, variants, folder)
+        return write_study(name, variants, folder, planned)
 
     return write
 

@@ -53,6 +53,28 @@ def pair_model(
     )
 
 
+def standing_model(body: PortModel) -> PortModel:
+    """The real model of a nodal diameter that is its own mirror image, 0 or N/2, from that of a
+    neighbouring one which stands for it: each mode turned to where it is most nearly real.
+    """
+    if not np.iscomplexobj(body.shapes):
+        return body
+    turn = np.exp(-0.5j * np.angle((body.shapes**2).sum(axis=0)))
+
+    def turned(matrix: np.ndarray | None) -> np.ndarray | None:
+        if matrix is None or matrix.ndim == 1:
+            return matrix
+        return (turn.conj()[:, None] * matrix * turn).real
+
+    return replace(
+        body,
+        shapes=(body.shapes * turn).real,
+        residual=body.residual.real,
+        damping=turned(body.damping),
+        circulatory=turned(body.circulatory),
+    )
+
+
 def pair_models(
     body: PortModel,
     following: slice | np.ndarray,

@@ -62,6 +62,17 @@ def lowest_resonance(
     return LowestResonance(row, found is not None, reasons_against(row, summary, points, searched))
 
 
+def lowest_found(row: pd.Series, summary: pd.DataFrame) -> pd.Series:
+    """The row, or that of a load studied whose resonance is lower: what the errors do not separate
+    from the load of a search takes no optimum's place, and is the lowest all the same.
+    """
+    finite = summary[(summary["load"] > 0) & np.isfinite(summary["load"])]
+    if finite.empty:
+        return row
+    lowest = finite.loc[finite["peak_amplitude"].idxmin()]
+    return lowest if lowest["peak_amplitude"] < row["peak_amplitude"] else row
+
+
 def lowest_of_response(response: Response) -> LowestResonance:
     """`lowest_resonance` of responses that are not tables yet."""
     return lowest_resonance(

@@ -14,8 +14,8 @@ import numpy as np
 import pandas as pd
 
 from ..scene.units import newton_range, newtons
-from .best_load import BALANCES, error_words, found_best, stress_error_words
-from .statements import ResponseAnswer
+from .best_load import BALANCES, error_words, found_best, lowest_found, stress_error_words
+from .statements import LOWEST_FOUND, ResponseAnswer
 
 # what an answer says in place of a number that the data cannot carry
 NOT_DETERMINED = "not determined"
@@ -48,8 +48,10 @@ def headlines(
     """
     sure = {} if summary is None else _uncertainties(summary, points)
     best = None if searched is None or summary is None else found_best(searched, summary)
-    if best is not None:
+    if best is not None and summary is not None:
         sure |= _of_search(best, points)
+        lowest = lowest_found(best, summary)
+        sure["lowest"] = sure["amplitude"] if lowest is best else error_words(lowest)
     found = []
     for what, value, remark in answer.numbers:
         quantity = _quantity(what)
@@ -79,6 +81,7 @@ def _as_known(value: str, uncertainty: str) -> str:
 def _quantity(what: str) -> str:
     """Which uncertainty belongs to a headline, by the words in its title."""
     words = {
+        LOWEST_FOUND: "lowest",
         "amplitude": "amplitude",
         "stress": "stress",
         "frequency": "frequency",
@@ -101,6 +104,7 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
     low, high = _bracket(finite, best)
     return {
         "amplitude": error_words(best),
+        "lowest": error_words(best),
         "stress": stress_error_words(best),
         "frequency": _frequency_text(best, points),
         "load": _between_text(low, high),

@@ -210,6 +210,8 @@ def _file_writers(
         "modes.nc": lambda: write_results(
             folder / "modes.nc", {"modes": mode_shapes(run)}, dump_scene(run.scene)
         ),
+        # the elements between the nodes of modes.nc
+        "mesh.vtu": lambda: mesh.save_vtu(run.mesh, folder / "mesh.vtu"),
     }
     if pictures:
         out["modes.vtu"] = lambda: modes.save_modes_vtu(run.mesh, excited, folder / "modes.vtu")

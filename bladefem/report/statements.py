@@ -17,13 +17,15 @@ from ..scene.units import newtons
 from ..util.counted import counted
 from ..view.optimum import at_band_end
 from ..view.response import FOLLOWED, MARCHED
-from .best_load import certainty, flat_range, lowest_resonance, of_same_damper
+from .best_load import certainty, flat_range, lowest_found, lowest_resonance, of_same_damper
 from .response_points import LINEAR
 
 # of the resonance frequency: farther off, an engine order does not drive it
 OFF_RESONANCE = 0.1
 # methods of points that no balance was solved for
 NOT_BALANCED = (LINEAR, MARCHED, FOLLOWED)
+# title of what is given where no optimum is named
+LOWEST_FOUND = "lowest resonance amplitude found"
 # relative difference below which a load was itself studied; own loads are rounded to four digits
 SAME_LOAD_TOLERANCE = 1e-3
 
@@ -67,10 +69,11 @@ def response_answer(
     remark = mass_of(best) or (flat_range(best) if by_search else best_of_studied(finite))
     doubts = cautions(finite, best, points, by_search)
     if against:
+        row = lowest_found(best, summary)
         lowest = (
-            "lowest resonance amplitude found",
-            f"{1e6 * best['peak_amplitude']:.4g} µm",
-            f"at {newtons(best['load'], 4)} and {best['peak_frequency']:.5g} Hz",
+            LOWEST_FOUND,
+            f"{1e6 * row['peak_amplitude']:.4g} µm",
+            f"at {newtons(row['load'], 4)} and {row['peak_frequency']:.5g} Hz",
         )
         said = [f"No optimum load is named: {reason}." for reason in against]
         unknown = ("optimum normal load per seat", "not determined", against[0])

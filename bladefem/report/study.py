@@ -48,12 +48,15 @@ def write_study(
     name: str,
     variants: Sequence[Variant],
     folder: Path,
+    planned: int = 0,
 ) -> tuple[pd.DataFrame, list[Path]]:
     """Write study and study_loads (CSV, Markdown, LaTeX) and study.png; returns the table of values
     and the files.
 
     Args:
         name: dotted name of the varied field.
+        variants: those that are solved so far.
+        planned: values asked for, where there may be more.
     """
     table, loads = study_tables(variants)
     files = write_value_tables(
@@ -66,7 +69,7 @@ def write_study(
     draw_study(
         table.assign(axis=axis), loads, folder / "study.png", label=label, title=f"study of {name}"
     )
-    pages = _report(name, variants, table, loads, folder)
+    pages = _report(name, variants, (table, loads), folder, planned)
     return table, [*files, folder / "study.png", *pages]
 
 
@@ -78,16 +81,18 @@ def best_values(name: str, table: pd.DataFrame) -> list[Headline]:
 def _report(
     name: str,
     variants: Sequence[Variant],
-    table: pd.DataFrame,
-    loads: pd.DataFrame,
+    tables: tuple[pd.DataFrame, pd.DataFrame],
     folder: Path,
+    planned: int,
 ) -> tuple[Path, Path]:
     """``report_study.html`` and ``.md``: the best value first, all of them in one table."""
+    table, loads = tables
     best = table.loc[table["peak_amplitude"].idxmin()]
     values = best_values(name, table)
     sure = are_determined(values)
     words = load_words(best["load"], loads)
     numbers = [
+        *unfinished_headlines(len(variants), planned),
         values[0]._replace(remark=words) if sure else values[0],
         Headline(
             "resonance amplitude there" if sure else "smallest resonance amplitude",
@@ -118,6 +123,22 @@ def _report(
     )
 
 
+def unfinished_headlines(finished: int, planned: int) -> list[Headline]:
+    """That runs of the study are missing, since the page is written after each of them and an
+    interrupted study leaves it; none where all are there.
+    """
+    if finished >= planned:
+        return []
+    return [
+        Headline(
+            "runs finished",
+            f"{finished} of {planned}",
+            "what follows is of these alone; the same command goes on",
+            "",
+        )
+    ]
+
+
 def warnings_of_variant(response: Response, messages: Sequence[str]) -> list[str]:
     """What of the run of one value may make its answer wrong: why its best load is not determined,
     and its warnings.
@@ -128,12 +149,20 @@ def warnings_of_variant(response: Response, messages: Sequence[str]) -> list[str
 
 
 def warnings_of_all(names: Sequence[str], variants: Sequence[Variant]) -> list[str]:
-    """The warnings of all runs, each with the values that it belongs to, the same sentence once."""
+    """The warnings of all runs, each with the values that it belongs to, the same sentence once;
+    first those of every run, where listing more than two would bury the sentence.
+    """
     belongs: dict[str, list[str]] = {}
     for variant in variants:
         for text in variant.warnings:
             belongs.setdefault(text, []).append(_label(names, variant))
-    return [warning(f"{'; '.join(of)}: {text}") for text, of in belongs.items()]
+    every = len(variants) if len(variants) > 2 else 0
+    shared = [text for text, of in belongs.items() if len(of) == every]
+    some = {text: of for text, of in belongs.items() if len(of) != every}
+    return [
+        *(warning(f"all {every} runs: {text}") for text in shared),
+        *(warning(f"{'; '.join(of)}: {text}") for text, of in some.items()),
+    ]
 
 
 def _label(names: Sequence[str], variant: Variant) -> str:

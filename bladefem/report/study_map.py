@@ -11,7 +11,7 @@ import pandas as pd
 from ..scene.units import newtons
 from ..view.study_map import LEAST_FOR_SHARES, draw_band, draw_map
 from .best_load import error_words
-from .best_value import are_determined, value_headlines
+from .best_value import SPEED, are_determined, value_headlines, worst_speed_headlines
 from .headlines import Headline
 from .study import (
     UNPRINTED,
@@ -20,6 +20,7 @@ from .study import (
     load_words,
     own_headlines,
     study_tables,
+    unfinished_headlines,
     warnings_of_all,
     with_texts,
     write_value_tables,
@@ -62,28 +63,51 @@ def write_map(
             load_words(top["load"], loads),
         )
     )
-    numbers += own
+    numbers += [*own, *_all_speeds(names, values, best)]
     loads = with_texts(loads, names, variants)
+    numbers = unfinished_headlines(len(variants), len(values[0]) * len(values[1])) + numbers
     pages = _page(names, variants, (best, loads), picture, numbers, folder, "response/study_map")
     return best, [*files, picture, *pages]
+
+
+def _all_speeds(
+    names: tuple[str, str], values: tuple[Sequence[str], Sequence[str]], best: pd.DataFrame
+) -> list[Headline]:
+    """The value that does for all speeds, where one of the fields is the speed and the damper is
+    studied under its own load.
+    """
+    if SPEED not in names or "own_amplitude" not in best:
+        return []
+    other = 1 - names.index(SPEED)
+    return worst_speed_headlines(best, names[other], values[other])
 
 
 def best_pair(
     names: tuple[str, str], values: tuple[Sequence[str], Sequence[str]], best: pd.DataFrame
 ) -> list[Headline]:
-    """The best value of each of both fields, where the errors separate it from the others."""
-    return value_headlines(
-        best, {name: name for name in names}, dict(zip(names, values, strict=True))
-    )
+    """The best value of each of both fields, where the errors separate it from the others; values
+    whose runs are not finished do not count as studied.
+    """
+    studied = {
+        name: [text for text in texts if text in set(best[name])]
+        for name, texts in zip(names, values, strict=True)
+    }
+    return value_headlines(best, {name: name for name in names}, studied)
 
 
 def write_scatter(
     names: Sequence[str],
     variants: Sequence[Variant],
     folder: Path,
+    planned: int = 0,
 ) -> tuple[pd.DataFrame, list[Path]]:
     """Write study, study_loads, study.png (a band over the loads) and the page; returns the table
     of the band and the files.
+
+    Args:
+        names: dotted names of the scattered fields.
+        variants: the samples that are solved so far.
+        planned: samples asked for, where there may be more.
     """
     best, loads = study_tables(variants)
     shared = shared_loads(loads)
@@ -95,7 +119,7 @@ def write_scatter(
     files += write_tables(band, folder / "study_band", "resonance amplitude over the samples")
     picture = folder / "study.png"
     draw_band(shared, picture, title=f"scatter of {', '.join(names)}")
-    numbers = _robust_numbers(band, len(variants))
+    numbers = unfinished_headlines(len(variants), planned) + _robust_numbers(band, len(variants))
     best = with_texts(best, names, variants)
     pages = _page(names, variants, (best, band), picture, numbers, folder, "response/study_band")
     return band, [*files, picture, *pages]

@@ -31,6 +31,8 @@ class Column(NamedTuple):
 
 # an end of an interval that a sample is too small to have
 OPEN_END = "-"
+# an error that no estimate bounds, infinite in CSV
+UNBOUNDED = "unknown"
 COLUMNS = {
     "load": Column("normal load", "N"),
     "load_low": Column("load, low end", "N"),
@@ -102,7 +104,7 @@ COLUMNS = {
     "balance_frequency": Column("resonance by the balance", "Hz"),
     "balance_amplitude": Column("amplitude by the balance", "m", "µm", 1e6),
     "off": Column("off the balance", "1", "%", 100.0, 2),
-    "balance_error": Column("estimated error of the balance", "1", "%", 100.0, 2),
+    "balance_error": Column("estimated error of the balance", "1", "%", 100.0, 2, UNBOUNDED),
     "off_reading": Column("off the reading", "1", "%", 100.0, 2),
     "most_friction": Column("largest friction damping", "1", "%", 100.0, 3),
     "own_damping": Column("damping of the blade", "1", "%", 100.0, 3),
@@ -237,7 +239,7 @@ COLUMNS = {
     **{f"moment_{name}": Column(f"moment {name}", "N m", digits=4) for name in "xyz"},
     "complementarity": Column("complementarity", "1", digits=2),
     "time": Column("time", "s", digits=3),
-    "error": Column("estimated error", "1", "%", 100.0, 2),
+    "error": Column("estimated error", "1", "%", 100.0, 2, UNBOUNDED),
     "error_to_reference": Column("error against the reference", "1", "%", 100.0, 2),
     "error_frequency": Column("error of the frequency", "1", "%", 100.0, 2),
     "error_phasor": Column("error of the worst phasor", "1", "%", 100.0, 2),
@@ -255,13 +257,13 @@ COLUMNS = {
     "own_load": Column("damper's own load", "N", "N", 1.0, 4),
     "own_frequency": Column("resonance under it", "Hz", "Hz", 1.0, 5),
     "own_amplitude": Column("its amplitude", "m", "µm", 1e6),
-    "own_error": Column("its estimated error", "1", "%", 100.0, 2),
+    "own_error": Column("its estimated error", "1", "%", 100.0, 2, UNBOUNDED),
     "free_amplitude": Column("amplitude without damper", "m", "µm", 1e6),
     "lower_amplitude": Column("lower motion there", "m", "µm", 1e6, 2),
     "halved": Column("change with half the contact points", "1", "%", 100.0, 2),
     "body_mesh": Column("change by the error of the body's mesh", "1", "%", 100.0, 2),
     "layer_law": Column("change by the law of the layer", "1", "%", 100.0, 2),
-    "estimated_error": Column("estimated error", "1", "%", 100.0, 2),
+    "estimated_error": Column("estimated error", "1", "%", 100.0, 2, UNBOUNDED),
     "tolerated_error": Column("tolerated error", "1", "%", 100.0, 3),
     "error_checked": Column("error checked here"),
     "stability": Column("stability"),
@@ -325,7 +327,7 @@ def is_number(text: str) -> bool:
     try:
         float(text.replace("∞", "inf"))
     except ValueError:
-        return text in ("", OPEN_END)
+        return text in ("", OPEN_END, UNBOUNDED)
     return True
 
 

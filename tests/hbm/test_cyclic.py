@@ -3,17 +3,27 @@ alike.
 """
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.linalg import block_diag
 
 from bladefem.data import Elements, RigidBody
+from bladefem.errors import InputError
 from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.sector_modes import blades_of_wave
 from bladefem.hbm.solve import solve
-from bladefem.reduction.assemble import join_bodies, recombine_contact, wheel_models
+from bladefem.reduction.assemble import (
+    join_bodies,
+    recombine_contact,
+    standing_model,
+    wheel_models,
+)
 from bladefem.reduction.beam import reference_blade
 from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.scene.toml import load_scene, vary
+from bladefem.study.pipeline.assemble_model import _sides
 
 N, EO, H = 6, 2, 3  # harmonics 1, 2, 3 move in nodal diameters 2, 2 backwards, 0
 OWN = np.array(
@@ -31,7 +41,7 @@ LOAD, PROBE = np.array([[0.3, 1.0, 0.0]]), np.array([[0.0, 1.0, 0.0]])
 RIGID = RigidBody(np.diag([0.3, 0.4]), np.array([[0.9, 0.1], [-0.2, 0.8], [0.7, -0.3], [0.2, 0.9]]))
 
 
-def sector_models():
+def sectors_by_diameter():
     sectors = {}
     for n in range(N // 2 + 1):
         K = OWN + np.exp(2j * np.pi * n / N) * LINK + np.exp(-2j * np.pi * n / N) * LINK.T
@@ -39,7 +49,52 @@ def sector_models():
         sectors[n] = port_model_from_matrices(
             MASS, K.real if 2 * n % N == 0 else K, ports, nodal_diameter=n
         )
-    return wheel_models(sectors, slice(2, 4), EO, N, H)
+    return sectors
+
+
+def sector_models():
+    return wheel_models(sectors_by_diameter(), slice(2, 4), EO, N, H)
+
+
+def test_a_wave_repeats_whose_last_diameter_has_the_model_of_another_one():
+    """Harmonics of the last diameter, that of antiphase, are their own mirror images."""
+    sectors = sectors_by_diameter()
+    near = sectors[N // 2 - 1]
+    assert np.iscomplexobj(near.shapes)
+
+    def model(sides):
+        four = np.ones(4)
+        element = Elements(kt=four, kn=0 * four, mu=0.3 * four, n0=four, tangents=1)
+        return ReducedModel(sides, element, {1: np.ones(1)})
+
+    with pytest.raises(InputError, match="does not repeat"):
+        blades_of_wave(model(wheel_models({**sectors, N // 2: near}, slice(2, 4), 1, N, 7)))
+    # few nodal diameters are reduced; the others have the model of the nearest one
+    few = {n: sectors[n] for n in range(N // 2)}
+    reduced = SimpleNamespace(sectors=N, sector=few, following=slice(2, 4))
+    scene = vary(load_scene("scenes/wedge.toml"), "excitation.engine_order", 1)
+    assert blades_of_wave(model(_sides(scene, reduced, 7))) == N
+
+
+def test_a_standing_model_is_that_of_the_modes_whatever_their_phase():
+    real = sectors_by_diameter()[N // 2]
+    turn = np.exp(1j * np.arange(1.0, 1.0 + len(real.omega)))
+    damping = 0.1 * np.ones((len(turn), len(turn))) + np.eye(len(turn))
+    turned = replace(
+        real,
+        shapes=real.shapes * turn,
+        damping=turn.conj()[:, None] * damping * turn,
+    )
+    found = standing_model(turned)
+    given = replace(real, damping=damping)
+
+    def receptance(body, omega=1.3):
+        dynamic = np.diag(body.omega**2 - omega**2) + 1j * omega * body.damping
+        return body.shapes @ np.linalg.solve(dynamic, body.shapes.conj().T) + body.residual
+
+    assert not np.iscomplexobj(found.shapes)
+    np.testing.assert_allclose(receptance(found), receptance(given), rtol=1e-12)
+    assert standing_model(real) is real
 
 
 def ring():

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import base64
 import time
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
 import pytest
+import pyvista as pv
+import xarray as xr
 
 from bladefem import load_scene
 from bladefem.cli.main import main
@@ -83,6 +86,42 @@ def test_folder_holds_tables_pictures_and_shapes(folder):
     assert table["family"].iloc[0] == "first flap"
 
 
+def quadratic_triangle(x, y):
+    """Shape functions of six nodes at one place, and their derivatives by both coordinates."""
+    one = np.array([1 - x - y, x, y])
+    slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
+    ends = [(0, 1), (1, 2), (2, 0)]
+    shape = [*(one * (2 * one - 1)), *(4 * one[i] * one[j] for i, j in ends)]
+    gradient = [
+        *((4 * one - 1)[:, None] * slope),
+        *(4 * (one[i] * slope[j] + one[j] * slope[i]) for i, j in ends),
+    ]
+    return np.array(shape), np.array(gradient)
+
+
+def test_shapes_have_a_unit_modal_mass_on_the_elements_beside_them(tmp_path):
+    """Integrated here on the triangles of mesh.vtu, whose points are the nodes of modes.nc."""
+    assert main([*PLANE, "-o", str(tmp_path), "--pictures", "0", "-q"]) == 0
+    grid = pv.read(tmp_path / "mesh.vtu")
+    data = xr.open_dataset(tmp_path / "modes.nc", engine="h5netcdf", group="modes")
+    np.testing.assert_array_equal(grid.points, data["position"])
+    # one body, no wheel
+    assert data["nodal_diameter"].values.tolist() == [-1]
+    assert not data["shape_im"].values.any()
+    blade = grid.cells_dict[pv.CellType.QUADRATIC_TRIANGLE][grid.cell_data["body"] == 0]
+    shapes = data["shape_re"].values[0].astype(float)
+    assert not shapes[:, np.setdiff1d(np.arange(grid.n_points), blade)].any()
+    mass = np.zeros(len(shapes))
+    nodes, weights = np.polynomial.legendre.leggauss(4)
+    for (a, wa), (b, wb) in product(zip((nodes + 1) / 2, weights / 2, strict=True), repeat=2):
+        shape, gradient = quadratic_triangle(a, b * (1 - a))
+        area = np.linalg.det(np.einsum("eni,nj->eij", grid.points[blade][..., :2], gradient))
+        u = np.einsum("n,meni->mei", shape, shapes[:, blade])
+        mass += wa * wb * (1 - a) * (abs(area) * (u**2).sum(axis=2)).sum(axis=1)
+    scene = load_scene("scenes/plane.toml")
+    np.testing.assert_allclose(mass * scene.material.blade.rho * scene.plane.depth, 1.0, rtol=1e-6)
+
+
 def test_a_speed_survey_begins_with_the_first_engine_order(folder):
     """plane.toml gives no engine order, and turns at 0 rpm."""
     crossings = pd.read_csv(folder / "crossings.csv")
@@ -147,8 +186,6 @@ def test_a_wheel_is_not_compared_with_a_single_blade(folder):
 
 
 def test_arrays_keep_the_scene_they_are_of(folder):
-    import xarray as xr
-
     kept = xr.open_dataset(folder / "modes.nc", engine="h5netcdf").attrs["scene"]
     assert kept.splitlines() == (folder / "scene.toml").read_text().splitlines()
 

@@ -96,6 +96,16 @@ def test_readable_units():
     assert text.to_numpy().tolist() == [["0", "500", "a", "3"], ["∞", "37.037", "b", ""]]
 
 
+def test_an_error_without_a_bound_is_unknown_and_no_infinite_number():
+    table = pd.DataFrame(
+        {"load": [1.0, np.inf], "error": [0.05, np.inf], "own_error": [np.inf, 0.1]}
+    )
+    text = readable_texts(table)
+    assert text.to_numpy().tolist() == [["1", "5", "unknown"], ["∞", "unknown", "10"]]
+    # the column stays one of numbers, to the right
+    assert "| ---: | ---: | ---: |" in to_markdown(table)
+
+
 def test_influences_are_shown_in_the_units_of_people():
     names = ("amplitude_now", "amplitude_low", "amplitude_low_solved", "load_now", "frequency_high")
     text = readable_texts(pd.DataFrame({name: [1.5e-4] for name in names}))

@@ -10,9 +10,15 @@ import pandas as pd
 import pytest
 from limit_stubs import linear_limits
 
-from bladefem.report.best_value import best_value_lines, within_errors
-from bladefem.report.study import Variant, best_values, study_tables, write_study
-from bladefem.report.study_map import write_map
+from bladefem.report.best_value import best_value_lines, within_errors, worst_speed_headlines
+from bladefem.report.study import (
+    Variant,
+    best_values,
+    study_tables,
+    warnings_of_all,
+    write_study,
+)
+from bladefem.report.study_map import write_map, write_scatter
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
 from bladefem.view.study import draw_study
@@ -106,7 +112,9 @@ def test_the_damper_as_it_is_stands_beside_the_best_load(tmp_path):
         for mu in mus
     ]
     _, files = write_map(("operation.speed", "contact.mu"), (texts, mus), four, tmp_path)
-    assert "(9000 rpm; 0.2: 60 N on each seat)" in files[-1].read_text(encoding="utf-8")
+    page = files[-1].read_text(encoding="utf-8")
+    assert "(9000 rpm; 0.2: 60 N on each seat)" in page
+    assert "best contact.mu for all speeds, under the damper's own load: **not determined**" in page
     # not where nobody asked for it
     assert "own_load" not in study_tables([replace(one, own=None) for one in variants])[0]
 
@@ -128,6 +136,68 @@ def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
     assert "best damper.angle: **30 deg**, best of 2 values, the first" in page
     assert "best contact.mu: **0.3**, best of 3 values\n" in page
     assert "with 40 N on each seat)" in page
+
+
+def own_loads(amplitudes, errors):
+    """Two masses at two speeds under their own loads, as a study's table has them."""
+    return pd.DataFrame(
+        {
+            "damper.mass": ["4 g", "4 g", "8 g", "8 g"],
+            "operation.speed": ["4000 rpm", "5000 rpm"] * 2,
+            "own_amplitude": amplitudes,
+            "own_error": errors,
+            "peak_amplitude": 1e-5,
+            "error": 0.0,
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "errors", "value", "uncertainty"),
+    [
+        # 4 g has the smallest of all amplitudes, and the largest
+        ((1e-5, 9e-5, 5e-5, 6e-5), (0.1, 0.1, 0.1, 0.1), "8 g", "best of 2 values, the last"),
+        ((1e-5, 9e-5, 5e-5, 6e-5), (0.1, 0.3, 0.1, 0.1), "not determined", "do not separate"),
+        # at 4000 rpm it may be 85 um, as far as is known
+        ((5e-5, 6e-5, 7e-5, 9e-5), (0.7, 0.1, 0.1, 0.1), "not determined", "do not separate"),
+        ((1e-5, 9e-5, 5e-5, 6e-5), (0.1, 0.1, np.inf, 0.1), "not determined", "do not separate"),
+        ((1e-5, 9e-5, np.nan, 6e-5), (0.1, 0.1, 0.1, 0.1), None, None),
+    ],
+)
+def test_the_value_for_all_speeds_has_the_smallest_largest_amplitude(
+    amplitudes, errors, value, uncertainty
+):
+    found = worst_speed_headlines(own_loads(amplitudes, errors), "damper.mass", ["4 g", "8 g"])
+    assert [one.value for one in found] == ([value] if value else [])
+    for one in found:
+        assert uncertainty in one.uncertainty
+        assert "4 g: " in one.remark and "8 g: " in one.remark
+    if value == "8 g":
+        assert "4 g: 90 µm ± 10 %, at 5000 rpm; 8 g: 60 µm ± 10 %, at 5000 rpm" in found[0].remark
+
+
+def test_an_unfinished_study_says_what_it_is_the_best_of(tmp_path):
+    """The page is written after each run: values that were not run yet are none of those compared."""
+    names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3"))
+    done = [
+        Variant(
+            f"30 deg; {m}",
+            vary(vary(Scene(), names[0], "30 deg"), names[1], m),
+            response(5e-5, (3 - (m == "0.3")) * 1e-5, 6e-5),
+        )
+        for m in values[1]
+    ]
+    _, files = write_map(names, values, done, tmp_path)
+    page = files[-1].read_text(encoding="utf-8")
+    assert "runs finished: **2 of 4**, what follows is of these alone" in page
+    assert "best damper.angle: **30 deg**, the only value studied" in page
+    assert "best contact.mu: **0.3**, best of 2 values, the last" in page
+    some = of_values((2e-5,), (0.01,))
+    for write, name in ((write_study, "contact.mu"), (write_scatter, ["contact.mu"])):
+        _, files = write(name, some, tmp_path, 3)
+        assert "runs finished: **1 of 3**" in files[-1].read_text(encoding="utf-8")
+        _, files = write(name, some, tmp_path, 1)
+        assert "runs finished" not in files[-1].read_text(encoding="utf-8")
 
 
 def of_values(amplitudes, errors):
@@ -195,6 +265,14 @@ def test_warnings_of_all_values_are_on_the_page_each_once(tmp_path):
     page = files[-1].read_text(encoding="utf-8")
     assert "- contact.mu = 0.2; contact.mu = 0.3: 2 of 40 points did not converge\n" in page
     assert "- contact.mu = 0.2: a torus\n" in page
+    # three labels before a sentence would bury it
+    four = [
+        replace(one, warnings=(*(("a torus",) if number else ()), "a coarse mesh"))
+        for number, one in enumerate(of_values(4 * (2e-5,), 4 * (0.01,)))
+    ]
+    said = warnings_of_all(["contact.mu"], four)
+    assert said[0] == "all 4 runs: a coarse mesh"
+    assert said[1] == "contact.mu = 0.3; contact.mu = 0.4; contact.mu = 0.5: a torus"
 
 
 def test_bars_and_marks_tell_how_sure_each_resonance_is():

@@ -17,6 +17,7 @@ from bladefem.hbm.peak_levels import PeakSearch
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
 from bladefem.report.best_load import best_load_table, reasons_against
+from bladefem.report.headlines import headlines
 from bladefem.report.statements import response_answer
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
@@ -310,6 +311,26 @@ def test_a_headline_is_refused_when_its_data_cannot_carry_it(best, changes, said
     found = response_answer(summary, searched=table)
     assert found.numbers[0][1] == "not determined"
     assert any(said in caution for caution in found.cautions)
+
+
+def test_the_lowest_amplitude_found_is_that_of_no_higher_load(best):
+    """Where the search's load carries no headline, a load studied may have a lower resonance, whose
+    error is the one beside it.
+    """
+    summary, table = tables(best, error=np.inf)
+    lower = {"load": 2 * best.load, "peak_frequency": 1234.5, "error": 0.07, "dissipated": 1.0}
+    summary.loc[3] = {**summary.loc[1], "peak_amplitude": 0.9 * best.amplitude, **lower}
+    summary["error"] = [0.01, np.inf, 0.01, 0.07]
+    for rows, micrometres, error in ((summary, 0.9e6, "± 7 %"), (summary[:3], 1e6, "unknown")):
+        answer = response_answer(rows, searched=table)
+        [found] = [
+            one
+            for one in headlines(answer, rows, None, table)
+            if one.what == "lowest resonance amplitude found"
+        ]
+        assert found.value == f"{micrometres * best.amplitude:.4g} µm"
+        assert error in found.uncertainty
+    assert "1234.5 Hz" in response_answer(summary, searched=table).numbers[1][2]
 
 
 def test_a_headline_is_refused_beside_a_point_that_was_not_solved(best):

@@ -443,6 +443,9 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     )
     assert "580 N (no march)" in doubtful_sentence([shown])
     assert "580 N (a flow)" in doubtful_sentence([shown], "a flow")
+    # loads that share a reason say it once
+    other = SimpleNamespace(**vars(shown) | {"load": 900.0})
+    assert doubtful_sentence([shown, other]).endswith("known: 580 N, 900 N (no march)")
     # but for the error that fewer contact points tell
     shown.error_march = held.march
     assert doubtful_sentence([shown]) == ""

@@ -17,7 +17,13 @@ from geometry.mesh import Mesh, sector_of
 from ...data import Elements, Patch, PortModel, RigidBody
 from ...errors import InputError
 from ...hbm.model import Damping, ReducedModel, in_series
-from ...reduction.assemble import change_each, pair_models, recombine_contact, wheel_models
+from ...reduction.assemble import (
+    change_each,
+    pair_models,
+    recombine_contact,
+    standing_model,
+    wheel_models,
+)
 from ...scene.tables import Scene
 from .flow import flowing_sides, scene_flow
 from .reduced_sector import Reduced
@@ -223,6 +229,9 @@ def _sides(
             n: reduced.sector[min(reduced.sector, key=lambda known: abs(known - n))]
             for n in range(reduced.sectors // 2 + 1)
         }
+        # the wave repeats, and can be judged, only where the last diameter is its own mirror image
+        if reduced.sectors % 2 == 0:
+            nearest[reduced.sectors // 2] = standing_model(nearest[reduced.sectors // 2])
         sides = wheel_models(nearest, reduced.following, order, reduced.sectors, harmonics)
         return flowing_sides(scene_flow(scene, reduced.sectors), nearest, sides, order)
     return pair_models(reduced.sector[0], reduced.following, scene.excitation.phase, harmonics)

@@ -290,17 +290,20 @@ def doubtful_sentence(curves: Sequence[Curve], unjudged: str = "") -> str:
     Args:
         unjudged: why no motion of any curve could be judged or marched; "" where some could.
     """
-    each = ", ".join(
-        f"{newtons(c.load)} ({unjudged or c.march_at_peak.reason})"
-        for c in curves
-        if c.unstable_peak is None
-        and c.march_at_peak is not None
-        and c.march_at_peak.reason
-        # a march with fewer contact points tells the error
-        and c.error_march is None
-    )
-    if not each:
+    # loads that share a reason say it once
+    by_reason: dict[str, list[str]] = {}
+    for c in curves:
+        if (
+            c.unstable_peak is None
+            and c.march_at_peak is not None
+            and c.march_at_peak.reason
+            # a march with fewer contact points tells the error
+            and c.error_march is None
+        ):
+            by_reason.setdefault(unjudged or c.march_at_peak.reason, []).append(newtons(c.load))
+    if not by_reason:
         return ""
+    each = "; ".join(f"{', '.join(loads)} ({reason})" for reason, loads in by_reason.items())
     judged = "" if unjudged else "too few harmonics judge it, "
     return (
         f"contacts lift off at the resonance, {judged}and whether the blade keeps to it is not "
