@@ -73,7 +73,9 @@ def _subtract_matrix(part, target):
             target[i, j] -= part[i, j]
 
 
-@njit(**KERNEL)
+# the order of the sums is free, so that they are vectorised: in order, each product waits for the
+# one before
+@njit(fastmath={"reassoc", "contract"}, **KERNEL)
 def back_substitute(M, pivots, x):
     """x becomes M^-1 x."""
     size = M.shape[0]
@@ -81,9 +83,12 @@ def back_substitute(M, pivots, x):
         if pivots[k] != k:
             x[k], x[pivots[k]] = x[pivots[k]], x[k]
     for i in range(size):
+        total = 0.0
         for j in range(i):
-            x[i] -= M[i, j] * x[j]
+            total += M[i, j] * x[j]
+        x[i] -= total
     for i in range(size - 1, -1, -1):
+        total = 0.0
         for j in range(i + 1, size):
-            x[i] -= M[i, j] * x[j]
-        x[i] /= M[i, i]
+            total += M[i, j] * x[j]
+        x[i] = (x[i] - total) / M[i, i]
