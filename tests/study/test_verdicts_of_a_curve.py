@@ -75,6 +75,9 @@ def test_the_sentence_says_why_nothing_could_be_judged():
     said = stability_sentence(nothing, judged_disturbances(short, first_for(3)))
     assert "since the travelling wave does not repeat within 3 harmonics" in said
     assert "expected more of them (model.harmonics)" in said
+    # with the wheel known it says how many there would have to be
+    coprime = judged_disturbances(short, first_for(3), 7, 60).reason
+    assert "engine order 7 repeats after 60 of 60 blades, which takes as many harmonics" in coprime
     said = stability_sentence(nothing, judged_disturbances(short, first_for(3), 9, 36, True))
     assert "no point could be judged, since the flow's forces differ" in said
 

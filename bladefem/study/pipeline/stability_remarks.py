@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import gcd
 
 import numpy as np
 
@@ -71,7 +72,13 @@ def judged_disturbances(
     try:
         blades = blades_of_wave(model_in_time(models, settings))
     except InputError as error:
-        return Disturbances(reason=str(error))
+        blades = sectors // gcd(sectors, engine_order) if sectors else 0
+        if blades <= models.harmonics:
+            return Disturbances(reason=str(error))
+        return Disturbances(
+            reason=f"the travelling wave of engine order {engine_order} repeats after {blades} of "
+            f"{sectors} blades, which takes as many harmonics, and {models.harmonics} are known"
+        )
     if not sectors:
         return Disturbances(blades)
     turned = ((h * engine_order) % sectors for h in range(blades))
