@@ -152,11 +152,9 @@ def _climbed(
 
 
 def softer_model(model: ReducedModel, softening: float) -> ReducedModel:
-    """The model with so many times the compliance of its elements in series with them; the same one
-    for none.
+    """The model with so many times the compliance of its elements in series with them. Also with
+    none it counts as split: Newton lowers the step first.
     """
-    if softening == 0:
-        return model
     e = model.elements
     own = np.column_stack([e.kn, *[e.kt] * e.tangents])
     more = softening * np.divide(1.0, own, out=np.zeros_like(own), where=own > 0)
