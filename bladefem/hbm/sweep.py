@@ -225,12 +225,35 @@ def sweep(
     ends = peak, curve
     followed = yield from _close_in_maxima(model, solved, H, samples, ends, options, paths, notes)
     if followed:
-        points = list(solved.values())
-        limited = partial(find_branches, peak=peak, options=options, limits=limits)
-        found = limited(model, band, points, H, samples)
-        notes.extend(found.notes)
-        yield from found.points
-        yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)
+        yield from _round_folds(model, band, solved, lost, H, samples, peak, options, limits, notes)
+
+
+def _round_folds(
+    model: ReducedModel,
+    band: tuple[float, float],
+    solved: dict[float, Solution],
+    lost: list[float],
+    H: int,
+    samples: int,
+    peak: float,
+    options: Options,
+    limits: PathLimits,
+    notes: list[str],
+) -> Iterator[Solution]:
+    """The pieces of a response between its folds, and the points that no path leads to.
+
+    Args:
+        solved: circular frequency to point of the sweep.
+        lost: circular frequencies of the first look that were left to paths.
+        notes: takes what the search could not do, in sentences.
+    """
+    points = list(solved.values())
+    found = find_branches(
+        model, band, points, H, samples, peak=peak, options=options, limits=limits
+    )
+    notes.extend(found.notes)
+    yield from found.points
+    yield from _solved_again(model, _missed(lost, solved, found), points, H, samples, options)
 
 
 def _crossed(branches: Branches, omega: float) -> bool:

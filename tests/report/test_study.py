@@ -119,18 +119,25 @@ def test_the_damper_as_it_is_stands_beside_the_best_load(tmp_path):
     assert "own_load" not in study_tables([replace(one, own=None) for one in variants])[0]
 
 
-def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
-    names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3", "0.4"))
-    variants = [
+ANGLE_AND_MU = ("damper.angle", "contact.mu")
+
+
+def of_angles_and_mus(angles, mus):
+    """Variants of a map: 30 deg and 0.3 have the smallest amplitude."""
+    return [
         Variant(
             f"{a}; {m}",
-            vary(vary(Scene(), names[0], a), names[1], m),
+            vary(vary(Scene(), ANGLE_AND_MU[0], a), ANGLE_AND_MU[1], m),
             response(5e-5, (3 - (m == "0.3") + (a == "45 deg")) * 1e-5, 6e-5),
         )
-        for a in values[0]
-        for m in values[1]
+        for a in angles
+        for m in mus
     ]
-    _, files = write_map(names, values, variants, tmp_path)
+
+
+def test_a_map_says_what_it_shows_and_where_it_ends(tmp_path):
+    values = ("30 deg", "45 deg"), ("0.2", "0.3", "0.4")
+    _, files = write_map(ANGLE_AND_MU, values, of_angles_and_mus(*values), tmp_path)
     page = files[-1].read_text(encoding="utf-8")
     assert "over the values of both fields" in page
     assert "best damper.angle: **30 deg**, best of 2 values, the first" in page
@@ -178,16 +185,9 @@ def test_the_value_for_all_speeds_has_the_smallest_largest_amplitude(
 
 def test_an_unfinished_study_says_what_it_is_the_best_of(tmp_path):
     """The page is written after each run: values that were not run yet are none of those compared."""
-    names, values = ("damper.angle", "contact.mu"), (("30 deg", "45 deg"), ("0.2", "0.3"))
-    done = [
-        Variant(
-            f"30 deg; {m}",
-            vary(vary(Scene(), names[0], "30 deg"), names[1], m),
-            response(5e-5, (3 - (m == "0.3")) * 1e-5, 6e-5),
-        )
-        for m in values[1]
-    ]
-    _, files = write_map(names, values, done, tmp_path)
+    values = ("30 deg", "45 deg"), ("0.2", "0.3")
+    done = of_angles_and_mus(("30 deg",), values[1])
+    _, files = write_map(ANGLE_AND_MU, values, done, tmp_path)
     page = files[-1].read_text(encoding="utf-8")
     assert "runs finished: **2 of 4**, what follows is of these alone" in page
     assert "best damper.angle: **30 deg**, the only value studied" in page

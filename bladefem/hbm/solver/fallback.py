@@ -89,15 +89,13 @@ def _newton_attempts(
     # solved 12 of 300 points after it under 18 and 36 N, and took a third of the time.
     starts = [w for w in (start, start_in_stick(balance)) if w is not None]
     compiled = runs_compiled(balance)
-    split = balance.model.series is not None
     step_first = lowers_step_first(balance)
     merits: Sequence[tuple[str, str]] = NEWTON_MERITS if step_first else NEWTON_MERITS[::-1]
-    if split and not options.fallbacks and start is not None:
+    if balance.model.series is not None and not options.fallbacks and start is not None:
         # of 69 points with stiff layers that the start did not lead to, full stick led to one, in
         # a quarter of the time of all; what one merit does not find is better sought beside it
         starts, merits = starts[:1], merits[:1]
-    runs = _runs_in_order(starts, merits, compiled or split, options.fallbacks)
-    for w, (method, merit) in runs:
+    for w, (method, merit) in _runs_in_order(starts, merits, step_first, options.fallbacks):
         walks = merit == merits[0][1]
         yield Attempt(method, newton(balance, w, options, merit, walks or not compiled))
 
