@@ -19,6 +19,7 @@ from ..policy import (
     NUMPY_NEWTON,
     uses_compiled_newton,
 )
+from .balance_2d import search_residual
 from .newton_compiled import (
     BY_ITERATIONS,
     BY_LU,
@@ -30,9 +31,12 @@ from .residual import (
     Balance,
     Inverse,
     State,
+    arguments_2d,
     contact_table,
     evaluate_balance,
+    evaluates_2d,
     linearise_balance,
+    state_of_evaluation,
 )
 from .walking import (
     held_balance,
@@ -48,6 +52,9 @@ from .walking import (
 SAME_START = 1e-12
 # step share below which the search direction is given up
 SHORTEST_STEP_SHARE = 2.0**-8
+# share by which a whole step has to lower what the line search looks at
+STEP_DECREASE = 0.25
+RESIDUAL_DECREASE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -313,10 +320,12 @@ def _line_search(
     merit: str,
 ) -> State | None:
     """The first halving of the step that lowers the merit, or None."""
-    step = inverse(state.residual, float(np.clip(0.1 * state.error, 1e-5, 1e-2)))
+    step = inverse(state.residual, min(max(0.1 * state.error, 1e-5), 1e-2))
     if not np.isfinite(step).all():
         return None
-    demand = 0.25 if merit == "step" else 1e-4
+    if merit == "residual" and evaluates_2d(balance):
+        return _search_residual_2d(balance, state, step)
+    demand = STEP_DECREASE if merit == "step" else RESIDUAL_DECREASE
     before = np.linalg.norm(step if merit == "step" else state.residual)
 
     def lowers_merit(trial: State, share: float) -> bool:
@@ -328,3 +337,17 @@ def _line_search(
         lowers_merit,
         SHORTEST_STEP_SHARE,
     )
+
+
+def _search_residual_2d(balance: Balance, state: State, step: np.ndarray) -> State | None:
+    """The first halving of the step that lowers the residual of 2-D elements, or None."""
+    flat = (-1, state.w.shape[2])
+    found, last = search_residual(
+        np.ascontiguousarray(state.w, dtype=float).reshape(flat),
+        state.residual.reshape(flat),
+        np.ascontiguousarray(step).reshape(flat),
+        RESIDUAL_DECREASE,
+        SHORTEST_STEP_SHARE,
+        *arguments_2d(balance),
+    )
+    return state_of_evaluation(balance, last) if found else None

@@ -22,10 +22,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import linalg
 
-from ...friction.aft import Forces, evaluate
+from ...friction.aft import PERIODIC, PRECISIONS, Forces, convergence_reason, evaluate
 from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
-from ...friction.trigonometric_tables import trigonometric_tables
+from ...friction.trigonometric_tables import derivative_patterns, trigonometric_tables
 from ...util.arrays import RealArray
 from ..linear.condensation import Linear, condense, with_mean
 from ..linear.contact_flexibility import (
@@ -40,6 +40,7 @@ from ..linear.contact_flexibility import (
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
 from ..solution import Solution
+from .balance_2d import PERIODS, Evaluation, evaluate_2d, force_rates
 from .newton_compiled import (
     balance_residual,
     dense_jacobian,
@@ -54,7 +55,8 @@ STEP_ACCURACY = 1e-5
 STICKING_FORCE_SHARE = 1e-13
 # of the size of the motion: step of the walk by which forces are differenced
 WALK_DIFFERENCE = 1e-6
-
+# of 2-D elements whose state was not found
+NOT_PERIODIC = f"were not periodic after {PERIODS} cycles"
 
 Inverse = Callable[..., np.ndarray]
 
@@ -113,6 +115,9 @@ def evaluate_balance(
     """Forces and residual at w (n, d, K); precision is that of the forces' derivative."""
     model = balance.model
     linear = balance.linear
+    if evaluates_2d(balance):
+        by_row = np.ascontiguousarray(w, dtype=float).reshape(model.springs.size, -1)
+        return state_of_evaluation(balance, evaluate_2d(by_row, *arguments_2d(balance, precision)))
     forces = contact_forces(model, w, balance.samples, precision, walk_ramp(balance, w))
     p = np.empty(w.shape)
     residual = np.empty(w.shape)
@@ -126,6 +131,51 @@ def evaluate_balance(
         residual.reshape(flat),
     )
     return State(w, forces, p, residual, error)
+
+
+def evaluates_2d(balance: Balance) -> bool:
+    """True if an evaluation is one compiled call: 2-D elements of Coulomb's law."""
+    elements = balance.model.elements
+    return elements.tangents == 2 and elements.law is None and balance.samples > 0
+
+
+def arguments_2d(balance: Balance, precision: str = "single") -> tuple:
+    """What the kernels of `bladefem.hbm.solver.balance_2d` take of a balance: motions of the walk,
+    condensed bodies, contact, and patterns of the derivative in a precision.
+    """
+    linear = balance.linear
+    H = len(linear.stuck) - 1
+    walk = np.zeros((linear.springs.size, 0)) if balance.walk is None else balance.walk
+    return (
+        np.ascontiguousarray(walk),
+        linear.condensed,
+        contact_table(balance.model, H, balance.samples),
+        derivative_patterns(H, balance.samples, PRECISIONS[precision]),
+    )
+
+
+def state_of_evaluation(balance: Balance, found: Evaluation) -> State:
+    """The state that a compiled evaluation leaves."""
+    n, d = balance.model.springs.shape
+    K = found.w.shape[1]
+    missing = 3 - d
+    forces = Forces(
+        found.F[:, missing:],
+        found.J.reshape(n, 3, K, 3, K)[:, missing:, :, missing:],
+        found.shares,
+        found.dissipated,
+        np.abs(found.cycles),
+        found.periodic,
+        PERIODIC if found.periodic else convergence_reason(found.F, found.cycles, NOT_PERIODIC),
+    )
+    shape = (n, d, K)
+    return State(
+        found.w.reshape(shape),
+        forces,
+        found.p.reshape(shape),
+        found.residual.reshape(shape),
+        found.error,
+    )
 
 
 def contact_forces(
@@ -199,9 +249,28 @@ def walk_rates(balance: Balance, state: State) -> np.ndarray:
     """
     if "walk rates" in state.derived:
         return state.derived["walk rates"]
-    steps = walk_steps(balance, state.w)
     first = balance.model.directions - balance.model.elements.tangents
     size = WALK_DIFFERENCE * max(np.abs(state.w[:, first:, 1:]).max(), np.finfo(float).tiny)
+    state.derived["walk rates"] = (
+        _walk_rates_2d(balance, state, size)
+        if evaluates_2d(balance)
+        else _walk_rates_one_by_one(balance, state, size)
+    )
+    return state.derived["walk rates"]
+
+
+def _walk_rates_2d(balance: Balance, state: State, size: float) -> np.ndarray:
+    """`walk_rates` of 2-D elements by one compiled call."""
+    n, d, K = state.w.shape
+    full = np.zeros((n, 3, K))
+    full[:, 3 - d :] = state.forces.f
+    flat = np.ascontiguousarray(state.w, dtype=float).reshape(n * d, K)
+    return force_rates(flat, full, size, *arguments_2d(balance))[:, :, 3 - d :]
+
+
+def _walk_rates_one_by_one(balance: Balance, state: State, size: float) -> np.ndarray:
+    """`walk_rates`, each by one evaluation of the forces."""
+    steps = walk_steps(balance, state.w)
     rates = []
     for j in range(len(steps)):
         # away from a walk of zero, where the law has a corner
@@ -210,8 +279,7 @@ def walk_rates(balance: Balance, state: State) -> np.ndarray:
         ramp = _as_ramp(balance, steps + change)
         moved = contact_forces(balance.model, state.w, balance.samples, walk=ramp, jacobian=False).f
         rates.append((moved - state.forces.f) / change[j])
-    state.derived["walk rates"] = np.array(rates)
-    return state.derived["walk rates"]
+    return np.array(rates)
 
 
 def walking_force_change(

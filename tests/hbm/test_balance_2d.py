@@ -1,0 +1,158 @@
+"""Compiled evaluations of 2-D elements against the same in NumPy, one step after the other."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from models import block
+
+from bladefem.data import Elements, RigidBody
+from bladefem.friction.aft import dissipated_energy, evaluate
+from bladefem.hbm.linear.condensation import condense
+from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.solver import newton, residual
+from bladefem.hbm.solver.residual import (
+    Balance,
+    evaluate_balance,
+    linearise_balance,
+    start_in_stick,
+    walk_rates,
+)
+from bladefem.reduction.matrices import port_model_from_matrices
+from bladefem.util.newton import halve_step
+
+SAMPLES = 64
+ROUNDING = 1e-12
+
+
+def rubbing(nodes=2):
+    """Two unit masses on springs, and a free mass that rubs on them in two directions under loads
+    that swing.
+    """
+    readings = np.tile(np.eye(2), (nodes, 1)) * np.repeat(1 + 0.1 * np.arange(nodes), 2)[:, None]
+    ports = {"contact": readings, "load": [0], "probe": [0]}
+    body = port_model_from_matrices(np.eye(2), np.array([[1.0, 0.2], [0.2, 1.3]]), ports)
+    share = np.full(nodes, 1 / nodes)
+    elements = Elements(5.0 * share, np.zeros(nodes), np.full(nodes, 0.5), 0.3 * share, tangents=2)
+    damper = RigidBody(0.3 * np.eye(2), np.tile(np.eye(2), (nodes, 1)))
+    normal = {1: 0.2j * share}
+    return ReducedModel(
+        (body,), elements, {1: np.array([0.3])}, Damping(0.01), damper, normal=normal
+    )
+
+
+def walking(nodes=2):
+    """A balance whose damper walks along both tangents, and displacements that all contacts slip
+    by.
+    """
+    model = rubbing(nodes)
+    balance = Balance(model, condense(model, 1.1, 3), SAMPLES)
+    balance = replace(balance, walk=newton.tangential_motions(model, balance.linear.B))
+    assert balance.walk.shape == (2 * nodes, 2)
+    w = np.random.default_rng(3).normal(size=(nodes, 2, 7))
+    return balance, w
+
+
+def resting(model, size):
+    balance = Balance(model, condense(model, 0.9, 3), SAMPLES)
+    start = start_in_stick(balance)
+    rng = np.random.default_rng(1)
+    return balance, start + size * abs(start).max() * rng.normal(size=start.shape)
+
+
+CASES = {
+    "few contacts": resting(block(), 0.5),
+    "all stick": resting(block(n0=1e6), 0.0),
+    "rigid damper": resting(block(damper=True), 2.0),
+    "prescribed loads": resting(rubbing(3), 1.0),
+    "walking": walking(),
+}
+
+
+def plain_state(balance, w):
+    """(f, dfdw, shares, dissipated, p, residual, error) with NumPy alone but for the contact law."""
+    model = balance.model
+    linear = balance.linear
+    n, d, K = w.shape
+    full = np.zeros((n, 3, K))
+    full[:, 3 - d :] = w
+    full[:, 3 - d :, 0] += model.offset.reshape(n, d)
+    ramp = np.zeros((n, 2))
+    if balance.walk is not None:
+        steps = balance.walk.T @ (model.springs * w[:, :, 0]).ravel()
+        ramp = (balance.walk @ steps).reshape(n, d)[:, d - 2 :]
+    load = model.normal_series(SAMPLES) if model.normal else None
+    law = evaluate(model.elements, full, SAMPLES, load=load, precision="single", walk=ramp)
+    f = law.f[:, 3 - d :]
+    springs = model.springs[:, :, None]
+    p = f - springs * w
+    p[:, :, 0] -= model.preload.reshape(n, d)
+
+    def product(matrices, x):
+        q = residual.as_amplitudes(x)
+        return residual.as_coefficients(np.einsum("hij,hj->hi", matrices, q), x.shape)
+
+    r = w - residual.as_coefficients(linear.stuck, w.shape) + product(linear.A, p)
+    sprung = springs * r
+    sprung[:, :, 0] = 0.0
+    bare = r + product(linear.G, sprung)
+    error = max(
+        np.linalg.norm(r) / np.linalg.norm(w), np.linalg.norm(bare) / linear.condensed.scale
+    )
+    works = dissipated_energy(law.f, full) + np.sum(law.f[:, 1:, 0] * ramp, axis=1)
+    return f, law.jacobian[:, 3 - d :, :, 3 - d :], law.shares, works, p, r, error
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_compiled_evaluation_is_that_of_numpy(name):
+    balance, w = CASES[name]
+    assert residual.evaluates_2d(balance)
+    state = evaluate_balance(balance, w, "single")
+    forces = state.forces
+    found = (forces.f, forces.jacobian, forces.shares, forces.dissipated)
+    found = (*found, state.p, state.residual, state.error)
+    for value, expected in zip(found, plain_state(balance, w), strict=True):
+        size = abs(np.asarray(expected)).max()
+        np.testing.assert_allclose(value, expected, rtol=0, atol=ROUNDING * max(size, 1e-3))
+    assert forces.converged and forces.reason == "periodic"
+    np.testing.assert_array_equal(state.w, w)
+
+
+@pytest.mark.parametrize("name", ["few contacts", "rigid damper", "prescribed loads"])
+@pytest.mark.parametrize("factor", [1.0, 3.0, -1.0])
+def test_halvings_of_a_step_are_those_of_the_plain_search(name, factor):
+    """A step that is too long is halved as often, one that leads uphill is given up."""
+    balance, w = CASES[name]
+    state = evaluate_balance(balance, w, "single")
+    step = factor * linearise_balance(balance, state)(state.residual, 1e-6)
+    before = np.linalg.norm(state.residual)
+    plain = halve_step(
+        lambda share: evaluate_balance(balance, state.w - share * step, "single"),
+        lambda trial, share: np.linalg.norm(trial.residual) <= (1 - 1e-4 * share) * before,
+        newton.SHORTEST_STEP_SHARE,
+    )
+    found = newton._search_residual_2d(balance, state, step)
+    assert (found is None) == (plain is None)
+    if plain is not None:
+        np.testing.assert_allclose(found.w, plain.w, rtol=0, atol=ROUNDING * abs(plain.w).max())
+        assert abs(found.error - plain.error) <= ROUNDING
+
+
+def test_rates_of_a_walk_are_those_of_forces_one_by_one():
+    balance, w = CASES["walking"]
+    state = evaluate_balance(balance, w, "single")
+    rates = walk_rates(balance, state)
+    size = residual.WALK_DIFFERENCE * abs(w[:, :, 1:]).max()
+    plain = residual._walk_rates_one_by_one(balance, state, size)
+    # forces agree to rounding, which the difference divides by
+    rounding = ROUNDING * abs(state.forces.f).max() / size
+    assert rates.shape == (2, *w.shape) and abs(plain).max() > 1e3 * rounding
+    np.testing.assert_allclose(rates, plain, rtol=0, atol=rounding)
+
+
+def test_a_motion_that_is_not_finite_is_said_to_be_none():
+    balance, w = CASES["few contacts"]
+    w = w.copy()
+    w[0, 1, 1] = np.nan
+    forces = evaluate_balance(balance, w, "single").forces
+    assert not forces.converged and "not finite" in forces.reason
