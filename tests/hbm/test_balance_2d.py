@@ -8,9 +8,12 @@ from models import block
 
 from bladefem.data import Elements, RigidBody
 from bladefem.friction.aft import dissipated_energy, evaluate
+from bladefem.hbm import policy
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.solver import newton, residual
+from bladefem.hbm.solver.newton_compiled import dense_jacobian
+from bladefem.hbm.solver.newton_krylov import Memory
 from bladefem.hbm.solver.residual import (
     Balance,
     evaluate_balance,
@@ -62,7 +65,7 @@ def resting(model, size):
 
 CASES = {
     "few contacts": resting(block(), 0.5),
-    "all stick": resting(block(n0=1e6), 0.0),
+    "all stick": resting(block(n0=1e6), 0.5),
     "rigid damper": resting(block(damper=True), 2.0),
     "prescribed loads": resting(rubbing(3), 1.0),
     "walking": walking(),
@@ -148,6 +151,47 @@ def test_rates_of_a_walk_are_those_of_forces_one_by_one():
     rounding = ROUNDING * abs(state.forces.f).max() / size
     assert rates.shape == (2, *w.shape) and abs(plain).max() > 1e3 * rounding
     np.testing.assert_allclose(rates, plain, rtol=0, atol=rounding)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_step_by_one_matrix_solves_the_differences_of_the_residual(name):
+    balance, w = CASES[name]
+    state = evaluate_balance(balance, w)
+    step = linearise_balance(balance, state)(state.residual)
+    size = 1e-6 / abs(step).max() * abs(w).max()
+    ahead, back = (evaluate_balance(balance, w + s * size * step).residual for s in (1, -1))
+    np.testing.assert_allclose(
+        (ahead - back) / (2 * size), state.residual, rtol=0, atol=1e-4 * abs(state.residual).max()
+    )
+
+
+def test_a_step_of_a_walk_by_one_matrix_is_that_by_terms_of_low_rank():
+    balance, w = CASES["walking"]
+    state = evaluate_balance(balance, w)
+    base = residual._linearise_blocks(residual._held_walk(balance), state)
+    plain = residual._low_rank_inverse(base, *residual._walk_terms(balance, state))
+    memory = Memory()
+    step = linearise_balance(balance, state, memory)(state.residual)
+    expected = plain(state.residual)
+    np.testing.assert_allclose(step, expected, rtol=0, atol=1e-11 * abs(expected).max())
+    assert memory.solvers == {policy.DENSE_LU}
+
+
+def test_nodes_that_stick_are_left_out_of_the_matrix():
+    """The step is that of the whole system."""
+    model = block()
+    pressed = replace(model.elements, n0=model.elements.n0 * [1.0, 1e5, 1.0, 1e5])
+    balance, w = resting(replace(model, elements=pressed), 0.5)
+    state = evaluate_balance(balance, w)
+    change, nodes, _ = residual._active_nodes(balance, state)
+    n, d, K = w.shape
+    assert list(nodes) == [0, 2]
+    C = np.zeros((n, d * K, d * K))
+    C[nodes] = change
+    system = dense_jacobian(balance.linear.A, C)
+    expected = np.linalg.solve(system, state.residual.ravel()).reshape(w.shape)
+    step = linearise_balance(balance, state)(state.residual)
+    np.testing.assert_allclose(step, expected, rtol=0, atol=1e-11 * abs(expected).max())
 
 
 def test_a_motion_that_is_not_finite_is_said_to_be_none():

@@ -41,6 +41,7 @@ from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
 from ..solution import Solution
 from .balance_2d import PERIODS, Evaluation, evaluate_2d, force_rates
+from .dense_system import dense_system
 from .newton_compiled import (
     balance_residual,
     dense_jacobian,
@@ -139,15 +140,21 @@ def evaluates_2d(balance: Balance) -> bool:
     return elements.tangents == 2 and elements.law is None and balance.samples > 0
 
 
+def walk_columns(balance: Balance) -> np.ndarray:
+    """(m, z) motions of the walk for compiled loops, none where nothing walks."""
+    if balance.walk is None:
+        return np.zeros((balance.linear.springs.size, 0))
+    return np.ascontiguousarray(balance.walk)
+
+
 def arguments_2d(balance: Balance, precision: str = "single") -> tuple:
     """What the kernels of `bladefem.hbm.solver.balance_2d` take of a balance: motions of the walk,
     condensed bodies, contact, and patterns of the derivative in a precision.
     """
     linear = balance.linear
     H = len(linear.stuck) - 1
-    walk = np.zeros((linear.springs.size, 0)) if balance.walk is None else balance.walk
     return (
-        np.ascontiguousarray(walk),
+        walk_columns(balance),
         linear.condensed,
         contact_table(balance.model, H, balance.samples),
         derivative_patterns(H, balance.samples, PRECISIONS[precision]),
@@ -334,9 +341,11 @@ def linearise_balance(
     reduced to the nodes that slip or lift; the others follow from their forces. Raises
     numpy.linalg.LinAlgError where the derivative is singular.
     """
+    memory = Memory() if memory is None else memory
+    if linear_solver(state.w.size) == DENSE_LU:
+        return _linearise_densely(balance, state, memory)
     if balance.walk is None:
         return _linearise_blocks(balance, state, memory)
-    memory = Memory() if memory is None else memory
     walking = _iterate_with_walk(balance, state, memory)
     held: Inverse | None = None
 
@@ -351,6 +360,36 @@ def linearise_balance(
             base = _linearise_blocks(_held_walk(balance), state, memory)
             held = _low_rank_inverse(base, *_walk_terms(balance, state))
         return held(residual, accuracy)
+
+    return solve
+
+
+def _linearise_densely(balance: Balance, state: State, memory: Memory) -> Inverse:
+    """The inverse by one LU of a small balance, walk included."""
+    n, d, K = state.w.shape
+    rates = np.zeros((0, n, d, K)) if balance.walk is None else walk_rates(balance, state)
+    nodes, change, system = dense_system(
+        np.ascontiguousarray(state.forces.jacobian, dtype=float),
+        balance.linear.condensed,
+        d,
+        STICKING_FORCE_SHARE,
+        walk_columns(balance),
+        np.ascontiguousarray(rates).reshape(len(rates), n * d, K),
+    )
+    if len(nodes) == 0:
+        return lambda residual, accuracy=0.0: residual.copy()
+    memory.solvers.add(DENSE_LU)
+    invert = _factorised(system)
+    if len(nodes) == n:
+        return lambda residual, accuracy=0.0: invert(residual)
+    flex = balance.linear.condensed.flex
+
+    def solve(residual: np.ndarray, accuracy: float = 0.0) -> np.ndarray:
+        step = np.empty(residual.shape)
+        rows = np.ascontiguousarray(residual).reshape(-1, K)
+        x = invert(residual[nodes]).ravel()
+        spread_to_all_nodes(x, rows, d, nodes, change, flex, step.reshape(-1, K))
+        return step
 
     return solve
 
@@ -580,13 +619,21 @@ def _with_factors_at_need(
 
 
 def _dense_inverse(flex: Flexibility, change: np.ndarray) -> Inverse:
-    J = dense_jacobian(form_matrices(flex), change)
-    factors = linalg.lu_factor(J, overwrite_a=True, check_finite=False)
-    if not abs(np.diag(factors[0])).min() > 0:
+    invert = _factorised(dense_jacobian(form_matrices(flex), change))
+    return lambda residual, _: invert(residual)
+
+
+def _factorised(system: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
+    """The inverse of a matrix by its LU factors, for arrays of any shape; the matrix is lost."""
+    factors = linalg.lu_factor(system, overwrite_a=True, check_finite=False)
+    if not abs(factors[0].diagonal()).min() > 0:
         raise np.linalg.LinAlgError("singular Jacobian")
-    return lambda residual, _: linalg.lu_solve(
-        factors, residual.ravel(), check_finite=False
-    ).reshape(residual.shape)
+
+    def invert(residual: np.ndarray) -> np.ndarray:
+        found = linalg.lu_solve(factors, residual.ravel(), check_finite=False)
+        return found.reshape(residual.shape)
+
+    return invert
 
 
 def contact_table(
