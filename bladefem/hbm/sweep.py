@@ -22,7 +22,7 @@ from .sensitivity import sensitivities
 from .solution import Solution, lifts_off, size
 from .solve import leading_stuck_solutions
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .solver.point_compiled import solve_along, solve_started
+from .solver.point_compiled import compiles_points, solve_along, solve_started
 from .validate_model import check_point, check_probe
 
 Keep = Callable[[float, Callable[[], Solution]], Solution]
@@ -97,6 +97,9 @@ def _at_once(
 
     Both end where the other way is better, or where Newton needs more than a good start.
     """
+    # whatever the harmonics: the check of many frequencies would be for nothing, point after point
+    if not compiles_points(model, 1):
+        return []
     for omega in omegas:
         check_point(model, omega, H, samples)
     sticks = not last or all_stick(last[-1])

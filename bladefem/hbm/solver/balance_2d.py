@@ -15,8 +15,9 @@ import numpy as np
 from numba import njit
 
 from ...friction.simd.kernel_2d import disc_batch
+from ...friction.trigonometric_tables import Patterns
 from ...util.numba_options import INNER_KERNEL, KERNEL
-from .newton_compiled import balance_residual, frobenius_norm
+from .newton_compiled import Condensed, balance_residual, frobenius_norm
 
 # marched until the force of an element is periodic, at most
 PERIODS = 4000
@@ -119,15 +120,10 @@ def _all_periodic(F, cycles):
     return total == 0.0
 
 
-@njit(**KERNEL)
-def evaluate_2d(w, walk, linear, contact, patterns):
-    """The `Evaluation` at w (m, K), which becomes part of it.
-
-    Args:
-        walk: (m, z) motions along which the damper walks; (m, 0) where it rests in the mean.
-        linear: the `Condensed` bodies.
-        contact: as `bladefem.hbm.solver.residual.contact_table` makes it.
-        patterns: of the derivative, in its precision.
+@njit(cache=True, error_model="numpy", inline="always")
+def _evaluate(w, walk, linear, contact, patterns):
+    """The `Evaluation` at w (m, K), which becomes part of it; arguments as `search_residual` takes
+    them.
     """
     load, _, nodes, tab, _, preload, offset = contact
     n = nodes.shape[0]
@@ -147,29 +143,44 @@ def evaluate_2d(w, walk, linear, contact, patterns):
 
 
 @njit(**KERNEL)
-def search_residual(w, residual, step, decrease, shortest, walk, linear, contact, patterns):
-    """The first halving of a step (m, K) from w (m, K) that lowers the residual (m, K) enough.
+def search_residual(w, step, before, decrease, shortest, walk, linear, contact, patterns):
+    """The first halving of a step (m, K) from w (m, K) that lowers the residual enough.
 
     Args:
+        before: size of the residual at w [m]; the whole step is accepted where it is infinite.
         decrease: share of the residual by which a whole step has to lower it.
         shortest: share of the step below which it is given up.
+        walk: (m, z) motions along which the damper walks; (m, 0) where it rests in the mean.
+        linear: the `Condensed` bodies.
+        contact: as `bladefem.hbm.solver.residual.contact_table` makes it.
+        patterns: of the derivative, in its precision.
 
     Returns:
         whether one was found, and the last `Evaluation`.
     """
-    before = frobenius_norm(residual)
     share = 1.0
     while True:
         trial = np.empty(step.shape)
         for i in range(step.shape[0]):
             for k in range(step.shape[1]):
                 trial[i, k] = w[i, k] - share * step[i, k]
-        found = evaluate_2d(trial, walk, linear, contact, patterns)
+        found = _evaluate(trial, walk, linear, contact, patterns)
         if frobenius_norm(found.residual) <= (1.0 - decrease * share) * before:
             return True, found
         share /= 2.0
         if share < shortest:
             return False, found
+
+
+def evaluate_2d(
+    w: np.ndarray, walk: np.ndarray, linear: Condensed, contact: tuple, patterns: Patterns
+) -> Evaluation:
+    """The `Evaluation` at w (m, K): a search without a step, as a kernel of its own would take
+    several seconds more to compile.
+    """
+    return search_residual(w, np.zeros_like(w), np.inf, 0.0, 1.0, walk, linear, contact, patterns)[
+        1
+    ]
 
 
 @njit(**KERNEL)

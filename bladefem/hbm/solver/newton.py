@@ -344,8 +344,8 @@ def _search_residual_2d(balance: Balance, state: State, step: np.ndarray) -> Sta
     flat = (-1, state.w.shape[2])
     found, last = search_residual(
         np.ascontiguousarray(state.w, dtype=float).reshape(flat),
-        state.residual.reshape(flat),
         np.ascontiguousarray(step).reshape(flat),
+        float(np.linalg.norm(state.residual)),
         RESIDUAL_DECREASE,
         SHORTEST_STEP_SHARE,
         *arguments_2d(balance),

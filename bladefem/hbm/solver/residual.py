@@ -22,7 +22,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy import linalg
 
-from ...friction.aft import PERIODIC, PRECISIONS, Forces, convergence_reason, evaluate
+from ...friction.aft import PERIODIC, Forces, convergence_reason, evaluate
 from ...friction.fourier import to_complex, to_real
 from ...friction.kernel_1d_exact import evaluate_exact
 from ...friction.trigonometric_tables import derivative_patterns, trigonometric_tables
@@ -116,9 +116,10 @@ def evaluate_balance(
     """Forces and residual at w (n, d, K); precision is that of the forces' derivative."""
     model = balance.model
     linear = balance.linear
-    if evaluates_2d(balance):
+    # in double precision, which is not Newton's, the kernel would have to be compiled once more
+    if precision == "single" and evaluates_2d(balance):
         by_row = np.ascontiguousarray(w, dtype=float).reshape(model.springs.size, -1)
-        return state_of_evaluation(balance, evaluate_2d(by_row, *arguments_2d(balance, precision)))
+        return state_of_evaluation(balance, evaluate_2d(by_row, *arguments_2d(balance)))
     forces = contact_forces(model, w, balance.samples, precision, walk_ramp(balance, w))
     p = np.empty(w.shape)
     residual = np.empty(w.shape)
@@ -147,9 +148,9 @@ def walk_columns(balance: Balance) -> np.ndarray:
     return np.ascontiguousarray(balance.walk)
 
 
-def arguments_2d(balance: Balance, precision: str = "single") -> tuple:
+def arguments_2d(balance: Balance) -> tuple:
     """What the kernels of `bladefem.hbm.solver.balance_2d` take of a balance: motions of the walk,
-    condensed bodies, contact, and patterns of the derivative in a precision.
+    condensed bodies, contact, and patterns of the derivative in single precision.
     """
     linear = balance.linear
     H = len(linear.stuck) - 1
@@ -157,7 +158,7 @@ def arguments_2d(balance: Balance, precision: str = "single") -> tuple:
         walk_columns(balance),
         linear.condensed,
         contact_table(balance.model, H, balance.samples),
-        derivative_patterns(H, balance.samples, PRECISIONS[precision]),
+        derivative_patterns(H, balance.samples, np.float32),
     )
 
 
