@@ -19,7 +19,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..data import Elements
+from ..data import Elements, RigidBody
 from ..friction.aft import evaluate
 from ..reduction.matrices import port_model_from_matrices
 from .flow_map import flow_map
@@ -31,7 +31,8 @@ from .sector_modes import sector_modes
 from .solve import solve
 from .solver.newton import newton
 from .solver.newton_krylov import iterative_inverse
-from .solver.residual import Balance, start_in_stick
+from .solver.residual import Balance, evaluate_balance, linearise_balance, start_in_stick
+from .solver.walking import tangential_motions
 from .stability import linearised_contacts, stability_verdict
 from .sweep import response
 from .truncation_indicator import truncation_indicator
@@ -77,8 +78,8 @@ def compile_1d() -> None:
 
 def compile_2d() -> None:
     """Kernels of 2-D elements with the derivative in single precision, as Newton takes it; then all
-    that solves, measures and judges a point. By then `compile_linear` has left the linear part on
-    disk.
+    that solves, measures and judges a point, and what a damper that walks adds. By then
+    `compile_linear` has left the linear part on disk.
     """
     evaluate(_plane_model().elements, np.full((1, 3, 5), 0.1), 64, precision="single")
     for force in (0.5, 1.0, 2.0):
@@ -86,6 +87,11 @@ def compile_2d() -> None:
         points = list(response(plane, [1.0, 1.1], 2, 64))
     truncation_indicator(plane, points, 5)
     stability_verdict(plane, points[-1])
+    free = _free_model()
+    balance = Balance(free, condense(free, 1.0, 2), 64)
+    balance = replace(balance, walk=tangential_motions(free, balance.linear.B))
+    w = start_in_stick(balance)
+    linearise_balance(balance, evaluate_balance(balance, w, "single"))
 
 
 def compile_linear() -> None:
@@ -119,6 +125,12 @@ def _plane_model() -> ReducedModel:
     """The same on one 2-D element."""
     one = Elements(np.ones(1), np.ones(1), np.full(1, 0.4), np.full(1, 0.5), tangents=2)
     return _model_on(one)
+
+
+def _free_model() -> ReducedModel:
+    """The same with a rigid damper between, which may walk."""
+    damper = RigidBody(np.eye(2), np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+    return replace(_plane_model(), damper=damper)
 
 
 def _model_on(elements: Elements) -> ReducedModel:

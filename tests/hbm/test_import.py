@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 from numba.core import event
@@ -64,6 +65,8 @@ def test_the_main_job_compiles_nothing_after_the_installation():
     with event.install_listener("numba:compile", compiled):
         points = list(response(plane, [0.9, 1.0, 1.2], 3, 64))
         stability_verdict(plane, points[-1])
+        free = replace(precompile._free_model(), excitation={1: np.full(1, 3.0)})
+        assert any(point.walk is not None for point in response(free, [0.9, 1.0, 1.2], 3, 64))
         assert np.isfinite(condense(plane, 1.0, 3).G).all()
         for precision in ("single", "double"):
             for jacobian in (True, False):
