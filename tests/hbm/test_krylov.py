@@ -24,6 +24,7 @@ from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver import newton_krylov
 from bladefem.hbm.solver.deflation import _leading_directions, no_level, no_ramp, second_level
+from bladefem.hbm.solver.dense_lu import back_substitute
 from bladefem.hbm.solver.krylov import NOT_FOUND, conjugate_residuals
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.newton_compiled import dense_jacobian
@@ -138,6 +139,27 @@ def test_a_second_level_needs_fewer_directions_for_the_same_step():
     assert after < before / 2, (before, after)
     assert conjugate_residuals(flex, C, no_ramp(), r, 1e-10, level, x) > 0
     np.testing.assert_allclose(J @ x, r, atol=1e-9 * np.linalg.norm(r))
+
+
+@pytest.mark.parametrize("walks", [False, True])
+def test_a_second_level_solves_for_the_common_motions(walks):
+    """Its factors are those of  Z^T (1 + A C) Z  with the vectors of a walk, which NumPy inverts."""
+    A, C = system(3.0)
+    rng = np.random.default_rng(2)
+    Q, _ = np.linalg.qr(rng.normal(size=(12, 3)))
+    J = dense_jacobian(A, C)
+    ramp = no_ramp()
+    if walks:
+        ramp = rng.normal(size=(1, len(J))), rng.normal(size=(1, len(J)))
+        moved = flexibility_product(by_harmonic(A), ramp[0][0].reshape(12, 9)).ravel()
+        J = J + np.outer(moved, ramp[1][0])
+    Z, factors, pivots = second_level(by_harmonic(A), C, ramp, Q, np.arange(6), 2)
+    spread = np.kron(Z, np.eye(9))
+    x = rng.normal(size=27)
+    y = x.copy()
+    back_substitute(factors, pivots, y)
+    expected = np.linalg.solve(spread.T @ J @ spread, x)
+    np.testing.assert_allclose(y, expected, rtol=0, atol=1e-11 * abs(expected).max())
 
 
 def test_a_second_level_serves_the_next_derivatives_while_it_is_good(monkeypatch):

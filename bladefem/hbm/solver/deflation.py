@@ -133,41 +133,54 @@ def _orthonormal_rows(Q, active, d):
     return np.ascontiguousarray(Z[:count].T)
 
 
-@njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
+@njit(**INNER_KERNEL)
 def _galerkin_matrix(along, C, Z):
-    """E (qK, qK) = Z^T (1 + A C) Z from Z^T A (H+1, q, a)."""
-    q = Z.shape[1]
+    """E (qK, qK) = Z^T (1 + A C) Z from Z^T A (H+1, q, a), one matrix product a harmonic."""
+    a, q = Z.shape
     K = 2 * along.shape[0] - 1
-    size = C.shape[1]
-    d = size // K
     E = np.eye(q * K)
-    forces = np.empty((size, q * K))
+    # cosines of a harmonic, then its sines
+    forces = np.empty((2 * a, q * K))
+    left = np.empty((2 * q, 2 * a))
+    for h in range(along.shape[0]):
+        c = max(2 * h - 1, 0)
+        _forces_of_motions(C, Z, c, forces[:a])
+        _forces_of_motions(C, Z, 2 * h, forces[a:])
+        for i in range(q):
+            for row in range(a):
+                re = along[h, i, row].real
+                im = along[h, i, row].imag if h else 0.0
+                left[i, row] = re
+                left[i, a + row] = im
+                left[q + i, row] = -im
+                left[q + i, a + row] = re
+        moved = np.dot(left, forces)
+        for i in range(q):
+            for l in range(q * K):
+                E[i * K + c, l] += moved[i, l]
+                if h:
+                    E[i * K + 2 * h, l] += moved[q + i, l]
+    return E
+
+
+@njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
+def _forces_of_motions(C, Z, k, out):
+    """out (a, qK) becomes coefficient k of the forces C (nodes, dK, dK) by each coefficient of the
+    motions Z (a, q).
+    """
+    q = Z.shape[1]
+    K = out.shape[1] // q
+    d = C.shape[1] // K
     for node in range(C.shape[0]):
-        forces[:] = 0.0
-        for row in range(size):
+        for b in range(d):
+            rates = C[node, b * K + k]
+            force = out[node * d + b]
+            force[:] = 0.0
             for j in range(q):
                 for e in range(d):
                     moved = Z[node * d + e, j]
                     for l in range(K):
-                        forces[row, j * K + l] += moved * C[node, row, e * K + l]
-        for b in range(d):
-            for h in range(along.shape[0]):
-                c = max(2 * h - 1, 0)
-                s = 2 * h
-                by_cos = forces[b * K + c]
-                by_sin = forces[b * K + s]
-                for i in range(q):
-                    re = along[h, i, node * d + b].real
-                    im = along[h, i, node * d + b].imag
-                    if h == 0:
-                        E[i * K] += re * by_cos
-                        continue
-                    cos = E[i * K + c]
-                    sin = E[i * K + s]
-                    for l in range(q * K):
-                        cos[l] += re * by_cos[l] + im * by_sin[l]
-                        sin[l] += re * by_sin[l] - im * by_cos[l]
-    return E
+                        force[j * K + l] += moved * rates[e * K + l]
 
 
 @njit(**INNER_KERNEL)
