@@ -9,6 +9,9 @@ Four ways lead to the same solution, the cheapest that applies is taken:
 unknowns);
 4. NumPy Newton with iterations (conjugate residuals, then GMRES), dense LU where they fail.
 
+NumPy Newton keeps the loop; an evaluation of 2-D Coulomb elements and the halvings of a step are
+one compiled call all the same (`bladefem.hbm.solver.balance_2d`).
+
 `Solution.route` says which one ran. Sizes count contact degrees of freedom (nodes times directions)
 or unknowns (these times 2H+1). Each was measured on one thread as the size where both methods take
 the same time, and is flat around it: a factor of two costs some per cent. Compiled code takes the

@@ -194,6 +194,17 @@ def test_nodes_that_stick_are_left_out_of_the_matrix():
     np.testing.assert_allclose(step, expected, rtol=0, atol=1e-11 * abs(expected).max())
 
 
+def test_states_that_newton_begins_with_are_those_at_its_starts():
+    balance, w = CASES["walking"]
+    resting = replace(balance, walk=None)
+    starts = list(newton._likely_starts(resting, w))
+    assert any(start.balance.walk is not None and start.state is not None for start in starts)
+    for start in starts:
+        if start.state is not None:
+            state = evaluate_balance(start.balance, start.w, "single")
+            np.testing.assert_array_equal(start.state.residual, state.residual)
+
+
 def test_a_motion_that_is_not_finite_is_said_to_be_none():
     balance, w = CASES["few contacts"]
     w = w.copy()

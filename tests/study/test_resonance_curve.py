@@ -230,9 +230,9 @@ def test_a_damper_that_may_walk_is_looked_for_by_the_residual():
     case = random_case(34)
     taken = []
 
-    def counted(balance, w, options=ROUGH, merit="step"):
+    def counted(balance, w, options=ROUGH, merit="step", first=None):
         taken.append((balance.walk is not None, merit))
-        return newton_module_run(balance, w, options, merit)
+        return newton_module_run(balance, w, options, merit, first)
 
     newton_module_run = newton_module.newton_as_given
     with pytest.MonkeyPatch.context() as patch:

@@ -152,8 +152,8 @@ def _newton_of_free_damper(
     iterations = 0
     # rest comes first
     tried = None if walks or not runs_compiled(balance) else 1
-    for variant, start in islice(_likely_starts(balance, w), tried):
-        end = _newton_of_one_kind(variant, start, options, merit)
+    for start in islice(_likely_starts(balance, w), tried):
+        end = _newton_of_one_kind(start, options, merit)
         iterations += end.iterations
         if end.converged:
             return replace(end, iterations=iterations)
@@ -162,8 +162,8 @@ def _newton_of_free_damper(
     iterations += led.iterations
     best = end
     if led.converged:
-        for variant, start in islice(_likely_starts(balance, led.state.w), tried):
-            end = _newton_of_one_kind(variant, start, options, merit)
+        for start in islice(_likely_starts(balance, led.state.w), tried):
+            end = _newton_of_one_kind(start, options, merit)
             iterations += end.iterations
             if end.converged:
                 return replace(end, iterations=iterations)
@@ -171,7 +171,18 @@ def _newton_of_free_damper(
     return replace(best, iterations=iterations)
 
 
-def _likely_starts(balance: Balance, w: np.ndarray) -> Iterator[tuple[Balance, np.ndarray]]:
+@dataclass(frozen=True)
+class _Start:
+    """Where Newton begins on a balance at rest or walking."""
+
+    balance: Balance
+    # (n, d, K) [m]
+    w: np.ndarray
+    # the balance there, where it is known
+    state: State | None = None
+
+
+def _likely_starts(balance: Balance, w: np.ndarray) -> Iterator[_Start]:
     """The balance at rest and walking, with starts; the one that leaves less first, where both
     leave the same the one that the states of the contacts ask for. Rest comes first where its loop
     is compiled: it is found or refused in no time.
@@ -180,52 +191,51 @@ def _likely_starts(balance: Balance, w: np.ndarray) -> Iterator[tuple[Balance, n
     """
     compiled = runs_compiled(balance)
     if compiled:
-        yield balance, w
+        yield _Start(balance, w)
     rest = evaluate_balance(balance, w, "single")
     walking = sampled_walk(balance)
     motions = walking_motions(balance, rest.forces.shares)
-    found: list[tuple[float, Balance, np.ndarray | None]] = []
+    found: list[tuple[float, _Start]] = []
     if motions is not None:
-        found.append((rest.error, replace(walking, walk=motions), None))
+        variant = replace(walking, walk=motions)
+        found.append((rest.error, _Start(variant, without_step(variant, w))))
     every = replace(walking, walk=tangential_motions(balance.model, balance.linear.B))
     going = evaluate_balance(every, w, "single")
     motions = walking_motions(balance, going.forces.shares)
     if motions is not None and np.isfinite(going.error):
-        found.append((going.error, replace(walking, walk=motions), w))
+        all_walk = np.array_equal(motions, every.walking)
+        variant = replace(walking, walk=motions)
+        found.append((going.error, _Start(variant, w, going if all_walk else None)))
     if not compiled:
-        found.append((rest.error, balance, w))
-    used: list[tuple[Balance, np.ndarray]] = []
-    for _, variant, guess in sorted(found, key=lambda part: part[0]):
-        start = without_step(variant, w) if guess is None else guess
-        if not any(_same_run(variant, start, *earlier) for earlier in used):
-            used.append((variant, start))
-            yield variant, start
+        found.append((rest.error, _Start(balance, w, rest)))
+    used: list[_Start] = []
+    for _, start in sorted(found, key=lambda part: part[0]):
+        if not any(_same_run(start, earlier) for earlier in used):
+            used.append(start)
+            yield start
 
 
-def _same_run(one: Balance, start: np.ndarray, other: Balance, begun: np.ndarray) -> bool:
+def _same_run(one: _Start, other: _Start) -> bool:
     """Newton would take the same steps again: a motion without a step a period to begin with."""
-    if one.walk is None or other.walk is None or one.walk.shape != other.walk.shape:
+    motions = one.balance.walk
+    others = other.balance.walk
+    if motions is None or others is None or motions.shape != others.shape:
         return False
-    same_start = np.allclose(start, begun, rtol=0.0, atol=SAME_START * float(abs(start).max()))
-    return bool(same_start and np.array_equal(one.walk, other.walk))
+    same = np.allclose(one.w, other.w, rtol=0.0, atol=SAME_START * float(abs(one.w).max()))
+    return bool(same and np.array_equal(motions, others))
 
 
-def _newton_of_one_kind(
-    balance: Balance,
-    w: np.ndarray,
-    options: Options,
-    merit: str,
-) -> Newton:
+def _newton_of_one_kind(start: _Start, options: Options, merit: str) -> Newton:
     """Newton with the walk of the balance, not converged where its end contradicts it.
 
     The residual is lowered where the damper walks and its rest is compiled: on 18 random models
     with rigid dampers that led to 112 of 160 walks, all within 15 steps, and lowering the step to
     none of 48, most of which took all their steps, 40 ms each.
     """
-    rests_compiled = runs_compiled(replace(balance, walk=None))
-    end = newton_as_given(
-        balance, w, options, "residual" if balance.walk is not None and rests_compiled else merit
-    )
+    balance = start.balance
+    if balance.walk is not None and runs_compiled(replace(balance, walk=None)):
+        merit = "residual"
+    end = newton_as_given(balance, start.w, options, merit, start.state)
     end = replace(end, walk=balance.walk, samples=balance.samples)
     fault = walk_fault(balance, end.state) if end.converged else ""
     return replace(end, converged=False, reason=fault) if fault else end
@@ -236,30 +246,35 @@ def newton_as_given(
     w: np.ndarray,
     options: Options = DEFAULT_OPTIONS,
     merit: str = "step",
+    first: State | None = None,
 ) -> Newton:
-    """`newton` for a balance as it is: whether the damper walks is taken from it."""
+    """`newton` for a balance as it is: whether the damper walks is taken from it; `first` is its
+    state at w, where it is known.
+    """
     if merit == "step" and runs_compiled(balance):
         return _run_compiled(balance, w, options)
     memory = Memory()
-    run = _newton_loop(balance, w, options, merit, memory)
+    if first is None:
+        first = evaluate_balance(balance, w, "single")
+    run = _newton_loop(balance, first, options, merit, memory)
     route = route_of(NUMPY_NEWTON, memory.solvers)
     return Newton(run.state, run.iterations, run.converged, run.reason, route)
 
 
 def _newton_loop(
     balance: Balance,
-    w: np.ndarray,
+    first: State,
     options: Options,
     merit: str,
     memory: Memory,
 ) -> NewtonRun[State]:
-    """Newton with NumPy; memory takes what the linear solvers know."""
+    """Newton from a first state with NumPy; memory takes what the linear solvers know."""
 
     def advance(state: State) -> State | None:
         return _line_search(balance, state, linearise_balance(balance, state, memory), merit)
 
     return iterate_newton(
-        evaluate_balance(balance, w, "single"),
+        first,
         lambda state: state.error,
         advance,
         options.tolerance,
