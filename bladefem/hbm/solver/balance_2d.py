@@ -178,9 +178,9 @@ def evaluate_2d(
     """The `Evaluation` at w (m, K): a search without a step, as a kernel of its own would take
     several seconds more to compile.
     """
-    return search_residual(w, np.zeros(w.shape), np.inf, 0.0, 1.0, walk, linear, contact, patterns)[
-        1
-    ]
+    whole = np.zeros(w.shape)
+    _, found = search_residual(w, whole, np.inf, 0.0, 1.0, walk, linear, contact, patterns)
+    return found
 
 
 @njit(**KERNEL)
