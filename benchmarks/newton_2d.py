@@ -6,6 +6,10 @@ NumPy between the kernels.
 Each seed is a model of `branch_models.py` with two tangents, swept over its band in 41 points with
 its own harmonics, at least three. Times are CPU seconds of one process, the least of five sweeps;
 the amplitudes of both ways are compared.
+
+Measured, on a machine with other work: 0.14 to 1.9 ms a point, 0.68 to 0.93 of the time with NumPy,
+0.77 in all; amplitudes are 3e-15 apart at most. What is left is mostly kernels and the LU: seed 13
+factors 189 unknowns each step.
 """
 
 from __future__ import annotations
@@ -39,9 +43,7 @@ def swept(seed: int) -> tuple[float, list[bf.Solution]]:
 
 
 def main(seeds: tuple[int, ...]) -> None:
-    print(
-        "| seed | nodes, directions | steps | CPU a point [ms] | with NumPy [ms] | ratio | same |"
-    )
+    print("| seed | nodes, directions | steps | CPU a point [ms] | NumPy [ms] | ratio | apart |")
     print("| --- | --- | --- | --- | --- | --- | --- |")
     spent = np.zeros(2)
     for seed in seeds:
