@@ -190,3 +190,15 @@ def test_a_sweep_at_once_is_the_sweep_point_by_point(points, monkeypatch):
         np.testing.assert_allclose(
             one.probe, other.probe, rtol=0, atol=1e-8 * abs(other.probe).max()
         )
+
+
+def test_a_sweep_without_compiled_points_checks_each_frequency_in_its_turn(monkeypatch):
+    """Not up to 16 of them before every point; a bad one is refused all the same."""
+    checked = []
+    monkeypatch.setattr(sweep, "check_point", lambda *arguments: checked.append(arguments))
+    found = sweep.response(block(), [0.9, 1.0, -1.0], 3, 64)
+    assert next(found).converged and next(found).converged and not checked
+    with pytest.raises(InputError, match=r"omega -1\.0: expected a positive"):
+        next(found)
+    list(sweep.response(single_mass(), [0.9, 1.0], 3, 64))
+    assert len(checked) == 2
