@@ -22,7 +22,6 @@ from .ring_contacts import (
     displace,
     of_blade,
     subtract_moved,
-    table_of_blade,
     violation,
 )
 
@@ -59,7 +58,7 @@ def no_inverses(blades: int, size: int) -> BladeInverses:
     return BladeInverses(np.zeros((blades, size, size)), np.array([0, 1]))
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def note_step(kept, found):
     """A step was tried node by node: the next ones are taken blade by blade where it was not found,
     each time twice as many, and half as many where it was.
@@ -71,7 +70,7 @@ def note_step(kept, found):
         kept.steps[1] = min(2 * kept.steps[1], MOST_STEPS)
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=True, **INNER_KERNEL)
 def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
     """Sweeps over the blades until no force changes by more than a limit; False where they do not
     settle. Arguments as those of `bladefem.hbm.step_forces.contact_forces`.
@@ -87,7 +86,7 @@ def by_blades(c, contacts, kept, w, f, before, load1, limit, work):
         by_kept = bool(0)
         for b in range(blades):
             start = of_blade(before, b)
-            table = table_of_blade(contacts.table, b)
+            table = contacts.table[b]
             size = _violations(table, start, load1[b], w[b], f[b], gap)
             work[0] += 2.0 * m**2 + NODE_OPERATIONS * width
             if size <= limit:
@@ -138,7 +137,7 @@ def _shortened(table, flexibility, start, load1, w, f, inverse, gap, tries):
     return forces, 0.0
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _size(gap):
     total = 0.0
     for k in range(len(gap)):

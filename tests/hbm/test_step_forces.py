@@ -14,7 +14,7 @@ from bladefem.hbm.ring_contacts import (
     ring_contacts,
 )
 from bladefem.hbm.ring_contacts import violation as one_violation
-from bladefem.hbm.step_forces import contact_forces
+from bladefem.hbm.step_forces import contact_forces, step_room
 
 NODES = 8
 MU = 0.3
@@ -233,7 +233,8 @@ def contact_forces_of(case, w, f, extra, preload=None, blades=1, kept=None):
     moved, more, c = (in_places(x.reshape(blades, -1), places) for x in (w, extra, case["c"]))
     change, work = np.zeros((2, *rows.shape)), np.zeros(1)
     kept = kept or no_inverses(blades, len(places))
-    found = contact_forces(c, contacts, kept, moved, rows, change, more, *loads, work)
+    room = step_room(blades, len(nodes))
+    found = contact_forces(c, contacts, kept, moved, rows, change, more, *loads, work, room)
     assert work[0] > 0
     there = places >= 0
     for row in range(blades):
