@@ -19,7 +19,7 @@ from numba import njit
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
 from ..util.numba_options import INNER_KERNEL, KERNEL
-from .blade_forces import no_inverses
+from .blade_forces import no_factors
 from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_envelope, scatter
 from .linear.array_copy import clear_vector, copy_vector
 from .linear.condensation import condense
@@ -326,7 +326,7 @@ def _prepared(
             readings,
             ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
             layer,
-            no_inverses(r, len(places)),
+            no_factors(r, len(places)),
             # a place without a node is open
             in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
             in_places(free.reshape(S, r, own), places),

@@ -29,8 +29,8 @@ from .ring_contacts import (
     violation,
 )
 
-# most sweeps over the nodes in a step
-SWEEPS = 20
+# most sweeps over the nodes in a step; ten of them take the time of one Newton step of each blade
+SWEEPS = 30
 # change of a force in a sweep that counts as none, over the largest force
 SETTLED = 1e-6
 

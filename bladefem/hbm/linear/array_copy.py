@@ -28,4 +28,4 @@ def copy_matrix(source, target):
 def clear_vector(target):
     """target (n,) becomes zero."""
     for i in range(target.shape[0]):
-        target[i] = 0.0
+        target[i] = 0
