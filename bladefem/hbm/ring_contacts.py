@@ -133,21 +133,47 @@ def subtract_moved(columns, b, first, forces, place, target, work):
     Args:
         first: place of the block in a row of nodes; place: that of its forces in their rows.
     """
-    blades, m = target.shape
-    size = blades * m
+    last_blade = target.size - b * target.shape[1]
+    _subtract(columns, b, first, forces, place, target, work, (0, last_blade, target.size))
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def subtract_from_own(columns, b, first, forces, place, target, work):
+    """As `subtract_moved`, of blade b alone."""
+    m = target.shape[1]
+    _subtract(columns, b, first, forces, place, target, work, (0, m, m))
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def subtract_from_others(columns, b, first, forces, place, target, work):
+    """As `subtract_moved`, of all blades but b."""
+    m = target.shape[1]
+    last_blade = target.size - b * m
+    _subtract(columns, b, first, forces, place, target, work, (m, last_blade, target.size))
+
+
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
+def _subtract(columns, b, first, forces, place, target, work, which):
+    """As `subtract_moved`, of displacements from the first to the last of three numbers, counted
+    from blade b on; with the second one begins the first blade.
+    """
+    begin, middle, end = which
+    size, m = target.size, target.shape[1]
+    shift, width = b * m, m // 3
     stride = forces.shape[1]
     moving = 0
     for i in range(place, place + LANES_PER_VECTOR):
         moving += forces[0, i] != 0.0 or forces[1, i] != 0.0 or forces[2, i] != 0.0
+    of = width, size, begin, middle, end, shift, forces, stride
     if moving >= FULL_BLOCK:
-        work[0] += 6.0 * LANES_PER_VECTOR * size
-        subtract_block(columns, first, m // 3, b * m, size, forces, stride, place, target)
+        work[0] += 6.0 * LANES_PER_VECTOR * (end - begin)
+        subtract_block(columns, first, *of, place, target)
         return
-    work[0] += 6.0 * moving * size
+    work[0] += 6.0 * moving * (end - begin)
     for lane in range(LANES_PER_VECTOR):
         i = place + lane
         if forces[0, i] != 0.0 or forces[1, i] != 0.0 or forces[2, i] != 0.0:
-            subtract_node(columns, first + lane, m // 3, b * m, size, forces, stride, i, target)
+            subtract_node(columns, first + lane, *of, i, target)
 
 
 @njit(_nrt=False, **INNER_KERNEL)

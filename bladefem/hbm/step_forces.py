@@ -20,11 +20,13 @@ from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, node_steps
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import by_blades, note_step
-from .linear.array_copy import copy_vector
+from .linear.array_copy import clear_vector, copy_vector
 from .ring_contacts import (
     NODE_OPERATIONS,
     displace,
     of_blade,
+    subtract_from_others,
+    subtract_from_own,
     subtract_moved,
     violation,
 )
@@ -33,6 +35,10 @@ from .ring_contacts import (
 SWEEPS = 30
 # change of a force in a sweep that counts as none, over the largest force
 SETTLED = 1e-6
+# sweeps in a step beyond which blades are taken one by one in the next, and the change of a blade's
+# forces over its first one with which the others follow
+SWEEPS_TOGETHER = 6
+NEARLY_SETTLED = 0.02
 
 # Newton steps of all nodes together, and halvings of one
 NEWTON_STEPS = 40
@@ -49,8 +55,11 @@ class StepRoom(NamedTuple):
     displacements: np.ndarray
     # (r, 3, width) forces that were guessed
     ahead: np.ndarray
-    # (3, LANES_PER_VECTOR) changes of the forces of a block of nodes
+    # changes of the forces of a block of nodes (3, LANES_PER_VECTOR), and of a blade (3, width)
     block: np.ndarray
+    total: np.ndarray
+    # (1,) blades are taken one by one
+    apart: np.ndarray
     # of a layer that stiffens: (r, width) forces at which tangents are taken, and (2, r, width)
     # normal loads at zero displacement by them
     tangents: np.ndarray
@@ -64,6 +73,8 @@ def step_room(blades: int, width: int) -> StepRoom:
         displacements=np.zeros((blades, 3 * width)),
         ahead=np.zeros((blades, 3, width)),
         block=np.zeros((3, LANES_PER_VECTOR)),
+        total=np.zeros((3, width)),
+        apart=np.zeros(1, dtype=bool),
         tangents=np.zeros((blades, width)),
         loads=np.zeros((2, blades, width)),
     )
@@ -114,7 +125,10 @@ def settled_forces(c, contacts, kept, w, f, load0, load1, limit, work, room):
     if kept.steps[0] > 0:
         kept.steps[0] -= 1
     else:
-        found = _by_blocks(c, contacts, w, f, before, load1, limit, work, room.block)
+        if room.apart[0]:
+            found = _by_blocks_apart(c, contacts, w, f, before, load1, limit, work, room)
+        else:
+            found = _by_blocks(c, contacts, w, f, before, load1, limit, work, room)
         note_step(kept, found)
     if not found:
         # steps that do not settle lead away
@@ -173,17 +187,19 @@ def _shift_changes(f, start, change):
 
 
 @njit(_nrt=False, **INNER_KERNEL)
-def _by_blocks(c, contacts, w, f, before, load1, limit, work, step):
-    """Sweeps over the nodes, each with a Newton step of its own; False where they do not settle.
+def _by_blocks(c, contacts, w, f, before, load1, limit, work, room):
+    """Sweeps over the nodes of all blades, each with a Newton step of its own; False where they do
+    not settle.
 
     Displacements follow each force that changes: nodes that are open, most of them where a damper
     comes off, cost nothing but their displacement.
     """
     blades, _, width = f.shape
+    step = room.block
     displace(c, contacts, f, w, work)
     # a first sweep says nothing of how fast they settle
     last = 0.0
-    for _ in range(SWEEPS):
+    for sweep in range(SWEEPS):
         largest_step = 0.0
         for b in range(blades):
             old = of_blade(before, b)
@@ -198,9 +214,63 @@ def _by_blocks(c, contacts, w, f, before, load1, limit, work, step):
         # by how much the next one would change a force, if it falls again as it did
         ahead = largest_step * min(largest_step / last, 1.0) if last > 0.0 else largest_step
         if ahead <= limit:
+            room.apart[0] = sweep >= SWEEPS_TOGETHER
             return True
         last = largest_step
+    room.apart[0] = True
     return False
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def _by_blocks_apart(c, contacts, w, f, before, load1, limit, work, room):
+    """As `_by_blocks`, where many sweeps are needed: the displacements of the other blades, which
+    a blade hardly moves, follow when its nodes are nearly settled.
+    """
+    blades, _, width = f.shape
+    step = room.block
+    displace(c, contacts, f, w, work)
+    last = 0.0
+    most = SWEEPS * blades
+    sweeps = 0
+    while sweeps < most:
+        largest = 0.0
+        for b in range(blades):
+            old = of_blade(before, b)
+            table = contacts.table[b]
+            clear_vector(room.total.reshape(3 * width))
+            first_step = 0.0
+            settled = False
+            while not settled:
+                largest_step = 0.0
+                for first in range(0, width, LANES_PER_VECTOR):
+                    if _are_open(table[KN], w[b], f[b], load1[b], first):
+                        continue
+                    work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
+                    node_steps(first, width, table, contacts.own, *old, load1[b], w[b], f[b], step)
+                    largest_step = max(largest_step, _largest(step.reshape(step.size)))
+                    subtract_from_own(contacts.columns, b, first, step, 0, w, work)
+                    _add_block(step, first, room.total)
+                sweeps += 1
+                first_step = max(first_step, largest_step)
+                enough = max(limit, NEARLY_SETTLED * first_step)
+                settled = largest_step <= enough or sweeps >= most
+            largest = max(largest, first_step)
+            for first in range(0, width, LANES_PER_VECTOR):
+                subtract_from_others(contacts.columns, b, first, room.total, first, w, work)
+        ahead = largest * min(largest / last, 1.0) if last > 0.0 else largest
+        if ahead <= limit:
+            room.apart[0] = sweeps > SWEEPS_TOGETHER * blades
+            return True
+        last = largest
+    return False
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def _add_block(step, first, total):
+    """Changes (3, LANES_PER_VECTOR) of a block of nodes are added to those (3, width) of all."""
+    for k in range(3):
+        for lane in range(LANES_PER_VECTOR):
+            total[k, first + lane] += step[k, lane]
 
 
 @njit(_nrt=False, **INNER_KERNEL)
