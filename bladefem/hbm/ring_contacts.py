@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numba.extending import overload
 
 from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, KT, MU, subtract_block, subtract_node
@@ -29,7 +28,7 @@ class RingContacts(NamedTuple):
     the stiffness of a layer that stiffens (`bladefem.hbm.stiffening_layer`).
     """
 
-    # (3, width) kt, kn, mu of all blades alike; (r, 3, width) of each one where the layer stiffens
+    # (r, 3, width) kt, kn, mu of each blade
     table: np.ndarray
     # (3 width, r 3 width) displacements that each force on a blade makes on itself and, one after
     # the other, on those after it
@@ -68,15 +67,12 @@ def in_places(values: np.ndarray, places: np.ndarray, empty: float = 0.0) -> np.
     return np.ascontiguousarray(found)
 
 
-def ring_contacts(
-    table: np.ndarray, flexibility: np.ndarray, preload: np.ndarray, stiffens: bool = False
-) -> RingContacts:
+def ring_contacts(table: np.ndarray, flexibility: np.ndarray, preload: np.ndarray) -> RingContacts:
     """From what is counted node by node.
 
     Args:
         table: (n, 3) kt, kn, mu and preload: (n d,) of one blade.
         flexibility: (r n d, n d) of all blades by the forces on the first.
-        stiffens: each blade has a table of its own.
     """
     places = places_of_directions(len(table), len(preload) // len(table))
     m, width = len(preload), len(places) // 3
@@ -87,7 +83,7 @@ def ring_contacts(
     load = in_places(preload, places)
     own_table = in_places(table.T, places_of_nodes(len(table)))
     return RingContacts(
-        np.tile(own_table, (by_force.shape[1], 1, 1)) if stiffens else own_table,
+        np.tile(own_table, (by_force.shape[1], 1, 1)),
         columns.reshape(3 * width, -1).copy(),
         own.reshape(9, width).copy(),
         columns[:, 0].T.copy(),
@@ -108,28 +104,15 @@ def forces_of_nodes(forces: np.ndarray, nodes: int) -> np.ndarray:
     return forces[:, :, place].swapaxes(1, 2).reshape(-1, 3)
 
 
-def table_of_blade(table: np.ndarray, b: int) -> np.ndarray:
-    """(3, width) constants of blade b from those of all alike or of each."""
-    return table if table.ndim == 2 else table[b]
-
-
-# chosen by the type and written into its callers: a view of an array, and handing it on, cost a
-# march of one node several percent
-@overload(table_of_blade, inline="always")
-def _table_of_blade(table, b):
-    if table.ndim == 2:
-        return lambda table, b: table
-    return lambda table, b: table[b]
-
-
-@njit(**INNER_KERNEL)
+# written into its callers: it gives arrays, which those without counts of references cannot take
+@njit(inline="always", _nrt=False, **INNER_KERNEL)
 def of_blade(before, b):
     """Forces, displacements and loads of one blade from those of all."""
     forces, displacements, loads = before
     return forces[b], displacements[b], loads[b]
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def displace(c, contacts, f, w, work):
     """w (r, 3 width) becomes c less what the contact forces f (r, 3, width) beyond the preload
     move.
@@ -143,31 +126,57 @@ def displace(c, contacts, f, w, work):
             subtract_moved(contacts.columns, b, first, f[b], first, w, work)
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def subtract_moved(columns, b, first, forces, place, target, work):
     """target (r, 3 width) becomes less what the forces of a block of nodes of blade b move.
 
     Args:
         first: place of the block in a row of nodes; place: that of its forces in their rows.
     """
-    blades, m = target.shape
-    size = blades * m
+    last_blade = target.size - b * target.shape[1]
+    _subtract(columns, b, first, forces, place, target, work, (0, last_blade, target.size))
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def subtract_from_own(columns, b, first, forces, place, target, work):
+    """As `subtract_moved`, of blade b alone."""
+    m = target.shape[1]
+    _subtract(columns, b, first, forces, place, target, work, (0, m, m))
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def subtract_from_others(columns, b, first, forces, place, target, work):
+    """As `subtract_moved`, of all blades but b."""
+    m = target.shape[1]
+    last_blade = target.size - b * m
+    _subtract(columns, b, first, forces, place, target, work, (m, last_blade, target.size))
+
+
+@njit(_nrt=False, **INNER_KERNEL, forceinline=True)
+def _subtract(columns, b, first, forces, place, target, work, which):
+    """As `subtract_moved`, of displacements from the first to the last of three numbers, counted
+    from blade b on; with the second one begins the first blade.
+    """
+    begin, middle, end = which
+    size, m = target.size, target.shape[1]
+    shift, width = b * m, m // 3
     stride = forces.shape[1]
     moving = 0
     for i in range(place, place + LANES_PER_VECTOR):
         moving += forces[0, i] != 0.0 or forces[1, i] != 0.0 or forces[2, i] != 0.0
+    of = width, size, begin, middle, end, shift, forces, stride
     if moving >= FULL_BLOCK:
-        work[0] += 6.0 * LANES_PER_VECTOR * size
-        subtract_block(columns, first, m // 3, b * m, size, forces, stride, place, target)
+        work[0] += 6.0 * LANES_PER_VECTOR * (end - begin)
+        subtract_block(columns, first, *of, place, target)
         return
-    work[0] += 6.0 * moving * size
+    work[0] += 6.0 * moving * (end - begin)
     for lane in range(LANES_PER_VECTOR):
         i = place + lane
         if forces[0, i] != 0.0 or forces[1, i] != 0.0 or forces[2, i] != 0.0:
-            subtract_node(columns, first + lane, m // 3, b * m, size, forces, stride, i, target)
+            subtract_node(columns, first + lane, *of, i, target)
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def violation(w, f, i, table, before, load1):
     """What the friction law wants more of the forces of node i at its displacements: normal and two
     tangential ones.

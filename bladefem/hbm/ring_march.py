@@ -19,9 +19,9 @@ from numba import njit
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
 from ..util.numba_options import INNER_KERNEL, KERNEL
-from .blade_forces import no_inverses
+from .blade_forces import no_factors
 from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_envelope, scatter
-from .linear.array_copy import copy_vector
+from .linear.array_copy import clear_vector, copy_vector
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
@@ -33,11 +33,19 @@ from .ring_contacts import (
     places_of_nodes,
     ring_contacts,
 )
-from .ring_readings import displacements, modal_forces, ring_readings
+from .ring_readings import (
+    ReadingRoom,
+    RingReadings,
+    displacements,
+    push,
+    read,
+    reading_room,
+    ring_readings,
+)
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
-from .step_forces import contact_forces
+from .step_forces import StepRoom, contact_forces, less_preload, step_room
 from .stiffening_layer import RingLayer, reached_springs, ring_layer, stiffening_forces
 
 # of the instants of a period
@@ -179,12 +187,12 @@ def _marched(
     False where the forces of a step were not found, or are no numbers.
     """
     try:
-        found = bool(_march(y, forces, *prepared, motion, friction_work, work))
+        done = _march(y, forces, *prepared, motion, friction_work, work)
     except np.linalg.LinAlgError:
         # of a Newton step that is not determined
-        motion[:] = np.nan
-        return False
-    return found and bool(np.isfinite(motion).all())
+        done = 0
+    motion.reshape(-1, motion.shape[2])[done:] = np.nan
+    return bool(np.isfinite(motion).all())
 
 
 def _leapt(
@@ -218,7 +226,7 @@ def _leap(
     """Move the modal state y along the envelope, and the contacts with it, so that no step of
     theirs is a large one.
     """
-    w, readings, probe = prepared[0], prepared[2], prepared[-1][0]
+    w, readings, probe = prepared[0], prepared[2], prepared[-2][0]
     moved = moved_envelope(system, probe, y, omega, leap)
     w += displacements(readings, (moved - y)[: len(system.stiffness)])
     y[:] = moved
@@ -308,18 +316,17 @@ def _prepared(
     places = places_of_directions(len(e.kt), model.directions)
     nodes = places_of_nodes(len(e.kt))
     probes = len(system.probe) // r
+    readings = ring_readings(system, places)
     return (
         resolved,
         layer,
         (
             in_places(w.reshape(r, own), places),
             tuple(map(_step_terms, (E, -G0, -G1))),
-            ring_readings(system, places),
-            ring_contacts(
-                np.column_stack([e.kt, e.kn, e.mu]), F, model.preload, stiffens=layer is not None
-            ),
+            readings,
+            ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
             layer,
-            no_inverses(r, len(places)),
+            no_factors(r, len(places)),
             # a place without a node is open
             in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
             in_places(free.reshape(S, r, own), places),
@@ -330,6 +337,7 @@ def _prepared(
                 ),
                 np.ascontiguousarray(free_probe),
             ),
+            _march_room(readings, r, len(nodes)),
         ),
     )
 
@@ -439,12 +447,55 @@ def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
     return np.asarray(_of_wave(amplitudes, r).sum(axis=0).real)
 
 
-@njit(**KERNEL)
+class _MarchRoom(NamedTuple):
+    """What the steps of a march fill anew, kept so that none makes arrays."""
+
+    # of the contacts (`bladefem.hbm.step_forces`), and of readings (`bladefem.hbm.ring_readings`)
+    step: StepRoom
+    reading: ReadingRoom
+    # (M,) modal forces, (2 M,) modal displacements and velocities after the step
+    modal: np.ndarray
+    moved: np.ndarray
+    # (r, 3 width) contact forces beyond the preload, and displacements without them
+    extra: np.ndarray
+    free: np.ndarray
+    # (2, r, 3, width) changes of the forces in the last steps
+    change: np.ndarray
+
+
+def _march_room(readings: RingReadings, blades: int, width: int) -> _MarchRoom:
+    M = len(readings.by_mode)
+    rows = blades, 3 * width
+    return _MarchRoom(
+        step_room(blades, width),
+        reading_room(readings),
+        modal=np.zeros(M),
+        moved=np.zeros(2 * M),
+        extra=np.zeros(rows),
+        free=np.zeros(rows),
+        change=np.zeros((2, blades, 3, width)),
+    )
+
+
+@njit(_nrt=False, **KERNEL)
 def _march(
-    y, f, w, steps, readings, contacts, layer, kept, load, free, probe, motion, friction_work, work
+    y,
+    f,
+    w,
+    steps,
+    readings,
+    contacts,
+    layer,
+    kept,
+    load,
+    free,
+    probe,
+    room,
+    motion,
+    friction_work,
+    work,
 ):
-    """Fill motion (periods, S, r), and friction_work (periods,) of all blades; False where the
-    forces of a step were not found.
+    """Fill motion (periods, S, r), and friction_work (periods,) of all blades, step by step.
 
     Args:
         y: (2M,) modal displacements and velocities, changed.
@@ -457,51 +508,45 @@ def _march(
         free: (S, r, 3 width) motion without contact forces.
         probe: readings (r, M), flexibility (r, r 3 width) and free motion (S, r).
         work: (1,) takes the operations of the contact forces.
+
+    Returns:
+        the number of the step whose forces were not found; periods S where all were.
     """
     E, before, after = steps
     reading, flexible, steady = probe
     periods, S, _ = motion.shape
-    M = len(y) // 2
-    extra = f.copy().reshape(w.shape)
+    moved, modal, c, extra, change = room.moved, room.modal, room.free, room.extra, room.change
     for b in range(len(w)):
-        for k in range(len(contacts.preload)):
-            extra[b, k] -= contacts.preload[k]
-    modal = modal_forces(readings, extra)
-    moved = np.empty(2 * M)
-    change = np.zeros((2, *f.shape))
-    pushed = extra.reshape(w.size)
-    f_before, w_before = f.copy(), w.copy()
+        less_preload(f[b].reshape(extra.shape[1]), contacts.preload, extra[b])
+    clear_vector(change.reshape(change.size))
+    push(readings, extra, modal, room.reading)
     for k in range(periods * S):
-        seen, given = np.dot(reading, y[:M]), np.dot(flexible, pushed)
-        for b in range(len(seen)):
-            motion[k // S, k % S, b] = steady[k % S, b] + seen[b] - given[b]
+        for b in range(len(reading)):
+            seen = _product(reading[b], y) - _product(flexible[b], extra.reshape(extra.size))
+            motion[k // S, k % S, b] = steady[k % S, b] + seen
         j = (k + 1) % S
-        moved[:] = 0.0
+        clear_vector(moved)
         _add_product(E, y, moved)
         _add_product(before, modal, moved)
-        c = displacements(readings, moved[:M])
+        read(readings, moved, c, room.reading)
         for b in range(len(c)):
             for place in range(c.shape[1]):
                 c[b, place] += free[j, b, place]
-        copy_vector(f.reshape(f.size), f_before.reshape(f.size))
-        copy_vector(w.reshape(w.size), w_before.reshape(w.size))
-        loads = load[k % S], load[j]
+        state = c, contacts, kept, w, f, change, extra, load[k % S], load[j], work, room.step
         if layer is None:
-            found = contact_forces(c, contacts, kept, w, f, change, extra, *loads, work)
+            found = contact_forces(*state)
         else:
-            found = stiffening_forces(c, contacts, layer, kept, w, f, change, extra, *loads, work)
+            found = stiffening_forces(*state[:2], layer, *state[2:])
         if not found:
-            motion[k // S, k % S :] = np.nan
-            motion[k // S + 1 :] = np.nan
-            return False
-        friction_work[k // S] += _work_of_step(f_before, w_before, f, w)
-        modal = modal_forces(readings, extra)
+            return k
+        friction_work[k // S] += _work_of_step(room.step.forces, room.step.displacements, f, w)
+        push(readings, extra, modal, room.reading)
         _add_product(after, modal, moved)
         copy_vector(moved, y)
-    return True
+    return periods * S
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _work_of_step(f_before, w_before, f, w):
     """Work of the tangential forces (r, 3, width) on displacements (r, 3 width) in a step, by the
     trapezoidal rule [J].
@@ -516,7 +561,17 @@ def _work_of_step(f_before, w_before, f, w):
     return total
 
 
-@njit(**INNER_KERNEL)
+# the order of the sum is free, so that it is vectorised
+@njit(fastmath={"reassoc", "contract"}, _nrt=False, **INNER_KERNEL)
+def _product(row, values):
+    """Sum of row (n,) times the first n values."""
+    total = 0.0
+    for k in range(len(row)):
+        total += row[k] * values[k]
+    return total
+
+
+@njit(_nrt=False, **INNER_KERNEL)
 def _add_product(terms, x, target):
     """target (n,) becomes target plus the matrix (n, k) times x (k,)."""
     for term in range(len(terms.columns)):

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from ..util.numba_options import INNER_KERNEL, KERNEL
+from .linear.array_copy import clear_vector
 from .ring_contacts import in_places
 from .sector_modes import SectorModes
 
@@ -61,47 +62,69 @@ def ring_readings(system: SectorModes, places: np.ndarray) -> RingReadings:
     )
 
 
-@njit(**KERNEL)
-def displacements(readings, q):
-    """(r, k) displacements of modal coordinates q (M,)."""
+class ReadingRoom(NamedTuple):
+    """Where sums of a reading are kept on their way."""
+
+    # (M,) of modes, (k,) of displacements or forces of a blade
+    modes: np.ndarray
+    blade: np.ndarray
+
+
+def reading_room(readings: RingReadings) -> ReadingRoom:
+    """For `read` and `push`."""
     M, size = readings.by_mode.shape
-    blades = readings.turns.shape[2]
-    moved = np.zeros((blades, size))
-    sorted_q = np.empty(M)
-    seen = np.empty(size)
+    return ReadingRoom(np.empty(M), np.empty(size))
+
+
+def displacements(readings: RingReadings, q: np.ndarray) -> np.ndarray:
+    """(r, k) displacements of modal coordinates q (M,)."""
+    moved = np.empty((readings.turns.shape[2], readings.by_mode.shape[1]))
+    read(readings, q, moved, reading_room(readings))
+    return moved
+
+
+def modal_forces(readings: RingReadings, forces: np.ndarray) -> np.ndarray:
+    """(M,) forces in the modes of forces (r, k) on the blades."""
+    total = np.empty(len(readings.by_mode))
+    push(readings, forces, total, reading_room(readings))
+    return total
+
+
+@njit(_nrt=False, **KERNEL)
+def read(readings, q, moved, room):
+    """moved (r, k) becomes the displacements of modal coordinates q (M,)."""
+    blades = len(moved)
+    sorted_q, seen = room.modes, room.blade
+    for b in range(blades):
+        clear_vector(moved[b])
     for group in range(len(readings.parts)):
         first, last = readings.starts[group], readings.starts[group + 1]
         for part in range(readings.parts[group]):
             for i in range(first, last):
                 sorted_q[i] = q[readings.modes[part, i]]
-            seen[:] = 0.0
+            clear_vector(seen)
             _add_product(sorted_q[first:last], readings.by_mode[first:last], seen)
             for b in range(blades):
                 _add_multiple(readings.turns[part, group, b], seen, moved[b])
-    return moved
 
 
-@njit(**INNER_KERNEL)
-def modal_forces(readings, forces):
-    """(M,) forces in the modes of forces (r, k) on the blades."""
-    blades, size = forces.shape
-    M = len(readings.by_mode)
-    total = np.zeros(M)
-    joined = np.empty(size)
-    seen = np.empty(M)
+@njit(_nrt=False, **KERNEL)
+def push(readings, forces, total, room):
+    """total (M,) becomes the forces in the modes of forces (r, k) on the blades."""
+    seen, joined = room.modes, room.blade
+    clear_vector(total)
     for group in range(len(readings.parts)):
         first, last = readings.starts[group], readings.starts[group + 1]
         for part in range(readings.parts[group]):
-            joined[:] = 0.0
-            for b in range(blades):
+            clear_vector(joined)
+            for b in range(len(forces)):
                 _add_multiple(readings.turns[part, group, b], forces[b], joined)
             _product(readings.by_mode[first:last], joined, seen[first:last])
             for i in range(first, last):
                 total[readings.modes[part, i]] += seen[i]
-    return total
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _add_multiple(factor, values, target):
     """target (k,) becomes target + factor * values (k,)."""
     if factor != 0.0:
@@ -113,7 +136,7 @@ def _add_multiple(factor, values, target):
 # another order and in one instruction with a product, so that they are vectorised.
 
 
-@njit(fastmath={"contract"}, **INNER_KERNEL)
+@njit(fastmath={"contract"}, _nrt=False, **INNER_KERNEL)
 def _add_product(x, matrix, target):
     """target (k,) becomes target plus x (n,) times the matrix (n, k), four of its rows at a time:
     the target is read and written once for all of them.
@@ -133,7 +156,7 @@ def _add_product(x, matrix, target):
             target[k] += x[i] * matrix[i, k]
 
 
-@njit(fastmath={"contract", "reassoc"}, **INNER_KERNEL)
+@njit(fastmath={"contract", "reassoc"}, _nrt=False, **INNER_KERNEL)
 def _product(matrix, x, target):
     """target (n,) becomes the matrix (n, k) times x (k,), four of its rows at a time."""
     together = len(target) // 4 * 4

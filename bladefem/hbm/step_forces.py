@@ -11,6 +11,8 @@ Where that does not either, all nodes do, with the exact derivative of the law o
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numba import njit
 
@@ -18,20 +20,25 @@ from ..friction.simd.codegen import LANES_PER_VECTOR
 from ..friction.simd.node_steps import KN, node_steps
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import by_blades, note_step
-from .linear.array_copy import copy_vector
+from .linear.array_copy import clear_vector, copy_vector
 from .ring_contacts import (
     NODE_OPERATIONS,
     displace,
     of_blade,
+    subtract_from_others,
+    subtract_from_own,
     subtract_moved,
-    table_of_blade,
     violation,
 )
 
-# most sweeps over the nodes in a step
-SWEEPS = 20
+# most sweeps over the nodes in a step; ten of them take the time of one Newton step of each blade
+SWEEPS = 30
 # change of a force in a sweep that counts as none, over the largest force
 SETTLED = 1e-6
+# sweeps in a step beyond which blades are taken one by one in the next, and the change of a blade's
+# forces over its first one with which the others follow
+SWEEPS_TOGETHER = 6
+NEARLY_SETTLED = 0.02
 
 # Newton steps of all nodes together, and halvings of one
 NEWTON_STEPS = 40
@@ -40,8 +47,41 @@ HALVINGS = 10
 DECREASE = 1e-4
 
 
-@njit(**KERNEL)
-def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
+class StepRoom(NamedTuple):
+    """What a step of a march fills anew, kept so that none makes arrays."""
+
+    # (r, 3, width) contact forces and (r, 3 width) displacements before the step
+    forces: np.ndarray
+    displacements: np.ndarray
+    # (r, 3, width) forces that were guessed
+    ahead: np.ndarray
+    # changes of the forces of a block of nodes (3, LANES_PER_VECTOR), and of a blade (3, width)
+    block: np.ndarray
+    total: np.ndarray
+    # (1,) blades are taken one by one
+    apart: np.ndarray
+    # of a layer that stiffens: (r, width) forces at which tangents are taken, and (2, r, width)
+    # normal loads at zero displacement by them
+    tangents: np.ndarray
+    loads: np.ndarray
+
+
+def step_room(blades: int, width: int) -> StepRoom:
+    """Of r blades with nodes in rows of ``width``."""
+    return StepRoom(
+        forces=np.zeros((blades, 3, width)),
+        displacements=np.zeros((blades, 3 * width)),
+        ahead=np.zeros((blades, 3, width)),
+        block=np.zeros((3, LANES_PER_VECTOR)),
+        total=np.zeros((3, width)),
+        apart=np.zeros(1, dtype=bool),
+        tangents=np.zeros((blades, width)),
+        loads=np.zeros((2, blades, width)),
+    )
+
+
+@njit(_nrt=False, **KERNEL)
+def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work, room):
     """Forces at the end of a step, of w = c - F extra: f, extra and w are those before, and then
     those after. False where they were not found.
 
@@ -57,58 +97,65 @@ def contact_forces(c, contacts, kept, w, f, change, extra, load0, load1, work):
         load0, load1: (r, width) normal loads at zero displacement before and after the step,
             negative where there is no node.
         work: (1,) takes the operations.
+        room: `StepRoom`; has forces and displacements before the step afterwards.
     """
-    before = f.copy(), w.copy(), load0
+    note_start(f, w, room)
     limit = SETTLED * largest_force(contacts.preload, f)
     add_parabola(change.reshape(2, f.size), f.reshape(f.size))
-    found = settled_forces(c, contacts, kept, w, f, before, load1, limit, work)
-    note_forces(contacts.preload, f, before[0], change, extra)
+    found = settled_forces(c, contacts, kept, w, f, load0, load1, limit, work, room)
+    note_forces(contacts.preload, f, change, extra, room)
     return found
 
 
-# as part of its callers: arrays of a tuple that is handed on are counted anew at each call, which
-# took a fifth of a march of one node
-@njit(inline="always", **INNER_KERNEL)
-def settled_forces(c, contacts, kept, w, f, before, load1, limit, work):
+@njit(_nrt=False, **INNER_KERNEL)
+def note_start(f, w, room):
+    """Forces and displacements before a step are kept."""
+    copy_vector(f.reshape(f.size), room.forces.reshape(f.size))
+    copy_vector(w.reshape(w.size), room.displacements.reshape(w.size))
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def settled_forces(c, contacts, kept, w, f, load0, load1, limit, work, room):
     """The forces f, which are guesses before, until none changes by more than a limit, and their
     displacements w; False where they were not found. Other arguments as those of `contact_forces`.
-
-    Args:
-        before: forces, displacements and loads before the step.
     """
-    ahead = f.copy()
+    before = room.forces, room.displacements, load0
+    copy_vector(f.reshape(f.size), room.ahead.reshape(f.size))
     found = False
     if kept.steps[0] > 0:
         kept.steps[0] -= 1
     else:
-        found = _by_blocks(c, contacts, w, f, before, load1, limit, work)
+        if room.apart[0]:
+            found = _by_blocks_apart(c, contacts, w, f, before, load1, limit, work, room)
+        else:
+            found = _by_blocks(c, contacts, w, f, before, load1, limit, work, room)
         note_step(kept, found)
     if not found:
         # steps that do not settle lead away
-        copy_vector(ahead.reshape(f.size), f.reshape(f.size))
+        copy_vector(room.ahead.reshape(f.size), f.reshape(f.size))
         found = by_blades(c, contacts, kept, w, f, before, load1, limit, work)
     if not found:
-        copy_vector(before[0].reshape(f.size), f.reshape(f.size))
+        copy_vector(room.forces.reshape(f.size), f.reshape(f.size))
         found = _together(c, contacts, w, f, before, load1, limit, work)
     return found
 
 
-@njit(inline="always", **INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def largest_force(preload, f):
     """Of the preload (3 width,) and of forces f (r, 3, width) [N]."""
     return max(_largest(preload), _largest(f.reshape(f.size)))
 
 
-@njit(inline="always", **INNER_KERNEL)
-def note_forces(preload, f, start, change, extra):
-    """Extra forces and changes of a step from forces ``start`` to f."""
+@njit(_nrt=False, **INNER_KERNEL)
+def note_forces(preload, f, change, extra, room):
+    """Extra forces and changes of a step that ended on forces f."""
     for b in range(len(f)):
-        _less_preload(f[b].reshape(extra.shape[1]), preload, extra[b])
-    _shift_changes(f.reshape(f.size), start.reshape(f.size), change.reshape(2, f.size))
+        less_preload(f[b].reshape(extra.shape[1]), preload, extra[b])
+    _shift_changes(f.reshape(f.size), room.forces.reshape(f.size), change.reshape(2, f.size))
 
 
 # the order of a maximum is free, so that it is vectorised
-@njit(fastmath={"nnan", "nsz", "reassoc"}, **INNER_KERNEL)
+@njit(fastmath={"nnan", "nsz", "reassoc"}, _nrt=False, **INNER_KERNEL)
 def _largest(values):
     found = 0.0
     for k in range(len(values)):
@@ -116,7 +163,7 @@ def _largest(values):
     return found
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def add_parabola(change, target):
     """target (k,) goes on as by the changes (2, k) in the last step and the one before."""
     last, before = change[0], change[1]
@@ -124,13 +171,13 @@ def add_parabola(change, target):
         target[k] += 2.0 * last[k] - before[k]
 
 
-@njit(**INNER_KERNEL)
-def _less_preload(f, preload, extra):
+@njit(_nrt=False, **INNER_KERNEL)
+def less_preload(f, preload, extra):
     for k in range(len(extra)):
         extra[k] = f[k] - preload[k]
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _shift_changes(f, start, change):
     """change (2, k) of forces becomes that from start (k,) to f (k,), and what it was."""
     last, before = change[0], change[1]
@@ -139,23 +186,24 @@ def _shift_changes(f, start, change):
         last[k] = f[k] - start[k]
 
 
-@njit(**INNER_KERNEL)
-def _by_blocks(c, contacts, w, f, before, load1, limit, work):
-    """Sweeps over the nodes, each with a Newton step of its own; False where they do not settle.
+@njit(_nrt=False, **INNER_KERNEL)
+def _by_blocks(c, contacts, w, f, before, load1, limit, work, room):
+    """Sweeps over the nodes of all blades, each with a Newton step of its own; False where they do
+    not settle.
 
     Displacements follow each force that changes: nodes that are open, most of them where a damper
     comes off, cost nothing but their displacement.
     """
     blades, _, width = f.shape
-    step = np.zeros((3, LANES_PER_VECTOR))
+    step = room.block
     displace(c, contacts, f, w, work)
     # a first sweep says nothing of how fast they settle
     last = 0.0
-    for _ in range(SWEEPS):
+    for sweep in range(SWEEPS):
         largest_step = 0.0
         for b in range(blades):
             old = of_blade(before, b)
-            table = table_of_blade(contacts.table, b)
+            table = contacts.table[b]
             for first in range(0, width, LANES_PER_VECTOR):
                 if _are_open(table[KN], w[b], f[b], load1[b], first):
                     continue
@@ -166,12 +214,66 @@ def _by_blocks(c, contacts, w, f, before, load1, limit, work):
         # by how much the next one would change a force, if it falls again as it did
         ahead = largest_step * min(largest_step / last, 1.0) if last > 0.0 else largest_step
         if ahead <= limit:
+            room.apart[0] = sweep >= SWEEPS_TOGETHER
             return True
         last = largest_step
+    room.apart[0] = True
     return False
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
+def _by_blocks_apart(c, contacts, w, f, before, load1, limit, work, room):
+    """As `_by_blocks`, where many sweeps are needed: the displacements of the other blades, which
+    a blade hardly moves, follow when its nodes are nearly settled.
+    """
+    blades, _, width = f.shape
+    step = room.block
+    displace(c, contacts, f, w, work)
+    last = 0.0
+    most = SWEEPS * blades
+    sweeps = 0
+    while sweeps < most:
+        largest = 0.0
+        for b in range(blades):
+            old = of_blade(before, b)
+            table = contacts.table[b]
+            clear_vector(room.total.reshape(3 * width))
+            first_step = 0.0
+            settled = False
+            while not settled:
+                largest_step = 0.0
+                for first in range(0, width, LANES_PER_VECTOR):
+                    if _are_open(table[KN], w[b], f[b], load1[b], first):
+                        continue
+                    work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
+                    node_steps(first, width, table, contacts.own, *old, load1[b], w[b], f[b], step)
+                    largest_step = max(largest_step, _largest(step.reshape(step.size)))
+                    subtract_from_own(contacts.columns, b, first, step, 0, w, work)
+                    _add_block(step, first, room.total)
+                sweeps += 1
+                first_step = max(first_step, largest_step)
+                enough = max(limit, NEARLY_SETTLED * first_step)
+                settled = largest_step <= enough or sweeps >= most
+            largest = max(largest, first_step)
+            for first in range(0, width, LANES_PER_VECTOR):
+                subtract_from_others(contacts.columns, b, first, room.total, first, w, work)
+        ahead = largest * min(largest / last, 1.0) if last > 0.0 else largest
+        if ahead <= limit:
+            room.apart[0] = sweeps > SWEEPS_TOGETHER * blades
+            return True
+        last = largest
+    return False
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def _add_block(step, first, total):
+    """Changes (3, LANES_PER_VECTOR) of a block of nodes are added to those (3, width) of all."""
+    for k in range(3):
+        for lane in range(LANES_PER_VECTOR):
+            total[k, first + lane] += step[k, lane]
+
+
+@njit(_nrt=False, **INNER_KERNEL)
 def _are_open(kn, w, f, load1, first):
     """The nodes of a block have no force, and get none."""
     for i in range(first, first + LANES_PER_VECTOR):
@@ -180,7 +282,7 @@ def _are_open(kn, w, f, load1, first):
     return True
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=True, **INNER_KERNEL)
 def _together(c, contacts, w, f, before, load1, limit, work):
     """Newton steps of all nodes at once, shortened until the violation falls; False where it does
     not vanish.
@@ -257,7 +359,7 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
             w[b, k] = c[b, k] - _product(F[b * m + k], extra)
     total = 0.0
     for b in range(blades):
-        table = table_of_blade(contacts.table, b)
+        table = contacts.table[b]
         for i in range(width):
             own, (b00, b10, b20, b11, b12, b22) = violation(
                 w[b], f[b], i, table, of_blade(before, b), load1[b]
@@ -272,7 +374,7 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
 
 
 # the order of the sum is free, so that it is vectorised
-@njit(fastmath={"reassoc", "contract"}, **INNER_KERNEL)
+@njit(fastmath={"reassoc", "contract"}, _nrt=False, **INNER_KERNEL)
 def _product(a, b):
     total = 0.0
     for k in range(len(a)):

@@ -21,7 +21,7 @@ from ..util.numba_options import INNER_KERNEL, KERNEL
 from .linear.array_copy import copy_vector
 from .model import ReducedModel
 from .ring_contacts import in_places, places_of_nodes
-from .step_forces import add_parabola, largest_force, note_forces, settled_forces
+from .step_forces import add_parabola, largest_force, note_forces, note_start, settled_forces
 
 # most times that tangents are taken in a step, and from which one on half of the way to the next is
 # gone
@@ -108,35 +108,34 @@ def reached_springs(model: ReducedModel, layer: RingLayer) -> np.ndarray:
     return springs
 
 
-@njit(**KERNEL)
-def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load1, work):
+@njit(_nrt=False, **KERNEL)
+def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load1, work, room):
     """As `bladefem.hbm.step_forces.contact_forces`, by the law of a layer (`RingLayer`); the tables
     of the contacts become its tangents.
     """
-    start = f.copy(), w.copy()
+    note_start(f, w, room)
     largest = largest_force(contacts.preload, f)
     add_parabola(change.reshape(2, f.size), f.reshape(f.size))
-    tangent_at = np.maximum(f[:, 0], 0.0)
-    loads = load0.copy(), load1.copy()
+    tangent_at, loads = room.tangents, room.loads
+    for b in range(len(f)):
+        for i in range(len(load0[b])):
+            tangent_at[b, i] = max(f[b, 0, i], 0.0)
+            loads[0, b, i], loads[1, b, i] = load0[b, i], load1[b, i]
     found = False
     settled = SETTLED
     for turn in range(TANGENTS):
         for b in range(len(w)):
-            _take_tangents(
-                layer,
-                tangent_at[b],
-                start[0][b],
-                start[1][b],
-                contacts.table[b],
-                loads[0][b],
-                loads[1][b],
-            )
+            start = room.forces[b], room.displacements[b]
+            table = contacts.table[b]
+            _take_tangents(layer, tangent_at[b], *start, table, loads[0, b], loads[1, b])
         work[0] += TANGENT_OPERATIONS * tangent_at.size
-        before = start[0], start[1], loads[0]
-        if not settled_forces(c, contacts, kept, w, f, before, loads[1], settled * largest, work):
+        limit = settled * largest
+        if not settled_forces(c, contacts, kept, w, f, loads[0], loads[1], limit, work, room):
             # springs too stiff for their forces to be found: softer ones, and less exactly
-            copy_vector(start[0].reshape(f.size), f.reshape(f.size))
-            tangent_at *= SOFTER
+            copy_vector(room.forces.reshape(f.size), f.reshape(f.size))
+            for b in range(len(f)):
+                for i in range(len(load0[b])):
+                    tangent_at[b, i] *= SOFTER
             settled = min(settled * LOOSER, OFF_THE_LAW)
             continue
         # an impact raises all forces far above those before
@@ -148,14 +147,14 @@ def stiffening_forces(c, contacts, layer, kept, w, f, change, extra, load0, load
         if off <= OFF_THE_LAW * largest:
             found = True
             break
-    note_forces(contacts.preload, f, start[0], change, extra)
+    note_forces(contacts.preload, f, change, extra, room)
     for b in range(len(f)):
         for i in range(len(layer.reached)):
             layer.reached[i] = max(layer.reached[i], f[b, 0, i])
     return found
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _take_tangents(layer, at, f_before, w_before, table, load0, load1):
     """Stiffnesses (3, width) of the table, and loads (width,) at zero displacement before and after
     the step, become those of tangents of the law at forces (width,).
@@ -181,7 +180,7 @@ def _take_tangents(layer, at, f_before, w_before, table, load0, load1):
         load0[i] = normal - kn * w_before[i]
 
 
-@njit(**KERNEL)
+@njit(_nrt=False, **KERNEL)
 def _tangent_springs(layer, i, force):
     """Normal and tangential stiffness of the element in place i at a normal force, less the
     compliance that the bodies have.
@@ -193,7 +192,7 @@ def _tangent_springs(layer, i, force):
     return normal, tangential / (1.0 - tangential * layer.series[1, i])
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _off_the_law(layer, w, f, share, at):
     """How far the forces (width,) on the tangents are from the law at most [N]; the next tangents
     are to be taken at forces ``at`` (width,), changed by a share of the way there.

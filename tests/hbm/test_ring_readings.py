@@ -5,16 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from models import bouncing
-from numba import njit
 
 from bladefem.hbm.ring_contacts import in_places, places_of_directions
 from bladefem.hbm.ring_readings import displacements, modal_forces, ring_readings
 from bladefem.hbm.sector_modes import sector_modes
-
-
-@njit
-def forces_in_modes(readings, forces):
-    return modal_forces(readings, forces)
 
 
 @pytest.mark.parametrize("blades", [1, 2, 3, 4, 5])
@@ -40,5 +34,5 @@ def test_modes_sorted_by_how_they_turn_are_read_as_by_the_matrix(blades):
         in_places(seen, places), rel=1e-12, abs=1e-15
     )
     forces = rng.standard_normal((blades, 3))
-    found = forces_in_modes(readings, in_places(forces, places))
+    found = modal_forces(readings, in_places(forces, places))
     assert found == pytest.approx(system.contact.T @ forces.ravel(), rel=1e-12, abs=1e-15)

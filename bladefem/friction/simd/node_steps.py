@@ -185,13 +185,15 @@ def node_steps(code: Code, i, width, table, flexibility, before, old, load0, loa
         code.store(now[row] + x, f, (row, width), i)
 
 
-def _subtract(code, nodes, columns, i, width, shift, size, forces, stride, place, target) -> None:
+def _subtract(
+    code, nodes, columns, i, width, size, begin, middle, end, shift, forces, stride, place, target
+) -> None:
     """As `subtract_block`, of so many nodes."""
     places = [(row, lane) for row in range(3) for lane in range(nodes)]
     given = [code.spread(code.one(forces, (stride, row), place, lane)) for row, lane in places]
-    here = code.place(size, (shift, -1))
-    for begin, end, moved in ((0, here, shift), (here, size, code.place((here, -1)))):
-        with code.loop(begin, end, LANES_PER_VECTOR) as k:
+    back = code.place(shift, (size, -1))
+    for first, last, moved in ((begin, middle, shift), (middle, end, back)):
+        with code.loop(first, last, LANES_PER_VECTOR) as k:
             total = code.load(target, k, moved)
             for (row, lane), force in zip(places, given, strict=True):
                 column = code.place((width, row), i, lane)
@@ -200,19 +202,50 @@ def _subtract(code, nodes, columns, i, width, shift, size, forces, stride, place
 
 
 @kernel
-def subtract_block(code: Code, columns, i, width, shift, size, forces, stride, place, target):
+def subtract_block(
+    code: Code,
+    columns,
+    i,
+    width,
+    size,
+    begin,
+    middle,
+    end,
+    shift,
+    forces,
+    stride,
+    place,
+    target,
+):
     """The displacements target (size,) become less those by the forces of the block of nodes from
     place i on.
 
     Args:
         columns: (3 width, size) displacements by each force on the first blade, blade by blade.
-        shift: of the place in ``target`` where those of the nodes' own blade begin.
+        begin, middle, end: those of them that are meant; up to the middle one the target has them
+            ``shift`` places further on, from there on that less ``size``.
         forces: in rows of ``stride``, from a place there on.
     """
-    _subtract(code, LANES_PER_VECTOR, columns, i, width, shift, size, forces, stride, place, target)
+    where = columns, i, width, size, begin, middle, end, shift
+    _subtract(code, LANES_PER_VECTOR, *where, forces, stride, place, target)
 
 
 @kernel
-def subtract_node(code: Code, columns, i, width, shift, size, forces, stride, place, target):
+def subtract_node(
+    code: Code,
+    columns,
+    i,
+    width,
+    size,
+    begin,
+    middle,
+    end,
+    shift,
+    forces,
+    stride,
+    place,
+    target,
+):
     """The same of one node."""
-    _subtract(code, 1, columns, i, width, shift, size, forces, stride, place, target)
+    where = columns, i, width, size, begin, middle, end, shift
+    _subtract(code, 1, *where, forces, stride, place, target)

@@ -22,3 +22,10 @@ def copy_matrix(source, target):
     for i in range(source.shape[0]):
         for j in range(source.shape[1]):
             target[i, j] = source[i, j]
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def clear_vector(target):
+    """target (n,) becomes zero."""
+    for i in range(target.shape[0]):
+        target[i] = 0
