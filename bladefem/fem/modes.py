@@ -98,9 +98,10 @@ def proven_pairs(
         return lam, X
     upper, expected = _counting_shift(lam)
     if not keep:
+        # the count takes their place: not given back in between
         release(flex.con.K, flex.factor)
-        give_back()
     exact = count_below(flex.con, upper)
+    give_back()
     if exact == expected:
         return lam, X
     flex = flex if keep else flexible(flex.con)

@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import IndefiniteError, NotSolvedError
-from .compat import PETSc, no_error_messages
+from .compat import PETSc, no_error_messages, pages_kept
 
 # columns a solve: MUMPS works on them by matrix products, 256 are no faster
 COLUMNS_PER_SOLVE = 128
@@ -87,7 +87,8 @@ def factorise_matrix(
             index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
             petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
         in_order = None if order is None else partial(_in_order, F, A, order)
-        failed = _factorise_numeric(in_order or pc.setUp)
+        with pages_kept(large=True):
+            failed = _factorise_numeric(in_order or pc.setUp)
         if F.getMumpsInfog(1) not in ESTIMATE_EXCEEDED:
             break
     code = F.getMumpsInfog(1)

@@ -182,16 +182,49 @@ assert resident_memory() - before < LARGE_BLOCK
 """
 
 
+PAGES_THAT_SERVE_AGAIN = """
+import ctypes, resource
+from resident import resident_memory
+from bladefem.fem.compat import LARGE_BLOCK, pages_kept
+from bladefem.fem.memory import give_back
+library = ctypes.CDLL(None)
+library.malloc.restype = library.memset.restype = ctypes.c_void_p
+library.memset.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t]
+library.malloc.argtypes, library.free.argtypes = [ctypes.c_size_t], [ctypes.c_void_p]
+def filled():
+    block = library.malloc(4 * LARGE_BLOCK)
+    library.memset(block, 1, 4 * LARGE_BLOCK)
+    return block
+def cleared():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt * resource.getpagesize()
+before = resident_memory()
+with pages_kept(large=True):
+    block = filled()
+    above = library.malloc(1000)
+    library.free(block)
+    assert resident_memory() - before > 3.9 * LARGE_BLOCK
+    handed_out = cleared()
+    library.free(filled())
+    assert cleared() - handed_out < LARGE_BLOCK / 10
+give_back()
+assert resident_memory() - before < LARGE_BLOCK / 10
+block = filled()
+library.free(block)
+assert resident_memory() - before < LARGE_BLOCK / 10
+"""
+
+
 @needs_readings
-def test_large_blocks_go_back_to_the_system():
-    """Those below another one that is still there, too, which MPI's settings keep.
+@pytest.mark.parametrize("script", [BLOCK_THAT_GOES_BACK, PAGES_THAT_SERVE_AGAIN])
+def test_large_blocks_go_back_to_the_system(script):
+    """Those below another one that is still there, too, which MPI's settings keep; amid a block
+    that asks for it their pages wait, to serve again.
 
     In a process of its own: one that ran other tests may have a hole that the block fits into.
     """
     paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
     environment = {**os.environ, "PYTHONPATH": paths}
-    command = [sys.executable, "-c", BLOCK_THAT_GOES_BACK]
-    subprocess.run(command, env=environment, check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=120)
 
 
 @needs_readings

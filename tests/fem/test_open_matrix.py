@@ -6,9 +6,10 @@ import scipy.sparse as sp
 from structured import sector
 
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import transformation
+from bladefem.fem.constraint import constrain, transformation
 from bladefem.fem.distributed import local_rows, shared_rows
 from bladefem.fem.linalg import recombine
+from bladefem.fem.modes import modes
 from bladefem.fem.open_matrix import (
     Repeated,
     Selected,
@@ -87,6 +88,20 @@ def test_the_stiffness_of_an_open_sector_is_the_body_s_own_memory(body):
     for A, whole in ((opened.K, body.K), (opened.M, body.M)):
         expected = local_rows(whole)[own][:, own]
         assert abs(entries(A) - expected).max() <= 1e-14 * abs(expected).max()
+
+
+def test_modes_of_a_sector_need_the_mass_of_one_direction_alone():
+    """It is made whole for whoever asks later, and an open sector after that is the same."""
+    body = assemble(sector(8, (4, 3, 2), "tetra10", bump=0.2), "blade", Material())
+    lean = transformation(body, cyclic=True).opened
+    modes(constrain(body, "clamp", 2), 3)
+    assert body.mass.whole is None
+    own = body.scalar_rows[lean.places]
+    expected = local_rows(body.M)[own][:, own]
+    assert abs(entries(lean.M) - expected).max() == 0
+    assert body.mass.of_one_direction is None
+    late = transformation(body, cyclic=True).opened
+    np.testing.assert_array_equal(late.M.nodal.toarray(), lean.M.nodal.toarray())
 
 
 def test_shared_rows_are_the_matrix_and_cannot_be_written_to(body):
