@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 
@@ -87,7 +88,8 @@ def factorise_matrix(
             index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
             petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
         in_order = None if order is None else partial(_in_order, F, A, order)
-        with pages_kept(large=True):
+        # factors that stay would leave the others' pages in pieces
+        with nullcontext() if keep else pages_kept(large=True):
             failed = _factorise_numeric(in_order or pc.setUp)
         if F.getMumpsInfog(1) not in ESTIMATE_EXCEEDED:
             break

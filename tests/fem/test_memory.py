@@ -11,7 +11,7 @@ from resident import needs_readings, resident_memory
 from structured import box, sector
 
 from bladefem.errors import InputError
-from bladefem.fem import memory
+from bladefem.fem import compat, memory, mumps
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import LARGE_BLOCK, MPI
@@ -225,6 +225,29 @@ def test_large_blocks_go_back_to_the_system(script):
     paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
     environment = {**os.environ, "PYTHONPATH": paths}
     subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=120)
+
+
+def test_factors_lie_in_the_heap_only_where_the_count_takes_their_place(monkeypatch):
+    """Those that are kept would leave the pages of others in pieces: 0.3 GiB at 148 000 degrees of
+    freedom after a reduction.
+    """
+    heap, seen = [False], []
+    numeric = mumps._factorise_numeric
+
+    def watched(factorise):
+        seen.append(heap[-1])
+        return numeric(factorise)
+
+    monkeypatch.setattr(compat, "_set_allocator", lambda blocks, _: heap.append(blocks == 0))
+    monkeypatch.setattr(mumps, "_factorise_numeric", watched)
+    body = assemble(sector(8, (4, 3, 1), bump=0.2), "blade", Material())
+    modes(constrain(body, "clamp", 1), 3)
+    assert seen == [True, True]
+    seen.clear()
+    con = constrain(body, "clamp", 1)
+    modes(con, 3, flexible(con))
+    assert seen == [False, True]
+    assert not heap[-1]
 
 
 @needs_readings
