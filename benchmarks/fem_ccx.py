@@ -74,8 +74,8 @@ other work on a faster machine:
      44 892  5          straight     15.0           3.0    5.1  0.42    1.14   3.4e-07      9.8e-06
     146 769  5          curved       88.8          13.2    6.7  1.32    0.81   2.1e-07      1.6e-05
 
-With the mass of one direction alone and pages that the count takes over, beside other work, OpenBLAS
-with kernels of its own choice:
+With the mass of one direction alone and pages that the count takes over, beside other work, with
+OpenBLAS's own choice of kernels:
 
      44 892  5          curved       14.5           2.6    5.5  0.41    1.11   1.8e-07      7.6e-05
      44 892  0          curved       14.9           2.3    6.4  0.41    1.10   3.5e-07      7.3e-05
