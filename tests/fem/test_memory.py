@@ -228,9 +228,7 @@ def test_large_blocks_go_back_to_the_system(script):
 
 
 def test_factors_lie_in_the_heap_only_where_the_count_takes_their_place(monkeypatch):
-    """Those that are kept would leave the pages of others in pieces: 0.3 GiB at 148 000 degrees of
-    freedom after a reduction.
-    """
+    """Those that are kept would leave the pages of others in pieces."""
     heap, seen = [False], []
     numeric = mumps._factorise_numeric
 
