@@ -74,6 +74,13 @@ other work on a faster machine:
      44 892  5          straight     15.0           3.0    5.1  0.42    1.14   3.4e-07      9.8e-06
     146 769  5          curved       88.8          13.2    6.7  1.32    0.81   2.1e-07      1.6e-05
 
+With the mass of one direction alone and pages that the count takes over, beside other work, with
+OpenBLAS's own choice of kernels:
+
+     44 892  5          curved       14.5           2.6    5.5  0.41    1.11   1.8e-07      7.6e-05
+     44 892  0          curved       14.9           2.3    6.4  0.41    1.10   3.5e-07      7.3e-05
+    148 623  5          curved      100.6          11.2    8.9  1.32    0.79   1.1e-07      1.6e-05
+
 Where 16.8 s at 148 773 go: 3.6 s into the Cholesky factorisation, 3.8 s into the count (another
 factorisation, 3.2 s), 3.7 s into 26 sweeps over the factors with SLEPc's one vector. The block
 iteration takes 10 sweeps of six vectors, 3.6 s in place of SLEPc's 5.4 s with all around it.

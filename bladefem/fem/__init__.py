@@ -6,8 +6,8 @@
 - cells: ``shape_functions``, ``cell_functions``, ``cubic_functions``, ``mixed_cells``,
   ``refinement``, ``elasticity``
 - faces: ``face_elements``, ``surface``, ``face_overlap``, ``face_values``
-- bodies: ``body``, ``loads``, ``supports``, ``rotation`` preload, ``gyroscopic``, ``temperature``
-  and ``temperature_field``
+- bodies: ``body``, ``mass``, ``loads``, ``supports``, ``rotation`` preload, ``gyroscopic``,
+  ``temperature`` and ``temperature_field``
 - cyclic symmetry: ``constraint``, ``cut_faces``, ``cyclic_schur``, ``open_sector``,
   ``open_matrix``; over ranks ``groups``, ``subdomains``, ``separators``
 - modes: ``modes``, ``eigensolver``, ``lanczos``, ``all_diameters``, ``stiffness_error`` of the mesh

@@ -25,11 +25,11 @@ from .compat import (
     cell_dofs,
     dolfinx,
     one_component,
-    repeat_components,
     ufl,
     vector_space,
 )
 from .elasticity import Law, elastic_law
+from .mass import Mass
 from .memory import MemoryPlan, check_memory
 from .mixed_cells import pieces_of_one_shape, spread_matrix
 from .temperature import (
@@ -62,8 +62,8 @@ class Body:
     dim: int
     # (dim*n, dim*n) [N/m], n nodes of this body, distributed, block size dim
     K: PETSc.Mat
-    # (dim*n, dim*n) [kg]
-    M: PETSc.Mat
+    # see ``M``
+    mass: Mass
     # (n_points,) PETSc block row of each mesh node, -1 outside; same on every rank
     rows: np.ndarray
     # dolfinx function space of the displacements
@@ -85,6 +85,11 @@ class Body:
     plan: MemoryPlan = IN_MEMORY
     # of a mesh of mixed shapes: what its integrals are over; none where ``space`` has the cells
     pieces: tuple[Piece, ...] = ()
+
+    @property
+    def M(self) -> PETSc.Mat:
+        """(dim*n, dim*n) [kg], made when it is asked for first (collective)."""
+        return self.mass.matrix()
 
     @property
     def scalar_rows(self) -> np.ndarray:
@@ -170,16 +175,16 @@ def _assemble_bodies(
     rows = _block_rows(mesh, space, used[local], origin, comm)
     pieces: tuple[Piece, ...] = ()
     if any(n in mesh.whole for n in materials):
-        K, M, pieces = _sum_of_pieces(mesh, materials, (space, rows), plane, quadrature, heat)
+        K, mass, pieces = _sum_of_pieces(mesh, materials, (space, rows), plane, quadrature, heat)
     else:
-        K, M = _matrices(mesh, materials, (space, cells), plane, quadrature, heat)
+        K, mass = _matrices(mesh, materials, (space, cells), plane, quadrature, heat)
     return Body(
         mesh,
         " + ".join(materials),
         materials,
         mesh.dimension,
         K,
-        M,
+        mass,
         rows,
         space,
         plane,
@@ -196,7 +201,7 @@ def _matrices(
     plane: str,
     quadrature: str,
     heat: Temperatures | None,
-) -> tuple[PETSc.Mat, PETSc.Mat]:
+) -> tuple[PETSc.Mat, Mass]:
     """Stiffness and mass of cells of one shape.
 
     Args:
@@ -219,7 +224,7 @@ def _sum_of_pieces(
     plane: str,
     quadrature: str,
     heat: Temperatures | None,
-) -> tuple[PETSc.Mat, PETSc.Mat, tuple[Piece, ...]]:
+) -> tuple[PETSc.Mat, Mass, tuple[Piece, ...]]:
     """Stiffness and mass of a body of mixed shapes, and what they were summed from.
 
     Args:
@@ -240,7 +245,7 @@ def _sum_of_pieces(
         )
         pieces.append(piece)
     K, M = total
-    return K, M, tuple(pieces)
+    return K, Mass(space.mesh.geometry.dim, whole=M), tuple(pieces)
 
 
 def sum_matrices(body: Body, matrices: Iterable[PETSc.Mat]) -> PETSc.Mat:
@@ -278,14 +283,23 @@ def _mass_matrix(
     degree: int,
     density: Any,
     quadrature: int,
-) -> PETSc.Mat:
-    """The mass of one direction, repeated for each: a ninth of the work, a third of the entries."""
+) -> Mass:
+    """The mass, assembled for one direction where its nodes can be numbered as those of all are: a
+    ninth of the work.
+    """
     one = one_component(space, degree)
     u = ufl.TrialFunction(one or space)
     v = ufl.TestFunction(one or space)
     measure = ufl.dx(metadata={"quadrature_degree": quadrature})
     M = assemble_matrix(density * ufl.inner(u, v) * measure)
-    return M if one is None else repeat_components(M, space.mesh.geometry.dim)
+    dim = space.mesh.geometry.dim
+    if one is None:
+        return Mass(dim, whole=M)
+    mass = Mass(dim, of_one_direction=M)
+    if space.mesh.comm.size > 1:
+        # no rank may find itself alone in making it
+        mass.matrix()
+    return mass
 
 
 def properties(

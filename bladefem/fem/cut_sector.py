@@ -124,7 +124,7 @@ def harmonic_motion(
     """
     H, q = coordinates.shape
     lift = static_motion(sector, moved, np.zeros((H, moved[0].size), complex))
-    inertia = _mesh_forces(sector.body, sector.body.M, lift)
+    inertia = _mesh_forces(sector.body, sector.body.mass, lift)
     given = loads.T + omega**2 * inertia
     columns = np.concatenate([given, np.tile(readings, (1, H))], axis=1)
     at = np.concatenate([omega, np.repeat(omega, q)])

@@ -57,7 +57,7 @@ class Core:
     rim: np.ndarray
     # (nb, nb) Schur complement of the rim [N/m]
     S: np.ndarray
-    # (nb, ni) A_bi
+    # (nb, ni) A_bi; empty where only the count is wanted
     coupling: sp.csr_matrix
     # to the rim's system amid a solve; None: two solves instead
     bridge: Bridge | None
@@ -186,12 +186,14 @@ def eliminate_interior(
         S, separators = eliminate_separators(shared.cut, S, definite)
         give_back()
         negative = shared.cut.comm.allreduce(negative) + separators.negative
+    # only solves look at it
+    coupling = picked(A, rim, inner) if keep else sp.csr_matrix((len(rim), len(inner)))
     return Core(
         factor,
         inner,
         rim,
         S,
-        picked(A, rim, inner),
+        coupling,
         bridge,
         order,
         negative,

@@ -21,7 +21,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import InputError, NotSolvedError, suggestion
-from .compat import PETSc, SLEPc, option_used
+from .compat import PETSc, SLEPc, option_used, pages_kept
 from .constraint import Constrained
 from .lanczos import lowest_eigenpairs, orthonormal
 from .linalg import (
@@ -305,7 +305,8 @@ def krylov_schur(
     settings = settings or Eigensolver()
     eps = _make_solver(pencil, start, count, tolerance, settings)
     try:
-        eps.solve()
+        with pages_kept():
+            eps.solve()
         if pencil.failure is not None:
             raise pencil.failure
         _refuse_unknown(settings.options)

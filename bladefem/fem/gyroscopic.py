@@ -110,7 +110,7 @@ def _coriolis_forces(
     turn = np.array([[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]])[: body.dim, : body.dim]
     nodal = X.reshape(-1, body.dim, X.shape[1])
     crossed = np.asfortranarray(np.einsum("ij,njm->nim", turn, nodal).reshape(X.shape))
-    return 2 * apply_block(body.M, crossed)
+    return 2 * apply_block(body.mass, crossed)
 
 
 def own_rows(body: Body, shapes: np.ndarray) -> np.ndarray:

@@ -16,11 +16,11 @@ from geometry.mesh import Mesh, chosen_whole
 
 from ..errors import InputError
 from .body import Body
-from .compat import PETSc
 from .constraint import constrain, expand_to_mesh, restrict_load
 from .flexibility import Flexibility, compliance, flexible
 from .gyroscopic import own_rows
-from .linalg import apply_block, inner_products
+from .linalg import Matrix, apply_block, inner_products
+from .mass import Mass
 from .modes import modes
 
 # motions of a section beyond the rigid ones, and the least one over the strongest: fourteen bring
@@ -56,7 +56,7 @@ class HeldPart:
 
     def mass_products(self, fields: np.ndarray) -> np.ndarray:
         """(k, k) products of fields (k, n, 3) of the part with its mass."""
-        return _products(self.body, self.body.M, self.on_mesh(fields))
+        return _products(self.body, self.body.mass, self.on_mesh(fields))
 
     def on_mesh(self, fields: np.ndarray) -> np.ndarray:
         """(k, n_points, 3) fields (k, n, 3) of the part on its mesh, zero elsewhere."""
@@ -113,7 +113,7 @@ def held_part(
         omega = 2 * np.pi * found.frequencies[:count]
     numbers = np.flatnonzero(body.rows >= 0)
     static = _static_motions(flex, root, motions)
-    mass = _products(body, body.M, np.concatenate([shapes, static]))
+    mass = _products(body, body.mass, np.concatenate([shapes, static]))
     q = len(shapes)
     return HeldPart(
         mesh.points[numbers],
@@ -172,6 +172,6 @@ def _mesh_rows(body: Body) -> np.ndarray:
     return np.argsort(rows, kind="stable")[np.count_nonzero(rows < 0) :]
 
 
-def _products(body: Body, matrix: PETSc.Mat, fields: np.ndarray) -> np.ndarray:
+def _products(body: Body, matrix: Matrix | Mass, fields: np.ndarray) -> np.ndarray:
     rows = own_rows(body, fields)
     return np.asarray(inner_products(body.comm, rows, apply_block(matrix, rows)))

@@ -1,9 +1,10 @@
-"""Sparse matrices of constrained bodies in three forms, their products and factorisations (MUMPS
+"""Sparse matrices of bodies in several forms, their products and factorisations (MUMPS
 through PETSc).
 
 - a PETSc matrix: real, distributed;
 - ``Doubled``: the real twin of a complex Hermitian matrix, distributed; real and imaginary part of
   an unknown are adjacent, so that the memory of a complex vector is that of the doubled one;
+- ``Mass``: that of a body without constraints, for products;
 - ``Folded``: C^H A C with the real matrix A of an open sector, or the sum of such products of the
   ranks' parts; all nodal diameters share one factorisation of A's interior (``core``).
 
@@ -22,6 +23,7 @@ from scipy.linalg import blas
 
 from . import cyclic_schur as interior
 from .compat import MPI, PETSc
+from .mass import Mass
 from .mumps import Factorised, dense_matrix, dense_values, factorise_matrix, solve_matrix
 from .open_matrix import OpenMatrix, diagonal, entries, entries_of_sum, times
 from .subdomains import SharedBoundary, sum_of_parts, whole_part
@@ -164,7 +166,7 @@ def solve_together(systems: list[tuple[Factor, np.ndarray]]) -> list[np.ndarray]
     return [solve_block(factor, B) for factor, B in systems]
 
 
-def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
+def apply_block(A: Matrix | Mass, X: np.ndarray) -> np.ndarray:
     """A X for a block of vectors (n_own, k)."""
     if isinstance(A, Folded):
         if A.shared is not None:
@@ -172,7 +174,19 @@ def apply_block(A: Matrix, X: np.ndarray) -> np.ndarray:
         return _folded_product(A, X)
     if isinstance(A, Doubled):
         return _complex(_times(A.matrix, _real(X)))
+    if isinstance(A, Mass):
+        return _mass_product(A, X)
     return _join_complex(_times(A, _split_complex(X))) if np.iscomplexobj(X) else _times(A, X)
+
+
+def _mass_product(A: Mass, X: np.ndarray) -> np.ndarray:
+    """M X for a body's rows (n_own, k), from the mass of one direction where that is all there
+    is.
+    """
+    if A.of_one_direction is None:
+        return apply_block(A.matrix(), X)
+    directions = X.reshape(-1, A.dim * X.shape[1])
+    return np.asfortranarray(apply_block(A.of_one_direction, directions).reshape(X.shape))
 
 
 def _folded_product(A: Folded, X: np.ndarray) -> np.ndarray:

@@ -16,6 +16,7 @@ import numpy as np
 from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from ..util.lockstep import run_together
+from .compat import pages_kept
 from .constraint import Constrained, expand_to_mesh, restrict_load
 from .cyclic_schur import count_negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
@@ -72,8 +73,13 @@ def modes(
         raise InputError(f"count is {count}, expected at least 1 mode")
     if not prove:
         return mode_set(con, *lowest_pairs(flex or flexible(con), count, tolerance, solver=solver))
-    pairs = proven_pairs(flex or flexible(con), count, tolerance, solver, flex is not None)
-    return mode_set(con, *pairs)
+    if flex is not None:
+        return mode_set(con, *proven_pairs(flex, count, tolerance, solver))
+    # these factors make room for those of the count
+    with pages_kept(large=True):
+        own = flexible(con)
+    give_back()
+    return mode_set(con, *proven_pairs(own, count, tolerance, solver, keep=False))
 
 
 def proven_pairs(
@@ -98,9 +104,10 @@ def proven_pairs(
         return lam, X
     upper, expected = _counting_shift(lam)
     if not keep:
+        # the count takes their place: not given back in between
         release(flex.con.K, flex.factor)
-        give_back()
     exact = count_below(flex.con, upper)
+    give_back()
     if exact == expected:
         return lam, X
     flex = flex if keep else flexible(flex.con)

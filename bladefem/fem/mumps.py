@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
 from ..errors import IndefiniteError, NotSolvedError
-from .compat import PETSc, no_error_messages
+from .compat import PETSc, no_error_messages, pages_kept
 
 # columns a solve: MUMPS works on them by matrix products, 256 are no faster
 COLUMNS_PER_SOLVE = 128
@@ -87,7 +88,9 @@ def factorise_matrix(
             index = PETSc.IS().createGeneral(schur.astype(PETSc.IntType), comm=F.comm)
             petsc_call("MatFactorSetSchurIS", F.handle, index.handle)
         in_order = None if order is None else partial(_in_order, F, A, order)
-        failed = _factorise_numeric(in_order or pc.setUp)
+        # factors that stay would leave the others' pages in pieces
+        with nullcontext() if keep else pages_kept(large=True):
+            failed = _factorise_numeric(in_order or pc.setUp)
         if F.getMumpsInfog(1) not in ESTIMATE_EXCEEDED:
             break
     code = F.getMumpsInfog(1)

@@ -16,7 +16,7 @@ from .body import Body
 from .compat import PETSc
 from .distributed import local_rows, rows_of_rank, shared_rows, to_petsc
 from .memory import give_back
-from .open_matrix import OpenMatrix, Repeated, Selected
+from .open_matrix import OpenMatrix, Repeated, Selected, picked
 from .ordering import interior_first
 from .subdomains import Part, SharedBoundary, divide, matrix_share, share_boundary
 
@@ -84,7 +84,7 @@ def open_sector(
         return None
     if body.comm.size == 1:
         stiffness_of = partial(_open_stiffness, T=T, start=start)
-        both = stiffness_of(body), _open_mass(body, T, start)
+        both = stiffness_of(body), _picked_mass(body, T) or _open_mass(body, T, start)
         return _opened(body, T, places, both, rim, None, np.empty(0, int), stiffness_of)
     part = shared = None
     shares = []
@@ -155,7 +155,7 @@ def _opened(
     body: Body,
     T: sp.csr_matrix,
     places: np.ndarray,
-    matrices: tuple[OpenMatrix, sp.csr_matrix],
+    matrices: tuple[OpenMatrix, OpenMatrix],
     rim: np.ndarray,
     shared: SharedBoundary | None,
     boundary: np.ndarray,
@@ -164,7 +164,7 @@ def _opened(
     """The record, with the order of the elimination."""
     K, mass = matrices
     order = interior_first(K, rim, places // body.dim)
-    M = _of_one_direction(mass, places, body.dim)
+    M = mass if isinstance(mass, Repeated) else _of_one_direction(mass, places, body.dim)
     # what building the matrices took is of no more use
     give_back()
     elimination = core.Elimination(K, rim, order, shared, body.plan.on_disk)
@@ -186,6 +186,25 @@ def _open_mass(body: Body, T: sp.csr_matrix, start: np.ndarray) -> sp.csr_matrix
     out = _open_matrix(body, body.M, T, start)
     out.eliminate_zeros()
     return out
+
+
+def _picked_mass(body: Body, T: sp.csr_matrix) -> Repeated | None:
+    """The mass of an open sector that one rank holds, picked from that of one direction; None where
+    that is not there, or where nodes are held or tied in some directions only.
+    """
+    one = body.mass.of_one_direction
+    if one is None or not _merely_selects(T):
+        return None
+    # open unknowns are numbered as the rows are
+    chosen = body.scalar_rows[T.tocsc().indices]
+    nodes = chosen[:: body.dim] // body.dim
+    if not np.array_equal(chosen, (body.dim * nodes[:, None] + np.arange(body.dim)).ravel()):
+        return None
+    rows = shared_rows(one)
+    nodal = picked(local_rows(one) if rows is None else rows, nodes, nodes)
+    nodal.eliminate_zeros()
+    nodal.sort_indices()
+    return Repeated(nodal, body.dim)
 
 
 def _open_matrix(

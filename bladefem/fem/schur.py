@@ -16,14 +16,16 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..errors import NotSolvedError
-from .compat import PETSc, no_error_messages
+from .compat import PETSc, no_error_messages, shared_matrix
 from .memory import drop_values
-from .mumps import Factorised, petsc_call, set_operation, solve_matrix
+from .mumps import Factorised, factorise_matrix, petsc_call, set_operation, solve_matrix
 
 # MATOP_MAT_SOLVE: PETSc 3.1 to 3.19, later
 MATSOLVE = (109, 100)
@@ -86,6 +88,36 @@ def replace_dense_solve(factor: Factorised, n: int) -> Bridge | None:
 
     The Schur complement inside PETSc is of no use afterwards: copy it first.
     """
+    return _with_call_back(factor, n) if _petsc_calls_back() else None
+
+
+@lru_cache(maxsize=1)
+def _petsc_calls_back() -> bool:
+    """Whether a solve comes to the call back: of three unknowns, for it costs a sweep."""
+    diagonal = sp.identity(3, format="csr")
+    matrix = shared_matrix((3, 3), diagonal.indptr, diagonal.indices, diagonal.data)
+    factor = factorise_matrix(matrix, definite=True, schur=np.array([2]))
+    matrix.destroy()
+    heard: list[int] = []
+
+    def listen(r: np.ndarray) -> np.ndarray:
+        heard.append(1)
+        return r
+
+    made = _with_call_back(factor, 1)
+    try:
+        with no_error_messages():
+            if made is not None:
+                solve_through_boundary(made, np.zeros((3, 1)), listen)
+    except (PETSc.Error, NotSolvedError):
+        return False
+    finally:
+        factor.matrix.destroy()
+    return bool(heard)
+
+
+def _with_call_back(factor: Factorised, n: int) -> Bridge | None:
+    """The factor with a call back in place of PETSc's dense solve; None where PETSc refuses."""
     answers: list[Answer] = []
     raised: list[BaseException] = []
 
@@ -117,22 +149,14 @@ def replace_dense_solve(factor: Factorised, n: int) -> Bridge | None:
         for place in MATSOLVE:
             set_operation(handle, place, callback)
 
-    made = Bridge(factor, n, answers, raised, (callback, nothing))
-    heard: list[int] = []
-
-    def listen(r: np.ndarray) -> np.ndarray:
-        heard.append(1)
-        return r
-
     try:
         with no_error_messages():
             _use_complement(factor, leave_factors_out)
             petsc_call("MatFactorFactorizeSchurComplement", factor.matrix.handle)
             _use_complement(factor, redirect)
-            solve_through_boundary(made, np.zeros((factor.matrix.size[0], 1)), listen)
     except (PETSc.Error, NotSolvedError):
         return None
-    return made if heard else None
+    return Bridge(factor, n, answers, raised, (callback, nothing))
 
 
 def solve_through_boundary(

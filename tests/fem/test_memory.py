@@ -11,7 +11,7 @@ from resident import needs_readings, resident_memory
 from structured import box, sector
 
 from bladefem.errors import InputError
-from bladefem.fem import memory
+from bladefem.fem import compat, memory, mumps
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import LARGE_BLOCK, MPI
@@ -182,16 +182,70 @@ assert resident_memory() - before < LARGE_BLOCK
 """
 
 
+PAGES_THAT_SERVE_AGAIN = """
+import ctypes, resource
+from resident import resident_memory
+from bladefem.fem.compat import LARGE_BLOCK, pages_kept
+from bladefem.fem.memory import give_back
+library = ctypes.CDLL(None)
+library.malloc.restype = library.memset.restype = ctypes.c_void_p
+library.memset.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_size_t]
+library.malloc.argtypes, library.free.argtypes = [ctypes.c_size_t], [ctypes.c_void_p]
+def filled():
+    block = library.malloc(4 * LARGE_BLOCK)
+    library.memset(block, 1, 4 * LARGE_BLOCK)
+    return block
+def cleared():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_minflt * resource.getpagesize()
+before = resident_memory()
+with pages_kept(large=True):
+    block = filled()
+    above = library.malloc(1000)
+    library.free(block)
+    assert resident_memory() - before > 3.9 * LARGE_BLOCK
+    handed_out = cleared()
+    library.free(filled())
+    assert cleared() - handed_out < LARGE_BLOCK / 10
+give_back()
+assert resident_memory() - before < LARGE_BLOCK / 10
+block = filled()
+library.free(block)
+assert resident_memory() - before < LARGE_BLOCK / 10
+"""
+
+
 @needs_readings
-def test_large_blocks_go_back_to_the_system():
-    """Those below another one that is still there, too, which MPI's settings keep.
+@pytest.mark.parametrize("script", [BLOCK_THAT_GOES_BACK, PAGES_THAT_SERVE_AGAIN])
+def test_large_blocks_go_back_to_the_system(script):
+    """Those below another one that is still there, too, which MPI's settings keep; amid a block
+    that asks for it their pages wait, to serve again.
 
     In a process of its own: one that ran other tests may have a hole that the block fits into.
     """
     paths = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
     environment = {**os.environ, "PYTHONPATH": paths}
-    command = [sys.executable, "-c", BLOCK_THAT_GOES_BACK]
-    subprocess.run(command, env=environment, check=True, timeout=120)
+    subprocess.run([sys.executable, "-c", script], env=environment, check=True, timeout=120)
+
+
+def test_factors_lie_in_the_heap_only_where_the_count_takes_their_place(monkeypatch):
+    """Those that are kept would leave the pages of others in pieces."""
+    heap, seen = [False], []
+    numeric = mumps._factorise_numeric
+
+    def watched(factorise):
+        seen.append(heap[-1])
+        return numeric(factorise)
+
+    monkeypatch.setattr(compat, "_set_allocator", lambda blocks, _: heap.append(blocks == 0))
+    monkeypatch.setattr(mumps, "_factorise_numeric", watched)
+    body = assemble(sector(8, (4, 3, 1), bump=0.2), "blade", Material())
+    modes(constrain(body, "clamp", 1), 3)
+    assert seen == [True, True]
+    seen.clear()
+    con = constrain(body, "clamp", 1)
+    modes(con, 3, flexible(con))
+    assert seen == [False, True]
+    assert not heap[-1]
 
 
 @needs_readings

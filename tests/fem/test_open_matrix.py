@@ -6,9 +6,10 @@ import scipy.sparse as sp
 from structured import sector
 
 from bladefem.fem.body import assemble
-from bladefem.fem.constraint import transformation
+from bladefem.fem.constraint import constrain, transformation
 from bladefem.fem.distributed import local_rows, shared_rows
-from bladefem.fem.linalg import recombine
+from bladefem.fem.linalg import apply_block, recombine
+from bladefem.fem.modes import modes
 from bladefem.fem.open_matrix import (
     Repeated,
     Selected,
@@ -87,6 +88,26 @@ def test_the_stiffness_of_an_open_sector_is_the_body_s_own_memory(body):
     for A, whole in ((opened.K, body.K), (opened.M, body.M)):
         expected = local_rows(whole)[own][:, own]
         assert abs(entries(A) - expected).max() <= 1e-14 * abs(expected).max()
+
+
+def test_modes_of_a_sector_need_the_mass_of_one_direction_alone():
+    """It is made whole for whoever asks later, and an open sector after that is the same."""
+    body = assemble(sector(8, (4, 3, 2), "tetra10", bump=0.2), "blade", Material())
+    lean = transformation(body, cyclic=True).opened
+    modes(constrain(body, "clamp", 2), 3)
+    assert body.mass.whole is None
+    X = RNG.standard_normal((body.K.size[0], 4)) + 1j
+    products = [apply_block(body.mass, X), apply_block(body.mass, X.real)]
+    assert body.mass.whole is None
+    own = body.scalar_rows[lean.places]
+    whole = local_rows(body.M)
+    assert abs(entries(lean.M) - whole[own][:, own]).max() == 0
+    for found, Y in zip(products, (X, X.real), strict=True):
+        np.testing.assert_allclose(found, whole @ Y, rtol=1e-12, atol=1e-18)
+        np.testing.assert_allclose(apply_block(body.mass, Y), whole @ Y, rtol=1e-12, atol=1e-18)
+    assert body.mass.of_one_direction is None
+    late = transformation(body, cyclic=True).opened
+    np.testing.assert_array_equal(late.M.nodal.toarray(), lean.M.nodal.toarray())
 
 
 def test_shared_rows_are_the_matrix_and_cannot_be_written_to(body):

@@ -8,7 +8,7 @@ import pytest
 from structured import sector
 
 from bladefem.fem import cyclic_schur as core
-from bladefem.fem import ordering
+from bladefem.fem import ordering, schur
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import at_diameter, transformation
 from bladefem.fem.flexibility import flexible
@@ -68,6 +68,36 @@ def test_a_signal_waits_for_the_end_of_the_sweep():
     finally:
         signal.signal(signal.SIGTERM, before)
     assert solve_through_boundary(made, B, lambda r: r).shape == B.shape
+
+
+def test_where_petsc_does_not_call_back_two_solves_take_its_place(monkeypatch):
+    """The places of the dense solve in its table of operations could move again."""
+    expected = modes(at_diameter(opened(), 1), 3).frequencies
+    monkeypatch.setattr(schur, "MATSOLVE", ())
+    schur._petsc_calls_back.cache_clear()
+    try:
+        other = opened()
+        assert other.opened.core.bridge is None
+        found = modes(at_diameter(other, 1), 3).frequencies
+    finally:
+        schur._petsc_calls_back.cache_clear()
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+
+
+def test_a_sweep_is_tried_once_and_on_a_small_matrix(monkeypatch):
+    """A sector's own would cost as much as one of SLEPc's steps."""
+    opened().opened.core
+    solved = []
+    monkeypatch.setattr(
+        schur, "solve_matrix", lambda factor, *_, **__: solved.append(factor.matrix.size[0])
+    )
+    assert opened().opened.core.bridge is not None
+    schur._petsc_calls_back.cache_clear()
+    try:
+        assert opened().opened.core.bridge is None
+    finally:
+        schur._petsc_calls_back.cache_clear()
+    assert solved == [3]
 
 
 def test_given_order_gives_the_same_modes(monkeypatch):

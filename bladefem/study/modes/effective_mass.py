@@ -80,7 +80,7 @@ def _mass_rows(
         rigid = rigid_motion(points, direction)
     inside = (body.rows >= 0)[:, None]
     r = own_rows(body, np.where(inside, rigid, 0.0)[None])
-    moved = apply_block(body.M, r)
+    moved = apply_block(body.mass, r)
     total = inner_products(body.comm, r, moved)[0, 0].real
     coupling = inner_products(body.comm, own_rows(body, modes.shapes), moved)[:, 0]
     share = np.abs(coupling) ** 2 / total

@@ -154,7 +154,7 @@ def speed_model(
     shapes = np.concatenate([*(s.shapes for s in sets), answers])
     X = own_rows(body, shapes)
     K = tuple(hermitian_part(inner_products(body.comm, X, apply_block(at.K, X))) for at in bodies)
-    M = hermitian_part(inner_products(body.comm, X, apply_block(body.M, X)))
+    M = hermitian_part(inner_products(body.comm, X, apply_block(body.mass, X)))
     g = project_coriolis(body, X, axis)
     count = len(sets[0].frequencies)
     rigid = min(int(np.count_nonzero(at.frequencies == 0)) for at in sets)
