@@ -44,7 +44,7 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
             [
                 tables.frame_table(table),
                 "",
-                *(f"{text}\n" for text in tables.message_lists(sentences)),
+                *(f"{text}\n" for text in tables.message_lists(sentences, "report_scatter.html")),
                 f"written: {', '.join(map(str, files))}",
             ]
         ),

@@ -356,6 +356,21 @@ def test_levels_stay_apart(tmp_path):
     assert text.index('<section id="timings"') < text.index("mesh: found")
 
 
+def test_both_pages_say_what_to_do_and_why(tmp_path):
+    said = [
+        warning("it is unstable", "use a march", "9 N: 120 um"),
+        Message("sought", detail="8 loads"),
+    ]
+    files = write_report(tmp_path, Scene(), {}, {}, said)
+    page, plain = (file.read_text(encoding="utf-8") for file in files)
+    box = page[page.index('<div class="warnings">') : page.index("<h3>Information")]
+    assert '<div class="advice">What to do: use a march</div>' in box
+    assert '<div class="detail">9 N: 120 µm</div>' in box
+    assert '<div class="detail">8 loads</div>' in page
+    assert "- it is unstable\n  - What to do: use a march\n  - 9 N: 120 µm\n" in plain
+    assert "- sought\n  - 8 loads\n" in plain
+
+
 def test_every_headline_says_how_sure_it_is():
     summary = synthetic.summary().assign(error=0.012)
     found = headlines(response_answer(summary, synthetic.points()), summary, synthetic.points())

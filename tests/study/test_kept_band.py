@@ -20,7 +20,8 @@ from bladefem.hbm.time_model import time_system
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.curve import Curve
-from bladefem.study.pipeline.stability_remarks import doubtful_sentence
+from bladefem.study.pipeline.load_remarks import load_warnings
+from bladefem.study.pipeline.motion_warnings import doubtful_resonances
 from bladefem.study.stability import finer_contacts, judged_resonance
 from bladefem.study.stability import kept_band as module
 from bladefem.study.stability.error_in_time import Marches
@@ -439,20 +440,20 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     marches.band = lambda *_: module.KeptBand(1.0, np.nan, np.nan, 0, "no march")
     unknown = given(lift=3, harmonics=3)
     shown = SimpleNamespace(
-        load=580.0, march_at_peak=unknown.march, unstable_peak=None, error_march=None
+        load=580.0, mass=None, march_at_peak=unknown.march, unstable_peak=None, error_march=None
     )
-    assert "580 N (no march)" in doubtful_sentence([shown])
-    assert "580 N (a flow)" in doubtful_sentence([shown], "a flow")
+    (said,) = load_warnings(doubtful_resonances([shown]))
+    assert said.startswith("under 580 N it is not known whether") and said.detail == "no march"
+    assert load_warnings(doubtful_resonances([shown], "a flow"))[0].detail == "a flow"
     # loads that share a reason say it once
     other = SimpleNamespace(**vars(shown) | {"load": 900.0})
-    assert doubtful_sentence([shown, other]).endswith("known: 580 N, 900 N (no march)")
+    (said,) = load_warnings(doubtful_resonances([shown, other]))
+    assert said.startswith("under 580 N and 900 N it is") and said.detail == "no march"
     # but for the error that fewer contact points tell
     shown.error_march = held.march
-    assert doubtful_sentence([shown]) == ""
-    assert (
-        doubtful_sentence([SimpleNamespace(march_at_peak=held.march, unstable_peak=None, load=1.0)])
-        == ""
-    )
+    assert not list(doubtful_resonances([shown]))
+    shown = SimpleNamespace(march_at_peak=held.march, unstable_peak=None, load=1.0)
+    assert not list(doubtful_resonances([shown]))
 
 
 def test_a_march_with_fewer_points_far_from_the_balance_is_in_doubt():

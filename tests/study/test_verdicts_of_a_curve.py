@@ -15,12 +15,13 @@ from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline.response_remarks import search_sentence
+from bladefem.study.pipeline.accuracy_warnings import unfinished_searches
+from bladefem.study.pipeline.load_remarks import load_warnings
+from bladefem.study.pipeline.motion_warnings import unjudged_resonances
 from bladefem.study.pipeline.stability_remarks import (
     Disturbances,
     judged_disturbances,
     stability_sentence,
-    unjudged_sentence,
 )
 from bladefem.study.stability import verdicts as stability
 from bladefem.study.stability.highest_stable import highest_lasting, next_to_judge
@@ -221,10 +222,12 @@ def test_what_a_sweep_left_open_reaches_the_remarks(monkeypatch):
     covered_band(model, first_for(3), tuple(hertz), 1, 0.05, paths=False, notes=notes)
     assert len(notes) == 1 and "the sweep ended after 3 points" in notes[0]
     curve = SimpleNamespace(load=36.0, mass=None, notes=(*notes, "a", "b", "c"))
-    said = search_sentence(curve)
-    assert said.startswith("load 36 N: the sweep ended after 3 points")
-    assert said.endswith("; a; b; and 1 more of the kind")
-    assert search_sentence(SimpleNamespace(load=36.0, mass=None, notes=())) == ""
+    (said,) = load_warnings(unfinished_searches([curve]))
+    assert said.startswith("under 36 N the search for all motions")
+    assert said.detail.startswith("36 N: the sweep ended after 3 points")
+    assert said.detail.endswith(", a, b, 1 more of the kind")
+    curve.notes = ()
+    assert not list(unfinished_searches([curve]))
 
 
 def judge(branch, heights, stable, most=99):
@@ -290,15 +293,17 @@ def test_a_motion_that_was_not_judged_is_no_lasting_one():
     # a curve says so where that motion is its resonance
     curve = SimpleNamespace(
         load=7.0,
+        mass=None,
         is_march=False,
         frequency=np.array([1.0, 1.0, 2.0]),
         amplitude=heights,
         stability=np.array([UNKNOWN, STABLE, STABLE]),
         peak=SimpleNamespace(frequency=1.0, probe=np.array([[0.0], [3.0]])),
     )
-    assert "under 7 N the motion at the resonance was not judged" in unjudged_sentence([curve])
+    (said,) = load_warnings(unjudged_resonances([curve]))
+    assert said.startswith("under 7 N the motion at the resonance was not judged")
     curve.is_march = True
-    assert unjudged_sentence([curve]) == ""
+    assert not list(unjudged_resonances([curve]))
     curve.is_march = False
     curve.peak.probe[1] = 2.0
-    assert unjudged_sentence([curve]) == ""
+    assert not list(unjudged_resonances([curve]))

@@ -18,5 +18,7 @@
 - at the resonance: ``contact_cycle`` stick and slip, ``damped_motion`` motion and stress of all
   nodes, ``utilisation`` of the endurance
 - flutter: ``flow`` damping of each wave, ``flutter`` limit cycles
-- words and tables: ``response_remarks``, ``stability_remarks``, ``load_remarks``, ``design_table``
+- words: ``response_remarks`` all of a run, ``motion_warnings`` and ``accuracy_warnings`` with
+  ``load_remarks`` one warning a reason, ``stability_remarks``, ``best_load_remarks``
+- tables: ``design_table``
 """
