@@ -120,7 +120,7 @@ def draw_mode(
     factor = scale_of(mesh, shape)
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction)
-    with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
+    with canvas(file, size=size_for(image, margin=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(
@@ -387,7 +387,7 @@ def draw_wheel_mode(
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
     image = photograph(parts, direction, up, WHEEL_PIXELS, fine=True)
-    with canvas(file, size=size_for(image, 5.2, margin=1.0)) as ax:
+    with canvas(file, size=size_for(image, margin=1.0)) as ax:
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(
