@@ -12,7 +12,9 @@ import time
 import numpy as np
 from scipy import linalg
 
-from bladefem.report.wheel import marked_optima, scatter_sentences, scatter_table
+from bladefem.report.scatter_pictures import marked_optima
+from bladefem.report.scatter_sentences import scatter_sentences
+from bladefem.report.scatter_tables import scatter_table
 from bladefem.view.wheel import draw_bands
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.scatter import Scatter, drawn_patterns

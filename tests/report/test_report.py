@@ -19,6 +19,7 @@ from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
 from bladefem.report.run_messages import beyond_stick
+from bladefem.report.scatter_sentences import loads_on_both_sides
 from bladefem.report.statements import (
     ResponseAnswer,
     assumed_stiffness,
@@ -28,7 +29,6 @@ from bladefem.report.statements import (
     wrong_speed,
 )
 from bladefem.report.tables import readable_texts, to_latex, to_markdown, write_tables
-from bladefem.report.wheel import loads_on_both_sides
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import load_scene, vary
