@@ -21,11 +21,12 @@ from ..util.arrays import BooleanArray, IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, without_progress
-from .model import Pattern, Wheel
+from .model import TUNED_PATTERN, Pattern, Wheel
 from .one_body import one_body_model
 from .pattern_peak import PatternPeak, compared_peaks, peak_heights
 from .resonance import Respond, find_wheel_peak
-from .solve import TUNED_PATTERN, WheelSolution, solve_wheel
+from .solution import WheelSolution
+from .solve import solve_wheel
 
 CONFIDENCE_LEVEL = 0.95
 # of the wheels that stay below what a design is made for

@@ -65,8 +65,9 @@ from bladefem.study.pipeline.utilisation import (
     blade_nodes,
     run_utilisation,
 )
+from bladefem.wheel.linear_motion import free_wheel
 from bladefem.wheel.model import Pattern, frequency_pattern
-from bladefem.wheel.solve import free_wheel, solve_wheel
+from bladefem.wheel.solve import solve_wheel
 
 
 @pytest.fixture(scope="module")

@@ -37,9 +37,9 @@ from bladefem.study.mistuning.other_blades import (
 )
 from bladefem.study.mistuning.own_stress import steady_root_forces
 from bladefem.wheel.flexibility import wheel_flexibility
+from bladefem.wheel.linear_motion import excitation_forces, free_wheel, without_contact
 from bladefem.wheel.model import Pattern, engine_order, tuned_wheel
 from bladefem.wheel.pattern_file import BladeDeviations
-from bladefem.wheel.solve import excitation_forces, free_wheel, without_contact
 
 COUNT = 6
 ORDER = 2
