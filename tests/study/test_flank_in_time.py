@@ -22,7 +22,8 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.stability import error_in_time
 from bladefem.study.stability.error_in_time import Marches
 from bladefem.study.stability.flank_motions import flank_motions
-from bladefem.study.stability.kept_band import band_by_steps, kept_band
+from bladefem.study.stability.march_by_steps import band_by_steps
+from bladefem.study.stability.march_from_motion import kept_band
 from bladefem.study.stability.verdicts import in_one_body, stability_of
 from verification.paper.plane_row import row_of_blades, whole_model
 

@@ -18,7 +18,7 @@ from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline.stability_remarks import undriven_sentence
 from bladefem.study.stability import strong_drive as module
 from bladefem.study.stability.error_in_time import Marches
-from bladefem.study.stability.kept_band import band_by_steps
+from bladefem.study.stability.march_by_steps import band_by_steps
 from bladefem.study.stability.strong_drive import (
     STRONG_DRIVE,
     StrongDrives,

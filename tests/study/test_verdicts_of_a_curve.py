@@ -25,7 +25,8 @@ from bladefem.study.pipeline.stability_remarks import (
 )
 from bladefem.study.stability import verdicts as stability
 from bladefem.study.stability.highest_stable import highest_lasting, next_to_judge
-from bladefem.study.stability.kept_band import KeptBand, kept_band
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.march_from_motion import kept_band
 from bladefem.study.stability.verdicts import RicherModel, judged_above, model_in_time, stability_of
 
 
