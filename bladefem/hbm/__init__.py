@@ -12,7 +12,8 @@
   ``path_maxima``, ``slow_sweep``
 - derivatives: ``sensitivity``, ``parameter_derivatives``, ``node_gradients``,
   ``traction_gradient`` and ``history_interval`` for static friction forces
-- nonlinear modes: ``nonlinear_modes``, ``mode_path``, ``mode_equations``, ``mode_detour``
+- nonlinear modes: ``nonlinear_modes``, ``mode_path`` with ``mode_newton``, ``mode_arc`` and
+  ``mode_detour``, ``mode_equations``
 - stability: ``stability`` multipliers, ``flow_map``, ``linearised_flow``, ``closed_contacts``,
   ``other_diameters``
 - marches in time: ``ring_march`` all blades of a wave, ``ring_contacts``, ``ring_readings``,

@@ -23,12 +23,13 @@ from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
 from .assemble_model import LoadCase, rigid_body
-from .best_load import BestLoad, chart_loads, find_best_load
+from .best_load import BestLoad, chart_loads
 from .best_load_remarks import (
     best_load_remarks,
     lower_studied_remarks,
     stress_message,
 )
+from .best_load_search import find_best_load
 from .bodies import Bodies, is_wheel
 from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
