@@ -10,7 +10,8 @@
   and ``temperature_field``
 - cyclic symmetry: ``constraint``, ``cut_faces``, ``cyclic_schur``, ``open_sector``,
   ``open_matrix``; over ranks ``groups``, ``subdomains``, ``separators``
-- modes: ``modes``, ``eigensolver``, ``lanczos``, ``all_diameters``, ``stiffness_error`` of the mesh
+- modes: ``modes``, ``eigensolver``, ``lanczos``, ``all_diameters`` with ``diameter_space`` and
+  ``mode_count``, ``stiffness_error`` of the mesh
 - reduction: ``ports``, ``flexibility``, ``held_part``, ``readings``
 - motion and stress: ``forced_motion``, ``cut_sector``, ``stress``, ``alternating_stress``,
   ``stress_error``
