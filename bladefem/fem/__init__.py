@@ -6,8 +6,10 @@
 - cells: ``shape_functions``, ``cell_functions``, ``cubic_functions``, ``mixed_cells``,
   ``refinement``, ``elasticity``
 - faces: ``face_elements``, ``surface``, ``face_overlap``, ``face_values``
-- bodies: ``body``, ``loads``, ``supports``, ``rotation`` preload, ``gyroscopic``, ``temperature``
-  and ``temperature_field``
+- bodies: ``body``, ``loads``, ``supports``, ``gyroscopic``, ``temperature``, ``temperature_field``,
+  ``thermal_strain``
+- vibrations about rotation and heat: ``rotation``, ``steady_state`` its record, ``linear_preload``
+  or ``preload``, ``rotating_forms`` the potential and its derivatives
 - cyclic symmetry: ``constraint``, ``cut_faces``, ``cyclic_schur``, ``open_sector``,
   ``open_matrix``; over ranks ``groups``, ``subdomains``, ``separators``
 - modes: ``modes``, ``eigensolver``, ``lanczos``, ``all_diameters`` with ``diameter_space`` and
