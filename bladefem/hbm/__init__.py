@@ -4,8 +4,9 @@
   solved point, ``point_measures``, ``reference_blade`` a ready model
 - one point: ``solve``, ``policy`` which way, ``predictor`` where from, ``full_stick``; the work is
   in ``solver`` (Newton, iterations, fallbacks) on ``linear`` (condensed bodies)
-- curves: ``sweep``, ``next_frequency``, ``frequency_walk``, ``from_neighbours``, ``checkpoint``,
-  ``parallel`` over ranks, ``linear_resonances`` where to look
+- curves: ``response`` at given frequencies, ``sweep`` of a band, ``next_frequency``,
+  ``frequency_walk``, ``from_neighbours``, ``checkpoint``, ``parallel`` over ranks,
+  ``linear_resonances`` where to look
 - peaks: ``peak`` found and followed, ``peak_levels`` and ``next_parameter`` of a search,
   ``optimum`` the lowest peak, ``peak_ripples`` made by sampling, ``truncation_indicator``
 - several motions: ``continuation`` round folds, ``branches`` of a band, ``band_path``,

@@ -12,13 +12,13 @@ from plain import waves
 from bladefem.data import PortModel
 from bladefem.errors import InputError
 from bladefem.friction.fourier import to_complex
+from bladefem.hbm import response as response_module
 from bladefem.hbm import solve as api
-from bladefem.hbm import sweep
 from bladefem.hbm.model import Damping
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.dense_lu import back_substitute, factorise_large, factorise_small
-from bladefem.hbm.sweep import response
 
 
 def elastic_damper():
@@ -180,7 +180,7 @@ def test_a_sweep_at_once_is_the_sweep_point_by_point(points, monkeypatch):
     model = reference_model(3e6, 0.12, 8.0, phase=0.5, points=points, harmonics=3, modes=10)
     omegas = 2 * np.pi * np.linspace(780, 1300, 40)
     fast = list(response(model, omegas, 3, 64))
-    monkeypatch.setattr(sweep, "solve_along", lambda *_: [])
+    monkeypatch.setattr(response_module, "solve_along", lambda *_: [])
     monkeypatch.setattr(api, "solve_small", lambda *_: None)
     plain = list(response(replace(model), omegas, 3, 64))
     assert {p.states["stick"] == 2 * points for p in fast} == {True, False}

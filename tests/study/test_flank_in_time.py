@@ -11,9 +11,9 @@ import pytest
 from numba import njit
 
 from bladefem.damper.branch import state_of
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.stability import STABLE, UNSTABLE
-from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.checked_curve import CheckedCurve

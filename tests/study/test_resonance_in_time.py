@@ -10,9 +10,9 @@ import pytest
 from models import folding_pair, rebounding, single_mass
 
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.report.response_points import points_of
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings

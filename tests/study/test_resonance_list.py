@@ -10,8 +10,8 @@ import pytest
 from models import FOLDING, folding_pair
 
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
-from bladefem.hbm.sweep import response
 from bladefem.report.resonance_table import resonance_table
 from bladefem.study.pipeline.load_remarks import load_warnings
 from bladefem.study.pipeline.motion_warnings import selective_sweeps

@@ -13,8 +13,8 @@ from bladefem.damper.branch import inclined_contact
 from bladefem.errors import InputError
 from bladefem.hbm.continuation import follow
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.io.stage_cache import cached_stage
 from bladefem.report.tables import readable_texts, units_of
 from bladefem.scene.toml import load_scene

@@ -10,9 +10,9 @@ import pytest
 from models import folding_pair, rebounding
 
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline.stability_remarks import undriven_sentence

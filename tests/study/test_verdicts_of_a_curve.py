@@ -9,9 +9,9 @@ from models import bouncing, bouncing_wave
 
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.model import Damping
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, Verdict, stability_verdict
-from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
