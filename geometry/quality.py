@@ -1,5 +1,5 @@
-"""Is the mesh fit to compute on: Jacobians, shape quality, straightening of bad second-order cells,
-a table.
+"""Checks of a mesh before it is solved: Jacobians and shapes of its cells, as a table; bad
+second-order cells are straightened.
 """
 
 from __future__ import annotations
