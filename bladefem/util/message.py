@@ -52,9 +52,9 @@ def warning(text: str, advice: str = "", detail: str = "") -> Message:
     return Message(text, "warning", advice, detail)
 
 
-def method(text: str) -> Message:
+def method(text: str, detail: str = "") -> Message:
     """How something was computed, and how far that reaches."""
-    return Message(text, "method")
+    return Message(text, "method", detail=detail)
 
 
 def by_level(messages: Iterable[str]) -> dict[str, list[Message]]:

@@ -56,14 +56,14 @@ def test_the_sentence_says_which_disturbances_a_wave_was_judged_against():
     blades = [judged_disturbances(family, settings).blades for family in (wave, alone)]
     assert blades == [4, 1]
     verdicts = [(np.array([STABLE]), np.array([0.5]))]
-    said = stability_sentence(verdicts, Disturbances(4))
+    said = stability_sentence(verdicts, Disturbances(4)).detail
     assert "repeat after 4 blades" in said and "not those of other nodal diameters" in said
     # engine order 9 of 36: harmonics 0 to 3 are diameters 0, 9, 18 and 9 again
     wheel = judged_disturbances(wave, settings, 9, 36)
     assert wheel.diameters == (0, 9, 18) and wheel.possible == 19
-    said = stability_sentence(verdicts, wheel)
+    said = stability_sentence(verdicts, wheel).detail
     assert "(nodal diameters 0, 9, 18), not those of the other 16 nodal diameters" in said
-    assert "blades" not in stability_sentence(verdicts)
+    assert "blades" not in "".join(stability_sentence(verdicts).parts)
 
 
 def test_the_sentence_says_why_nothing_could_be_judged():
@@ -110,7 +110,8 @@ def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(mo
     judged = alone.verdict != UNKNOWN
     assert judged.sum() == 1
     said = stability_sentence([(alone.verdict, alone.multiplier)])
-    assert f"{(~judged).sum()} not judged (where the verdicts on a curve" in said
+    assert said.endswith(f"{(~judged).sum()} not judged")
+    assert said.detail.startswith("where the verdicts on a curve")
 
 
 def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):

@@ -37,14 +37,12 @@ def response_remarks(
         nodes: contact points of a seat.
         judged: what verdicts looked at.
     """
-    methods = []
-    if scene.study.stability:
-        verdicts = [(c.stability, c.multiplier) for c in curves]
-        methods.append(stability_sentence(verdicts, judged))
-    methods += [ripple_sentence(curves, scene.accuracy), undriven_sentence(curves)]
+    verdicts = [(c.stability, c.multiplier) for c in curves]
+    ripples = ripple_sentence(curves, scene.accuracy), undriven_sentence(curves)
     return [
         *_of_settings(scene, settings, curves, nodes),
-        *map(method, filter(None, methods)),
+        *([stability_sentence(verdicts, judged)] if scene.study.stability else []),
+        *map(method, filter(None, ripples)),
         *history_remarks(curves),
         *load_warnings(warnings_of_curves(curves, scene.accuracy, judged)),
     ]

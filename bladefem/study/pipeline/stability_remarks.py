@@ -13,6 +13,7 @@ from ...hbm.sector_modes import blades_of_wave
 from ...hbm.solution import size
 from ...hbm.stability import STABLE, UNIQUE, UNKNOWN, UNSTABLE
 from ...scene.units import newtons
+from ...util.message import Message, method
 from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from ..stability.verdicts import model_in_time
@@ -84,8 +85,8 @@ def judged_disturbances(
 def stability_sentence(
     parts: Sequence[tuple[np.ndarray, np.ndarray]],
     judged: Disturbances = Disturbances(),
-) -> str:
-    """What was found on all curves, for the report.
+) -> Message:
+    """What was found on all curves, with what was judged in the details.
 
     Args:
         parts: verdicts and multipliers of each curve.
@@ -94,14 +95,14 @@ def stability_sentence(
     verdict, largest = (np.concatenate(column) for column in zip(*parts, strict=True))
     counts = {name: int((verdict == name).sum()) for name in (UNIQUE, STABLE, UNSTABLE, UNKNOWN)}
     if counts[UNIQUE]:
-        return (
+        return method(
             "stability: normal loads are prescribed, so that each periodic motion is the only "
             "one, and stable"
         )
     if counts[UNKNOWN] == len(verdict) and judged.reason:
-        return f"stability is unknown: no point could be judged, since {judged.reason}"
+        return method(f"stability is unknown: no point could be judged, since {judged.reason}")
     if counts[UNKNOWN] == len(verdict):
-        return (
+        return method(
             "stability is unknown: no point could be judged; it takes Coulomb's law, a wave that "
             "repeats after few blades, no more of them than model.harmonics where that is given, "
             "and not too many contact nodes that slip"
@@ -113,13 +114,13 @@ def stability_sentence(
     left_out = ""
     if counts[UNKNOWN]:
         left_out = (
-            " (where the verdicts on a curve would cost more than its points, only the local "
-            "maxima, the neighbours of the highest and points spread evenly are judged)"
+            "where the verdicts on a curve would cost more than its points, only the local "
+            "maxima, the neighbours of the highest and points spread evenly are judged"
         )
-    wave = f"; {judged.sentence}" if judged.sentence else ""
-    return (
+    return method(
         f"stability: {counts[STABLE]} points stable, {counts[UNSTABLE]} unstable{worst}, "
-        f"{counts[UNKNOWN]} not judged{left_out}{wave}"
+        f"{counts[UNKNOWN]} not judged",
+        detail="; ".join(filter(None, [left_out, judged.sentence])),
     )
 
 
