@@ -60,6 +60,8 @@ WHEEL_PIXELS = (1130, 890)
 # part of a tile's width that a picture takes, and the gap below its title [inch]
 TILE_SHARE = 0.98
 TITLE_GAP = 0.06
+# modes of a contact sheet
+SHEET_MODES = 8
 # in an animated wave
 WAVE_COLOURS = 224
 
@@ -233,11 +235,10 @@ def draw_mode_sheet(
     modes: ModeSet,
     file: str | Path | None = None,
     *,
-    count: int = 8,
     families: Sequence[str] = (),
 ) -> object:
     """The first modes of a sector side by side; returns the figure."""
-    count = min(count, len(modes.frequencies))
+    count = min(SHEET_MODES, len(modes.frequencies))
     columns = min(count, 4)
     rows = -(-count // columns)
     direction = view_of(mesh)

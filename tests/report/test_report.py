@@ -364,7 +364,7 @@ def test_both_pages_say_what_to_do_and_why(tmp_path):
     files = write_report(tmp_path, Scene(), {}, {}, said)
     page, plain = (file.read_text(encoding="utf-8") for file in files)
     box = page[page.index('<div class="warnings">') : page.index("<h3>Information")]
-    assert '<div><b>What to do:</b> use a march</div>' in box
+    assert "<div><b>What to do:</b> use a march</div>" in box
     assert '<div class="detail">9 N: 120 µm</div>' in box
     assert '<div class="detail">8 loads</div>' in page
     assert "- it is unstable\n  - What to do: use a march\n  - 9 N: 120 µm\n" in plain
