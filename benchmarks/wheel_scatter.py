@@ -67,7 +67,7 @@ def main() -> None:
         for name, share in (("half of the wheels", 0.5), ("95 % of the wheels", 0.95)):
             rows = [quantile_interval(row, share) for row in found.peak]
             bands[name] = np.array([[q.value, q.low, q.high] for q in rows])
-        draw_bands(found.loads, found.tuned, bands, marked_optima(found), sys.argv[2])
+        draw_bands(found.loads, found.tuned, bands, marked_optima(found, None), sys.argv[2])
 
 
 if __name__ == "__main__":
