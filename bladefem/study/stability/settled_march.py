@@ -122,7 +122,7 @@ def settle(
         MarchFailedError: the forces of a step were not found, or the march takes too long.
     """
     work.frequencies.add(state.drive.omega)
-    return end_of_march(limited_march(model, state, MOST_PERIODS, work, instants, has_settled))
+    return end_of_march(limited_march(model, state, MOST_PERIODS, work, instants, _has_settled))
 
 
 def settle_at(
@@ -203,7 +203,7 @@ def half_band(found: SettledMotion) -> float:
     return (found.highest - found.lowest) / (2 * found.highest)
 
 
-def has_settled(motion: RealArray) -> bool:
+def _has_settled(motion: RealArray) -> bool:
     """The last two thirds of a march keep to one band, and the means of all thirds have come to
     their limit.
     """
