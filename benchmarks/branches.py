@@ -29,7 +29,7 @@ from branch_models import Case, March, march, random_case, rest
 
 from bladefem import balance as bf
 from bladefem.hbm.stability import UNSTABLE, stability_verdict
-from bladefem.study.stability.kept_band import kept_band
+from bladefem.study.stability.march_from_motion import kept_band
 
 HARMONICS = 7
 SAMPLES = 256

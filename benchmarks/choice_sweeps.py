@@ -64,9 +64,9 @@ from choice_cases import RICH, TRUTH, Case, beam_cases, random_cases
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.precompile import compile_kernels
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.scene.toml import load_scene
 from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.family import Family, family_member, family_of

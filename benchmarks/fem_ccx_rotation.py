@@ -32,8 +32,9 @@ from twisted import twisted
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.flexibility import flexible
+from bladefem.fem.linear_preload import linear_tangent, unit_speed_displacement
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import linear_tangent, preload, tangent, unit_speed_displacement
+from bladefem.fem.preload import preload, tangent
 from bladefem.scene.tables import Material
 
 COUNT = 6

@@ -47,7 +47,7 @@ CURVE = """
 import resource
 import numpy as np
 from hbm_models import PROBLEMS
-from bladefem.hbm.sweep import response
+from bladefem.hbm.response import response
 model, band = PROBLEMS["{0}"]().model, PROBLEMS["{0}"]().band
 for count in ({1}, {2}):
     for point in response(model, np.linspace(*band, count), {3}, {4}):

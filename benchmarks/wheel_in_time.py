@@ -36,7 +36,8 @@ from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
 from bladefem.study.pipeline.run_records import SolvedRun
 from bladefem.wheel.model import Pattern, Wheel
-from bladefem.wheel.solve import WheelSolution, solve_wheel
+from bladefem.wheel.solution import WheelSolution
+from bladefem.wheel.solve import solve_wheel
 
 SCENE = Path(__file__).parents[1] / "scenes" / "mistuned.toml"
 STEPS = 256

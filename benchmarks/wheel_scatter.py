@@ -12,7 +12,9 @@ import time
 import numpy as np
 from scipy import linalg
 
-from bladefem.report.wheel import marked_optima, scatter_sentences, scatter_table
+from bladefem.report.scatter_pictures import marked_optima
+from bladefem.report.scatter_sentences import scatter_sentences
+from bladefem.report.scatter_tables import scatter_table
 from bladefem.view.wheel import draw_bands
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.scatter import Scatter, drawn_patterns
@@ -65,7 +67,7 @@ def main() -> None:
         for name, share in (("half of the wheels", 0.5), ("95 % of the wheels", 0.95)):
             rows = [quantile_interval(row, share) for row in found.peak]
             bands[name] = np.array([[q.value, q.low, q.high] for q in rows])
-        draw_bands(found.loads, found.tuned, bands, marked_optima(found), sys.argv[2])
+        draw_bands(found.loads, found.tuned, bands, marked_optima(found, None), sys.argv[2])
 
 
 if __name__ == "__main__":

@@ -24,7 +24,7 @@ _WHERE = {
     "follow": ".hbm.continuation",
     "free": ".hbm.solve:free_response",
     "local_maxima": ".hbm.next_frequency",
-    "response": ".hbm.sweep",
+    "response": ".hbm.response",
     "size": ".hbm.solution",
     "solve": ".hbm.solve",
     "stuck": ".hbm.solve:stuck_response",

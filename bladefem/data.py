@@ -1,4 +1,4 @@
-"""The nouns that pass between the layers: frozen, plain arrays, each with its shape and unit.
+"""Records that pass between the packages: frozen, plain arrays, each with its shape and unit.
 
 Conventions. Harmonic motion is Re(q e^{j h Omega t}), h = 0..H; harmonic h of a tuned wheel excited
 by engine order EO moves in nodal diameter n = h EO mod N, where the next blade carries the factor

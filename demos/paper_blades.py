@@ -107,10 +107,8 @@ for load in loads[::3] if coarse else loads:
 
 # %%
 if not coarse:
-    draw_tip_responses(
-        curves, folder / "fig_15.png", "mode 2, damper of 60 g", load="normal load of a seat [N]"
-    )
-    draw_friction_loops(loops, folder / "fig_16.png", "normal load of a seat [N]")
+    draw_tip_responses(curves, folder / "fig_15.png", "mode 2, damper of 60 g")
+    draw_friction_loops(loops, folder / "fig_16.png")
 
 # %% [markdown]
 # ## The paper's loop against the truth
@@ -210,7 +208,6 @@ for (kt, mode), span in list(cases.items())[: 1 if coarse else 3]:
             table,
             folder / f"fig_17_{kt:.0e}_{mode}.png",
             f"mode {mode}, {kt:.2g} N/m a seat",
-            "normal load of a seat [N]",
         )
 
 # %% [markdown]

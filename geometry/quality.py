@@ -1,5 +1,5 @@
-"""Is the mesh fit to compute on: Jacobians, shape quality, straightening of bad second-order cells,
-a table.
+"""Checks of a mesh before it is solved: Jacobians and shapes of its cells, as a table; bad
+second-order cells are straightened.
 """
 
 from __future__ import annotations
@@ -66,7 +66,7 @@ def edge_of_middle(mesh: Mesh) -> np.ndarray:
     return ends
 
 
-def straighten_cells(mesh: Mesh, safe: float = MIN_JACOBIAN) -> tuple[np.ndarray, int]:
+def straighten_cells(mesh: Mesh) -> tuple[np.ndarray, int]:
     """Points (n, 3) [m] where no second-order cell has a doubtful Jacobian, and how many cells were
     touched.
 
@@ -87,7 +87,7 @@ def straighten_cells(mesh: Mesh, safe: float = MIN_JACOBIAN) -> tuple[np.ndarray
     rounds = np.zeros(len(points), dtype=int)
     # ends: an edge is touched three times at most, then it is straight
     while True:
-        doubtful = scaled_jacobian(points, cells, mesh.cell_type) < safe
+        doubtful = scaled_jacobian(points, cells, mesh.cell_type) < MIN_JACOBIAN
         todo = _with_partners(np.unique(cells[doubtful][:, k:]), mesh.pairs, len(points)) & (
             rounds < 3
         )

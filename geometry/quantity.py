@@ -15,7 +15,6 @@ def quantity(
     high: float | None = None,
     help: str = "",
     choices: tuple[str, ...] = (),
-    factory: Any = dataclasses.MISSING,
 ) -> Any:
     """A dataclass field with physical meaning.
 
@@ -27,11 +26,8 @@ def quantity(
         low, high: closed range of accepted values, in SI.
         help: one line for ``--help``, the resolved table and the documentation.
         choices: accepted words of a text field.
-        factory: default factory, for nested tables.
     """
     meta = {"unit": unit, "low": low, "high": high, "help": help, "choices": choices}
-    if factory is not dataclasses.MISSING:
-        return dataclasses.field(default_factory=factory, metadata=meta)
     return dataclasses.field(default=default, metadata=meta)
 
 

@@ -63,14 +63,13 @@ def closed_section(
     family: str,
     thickness: float,
     camber: float,
-    points: int = POINTS_PER_SIDE,
 ) -> np.ndarray:
-    """Closed section over chord, (2 points - 1, 2): trailing edge (suction side), leading edge,
-    trailing edge.
+    """Closed section over chord, (2 POINTS_PER_SIDE - 1, 2): trailing edge (suction side), leading
+    edge, trailing edge.
 
     Columns: along the chord (0 leading, 1 trailing edge) and across it (suction side positive).
     """
-    x = chord_places(family, thickness, points)
+    x = chord_places(family, thickness, POINTS_PER_SIDE)
     half = half_thickness(family, x, thickness)
     line = 4 * camber * x * (1 - x)
     slope = 4 * camber * (1 - 2 * x)

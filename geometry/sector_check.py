@@ -1,5 +1,5 @@
-"""Can this wedge sector be drawn? Checked with arithmetic, before any CAD: one sentence with the
-field to change.
+"""Proportions with which a wedge sector cannot be drawn, refused by arithmetic before any CAD: one
+sentence with the field to change.
 """
 
 from __future__ import annotations

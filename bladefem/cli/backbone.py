@@ -29,7 +29,7 @@ def backbone(options: argparse.Namespace, comm: Communicator | None) -> None:
             [
                 tables.frame_table(readable_texts(prediction_table(found, run))),
                 "",
-                *(f"{text}\n" for text in tables.message_lists(said)),
+                *(f"{text}\n" for text in tables.message_lists(said, "report_backbone.html")),
                 f"written: {', '.join(map(str, files))}",
             ]
         ),

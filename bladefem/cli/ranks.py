@@ -1,5 +1,5 @@
-"""What goes wrong becomes one sentence and an exit code, on one rank or on many; no rank waits for
-ever. Ranks beyond the machine's cores wait without taking one from the others.
+"""Errors of a command as one sentence and an exit code, on one rank or on many: no rank waits for
+ever for another. Ranks beyond the machine's cores wait without taking one from the others.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     refuse_scatter(scene)
     from ..io.stage_cache import on_root
-    from ..report.wheel import scatter_sentences, use_sentences
+    from ..report.scatter_sentences import scatter_sentences, use_sentences
     from ..study.mistuning.stage import scatter_of_run, scatter_utilisation
     from ..study.pipeline import pipeline
     from ..study.pipeline.best_load import studied_load
@@ -44,7 +44,7 @@ def scatter(options: argparse.Namespace, comm: Communicator | None) -> None:
             [
                 tables.frame_table(table),
                 "",
-                *(f"{text}\n" for text in tables.message_lists(sentences)),
+                *(f"{text}\n" for text in tables.message_lists(sentences, "report_scatter.html")),
                 f"written: {', '.join(map(str, files))}",
             ]
         ),
@@ -64,18 +64,17 @@ def _write_results(
     Args:
         searched: best load of the tuned wheel by the run's search [N]; None without one.
     """
-    from ..report.tables import readable_texts, write_tables
-    from ..report.wheel import (
+    from ..report.scatter_pictures import scatter_drawings
+    from ..report.scatter_sentences import scatter_headlines, use_headlines
+    from ..report.scatter_tables import (
         optimum_is_known,
         optimum_table,
-        scatter_drawings,
-        scatter_headlines,
         scatter_table,
         shown_wheels,
-        use_headlines,
         use_table,
         wheel_table,
     )
+    from ..report.tables import readable_texts, write_tables
     from ..report.write import Page, write_report
 
     parts = {

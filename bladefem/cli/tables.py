@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from geometry.quality import quality_rows
 
 from ..scene.units import show
-from ..util.message import by_level
+from ..util.message import Message, by_level
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -253,23 +253,41 @@ def run_summary(run: Run, page: str | None = "report.html") -> str:
         [*rows, ["total", f"{total:.2f}", "100"]], ["stage", "time [s]", "share [%]"]
     )
     file = None if run.folder is None or page is None else run.folder / page
-    report = f"report: {file}\n" if file is not None and file.is_file() else ""
-    return "\n\n".join([table, *message_lists(run.messages), f"{report}results: {run.folder}"])
+    written = file is not None and file.is_file()
+    report = f"report: {file}\n" if written else ""
+    said = message_lists(run.messages, page if written else None)
+    return "\n\n".join([table, *said, f"{report}results: {run.folder}"])
 
 
-def message_lists(messages: Iterable[str]) -> list[str]:
+def message_lists(messages: Iterable[str], page: str | None = None) -> list[str]:
     """What a run or a command on top of one has to say: a list with a title for each level.
+
+    Args:
+        page: has the details, which are then left out here; without one they are printed.
 
     >>> from bladefem.util.message import warning
     >>> message_lists([warning("some points are not solved"), "the best load is 80 N"])
     ['information:\\n  - the best load is 80 N', 'warnings:\\n  - some points are not solved']
     """
     said = by_level(messages)
-    return [
-        "\n".join([f"{title}:", *(f"  - {text}" for text in said[level])])
+    lists = [
+        "\n".join([f"{title}:", *(_list_entry(one, page is None) for one in said[level])])
         for title, level in MESSAGE_TITLES.items()
         if said[level]
     ]
+    if page is not None and any(one.detail for entries in said.values() for one in entries):
+        lists.append(f"figures and reasons of each: {page}, section Answer")
+    return lists
+
+
+def _list_entry(message: Message, detailed: bool) -> str:
+    """A message as an entry of a list, what to do about it on a line of its own."""
+    lines = [f"  - {message}"]
+    if message.advice:
+        lines.append(f"    what to do: {message.advice}")
+    if message.detail and detailed:
+        lines.append(f"    details: {message.detail}")
+    return "\n".join(lines)
 
 
 # what a run says, by level; what the reader has to know is last, next to the prompt

@@ -14,6 +14,8 @@ from scipy.optimize import linprog
 from ..errors import NotSolvedError
 
 FRICTION_CONE_EDGES = 16
+# of a damper
+SEATS = 2
 # share of the forces' sum that may stay unbalanced in seats that jam
 UNBALANCED_FORCE_SHARE = 1e-9
 
@@ -22,7 +24,6 @@ def normal_load_bounds(
     rigid: np.ndarray,
     load: np.ndarray,
     mu: np.ndarray,
-    patches: int = 2,
 ) -> tuple[float, float]:
     """Lowest and highest mean normal load of a seat [N] under a load on the damper; the highest is
     infinite where the seats can jam.
@@ -45,7 +46,7 @@ def normal_load_bounds(
         if found.status == 3:
             bounds.append(np.inf)
         elif found.status == 0:
-            bounds.append(sign * found.fun * size / patches)
+            bounds.append(sign * found.fun * size / SEATS)
         else:
             raise NotSolvedError(
                 f"no pressing forces with friction balance the load on the damper: {found.message}"

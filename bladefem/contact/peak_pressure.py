@@ -1,5 +1,5 @@
-"""Can the largest pressure of a map be believed? Not where its place is narrower than the elements,
-or where stiff faces end in a sharp edge.
+"""Where the largest pressure of a map is not to be relied on: its place is narrower than the
+elements, or stiff faces end in a sharp edge.
 
 Forces and mean pressures are those of the whole seat and far less sensitive. Between rigid faces
 the pressure of the shipped wedge, bedded and under 80 N, grows at the inner edge from 0.88 over

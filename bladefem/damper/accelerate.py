@@ -130,14 +130,12 @@ def iterate(
     side: PlatformSide,
     method: str = "amplitude",
     rules: Rules | None = None,
-    start: np.ndarray | None = None,
 ) -> Iterated:
     """Look for the equilibrium of blade and damper.
 
     Args:
         method: one of METHODS: "picard", "amplitude", "complex", "parts" (Eq. 34 three ways),
             "anderson", "describing".
-        start: (H, n) first platform motion; without damper when left out, as in Fig. 14.
 
     Raises:
         InputError: unknown method.
@@ -146,7 +144,8 @@ def iterate(
         raise InputError(f"method = '{method}': expected one of {', '.join(METHODS)}")
     rules = rules or Rules()
     g = _Map(side, rules)
-    c = (side.free if start is None else start)[:, side.rows]
+    # without damper, as in Fig. 14
+    c = side.free[:, side.rows]
     with np.errstate(all="ignore"):
         c, converged, reason = METHODS[method](g, c)
     return _finished_result(method, g, c, converged, reason)

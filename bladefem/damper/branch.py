@@ -47,19 +47,17 @@ class BranchPoint:
     reason: str
 
 
-def inclined_contact(load: float = 10.0, force: float = 2.0) -> tuple[ReducedModel, System]:
+def inclined_contact() -> tuple[ReducedModel, System]:
     """One mass, 100 Hz, 0.5 % damping, on an inclined contact whose normal load follows it and can
-    open.
-
-    Args:
-        load: static normal force [N].
-        force: amplitude of the excitation [N].
+    open: 10 N press it, and 2 N excite it.
 
     Returns:
         The same system for the balance and for integration in time.
     """
     omega = 200 * np.pi
     angle = 1.2
+    load = 10.0
+    force = 2.0
     kn = 8e5
     kt = 1e5
     shapes = np.array([[np.sin(angle)], [np.cos(angle)], [1.0], [1.0]])

@@ -1,5 +1,5 @@
-"""Direct time integration of the complete coupled system by Newmark's rule of average acceleration:
-the judge.
+"""Direct time integration of the complete coupled system by Newmark's rule of average acceleration,
+for verification.
 
 A step is a small contact problem: w = w_free - G f with the friction law on w, G positive. It is
 solved by a Newton that starts from the stick predictor; started from slip, plain Newton on the

@@ -21,6 +21,9 @@ from ..friction.time_step import stable_step, step_1d
 from ..time.event_integrator import State, state_at_rest
 from ..time.system import System
 
+# relative change over a period, below which a march has become periodic
+SETTLED_CHANGE = 1e-6
+
 March = Callable[[State], tuple[State, np.ndarray, np.ndarray, np.ndarray]]
 
 
@@ -69,7 +72,6 @@ def damper_cycle(
     steps: int,
     start: State | None = None,
     most: int = 300,
-    tolerance: float = 1e-6,
 ) -> Cycle:
     """March explicitly until motion and friction forces repeat over one period.
 
@@ -77,14 +79,13 @@ def damper_cycle(
         steps: time steps a period.
         start: from rest when left out.
         most: largest number of periods.
-        tolerance: accepted relative change over a period.
 
     Raises:
         InputError: the step is beyond the stability limit.
     """
     check_steps(system, omega, steps)
     return march_to_periodic(
-        explicit_march(system, omega, steps), start or state_at_rest(system), most, tolerance
+        explicit_march(system, omega, steps), start or state_at_rest(system), most, SETTLED_CHANGE
     )
 
 

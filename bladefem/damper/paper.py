@@ -113,17 +113,14 @@ def damper_response(
     side: PlatformSide,
     u: np.ndarray,
     how: str = "shooting",
-    start: State | None = None,
     steps: int = 512,
-    most: int = 300,
 ) -> DamperResponse:
     """Forces of the damper on platforms that move with harmonics u (H, n).
 
     Args:
         how: "march" for explicit time integration from rest (the paper's), "shooting" for the exact
             periodic motion.
-        start: state to begin with; from rest, or from the stuck motion, when left out.
-        steps, most: time steps a period and largest number of periods of the march.
+        steps: time steps a period of the march.
     """
     model = side.model
     motion = np.concatenate([np.zeros((1, u.shape[1])), u]).T
@@ -133,7 +130,7 @@ def damper_response(
     H = len(u)
     if how == "march":
         steps = max(steps, stable_steps(system, side.omega), 4 * H)
-        cycle = damper_cycle(system, side.omega, steps, start, most)
+        cycle = damper_cycle(system, side.omega, steps)
         return DamperResponse(
             _harmonic_lines(cycle.force, H),
             cycle.state,
@@ -143,7 +140,7 @@ def damper_response(
         )
     if how != "shooting":
         raise InputError(f"how = '{how}': expected 'march' or 'shooting'")
-    solution = periodic_solution(system, side.omega, start, samples=max(256, 16 * H))
+    solution = periodic_solution(system, side.omega, samples=max(256, 16 * H))
     return DamperResponse(
         _harmonic_lines(solution.trajectory.force, H),
         solution.start,

@@ -70,17 +70,14 @@ class Motion:
     springs: np.ndarray
 
 
-def z_footprint(
-    width: float = 0.06,
-    height: float = 0.06,
-    bar: float = 0.016,
-) -> Footprint:
-    """Forty nodes on a Z: two bars of 2 x 7 nodes along x, a diagonal of 2 x 6 between them;
-    point-symmetric.
+def z_footprint() -> Footprint:
+    """Forty nodes on a Z of 60 x 60 mm: two bars of 2 x 7 nodes along x, 16 mm high, and a diagonal
+    of 2 x 6 between them; point-symmetric.
 
     Equal shares replace the pressure map of a finite element solution, which any caller may
     pass instead.
     """
+    width, height, bar = 0.06, 0.06, 0.016
     across = np.array([-bar / 4, bar / 4])
     along = width * (np.arange(7) + 0.5) / 7 - width / 2
     top = np.array([[x, (height - bar) / 2 + y] for x in along for y in across])

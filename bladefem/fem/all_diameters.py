@@ -1,61 +1,42 @@
 """All nodal diameters of a wheel: a few solved from scratch, the others from the space that these
 span.
 
-The vectors of a few nodal diameters, real and imaginary parts apart, nearly span those of all
-others. Projected onto them the three matrices of K(n) are small; what comes out starts a block
-Lanczos iteration, which stops only at the same tolerance as SLEPc's solve from scratch. The inertia
-of K(n) - s M(n), one more factorisation for all n, proves the count.
+What that space gives (``diameter_space``) starts a block Lanczos iteration, which stops only at the
+same tolerance as SLEPc's solve from scratch. The inertia of K(n) - s M(n), one more factorisation
+for all n, proves the count (``mode_count``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.linalg import eigh
 
-from ..data import ModeSet, SectorSpan
+from ..data import ModeSet
 from ..errors import InputError, NotSolvedError
 from ..util.progress import Progress, without_progress
-from . import cyclic_schur as core
 from .body import Body
 from .constraint import (
     Constrained,
     Transformation,
     at_diameter,
     checked_diameter,
-    high_part,
     transformation,
 )
+from .diameter_space import extend_space, initial_vectors
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
-from .linalg import (
-    Folded,
-    apply_block,
-    combined,
-    inertia,
-    inner_products,
-    linear_combinations,
-    subtract_product,
-)
 from .memory import give_back
+from .mode_count import Count, lost_modes
 from .modes import (
     BLOCKS,
     DIRECTION_TOLERANCE,
-    GAP_SHARE,
-    MIN_GAP,
     SLEPC,
-    highest_gap,
     lowest_pairs,
     mode_set,
     pairs_together,
 )
-from .open_matrix import chosen_rows, entries_of_sum, times
-from .open_sector import columns_of_part
-from .subdomains import whole_part
 
 # modes beyond those asked for, carried along
 GUARD_MODES = 2
@@ -67,23 +48,8 @@ FIRST_DIAMETER_PLACES = (0, 1, 1 / 3, 1 / 6, 2 / 3)
 SOLVED_DIAMETERS_BY_LEVEL = (3, 4, 5)
 # diameters solved from scratch at a time: more of them would save little and take memory
 DIAMETERS_AT_A_TIME = 3
-# columns of a sparse product at a time, to spare memory
-COLUMNS_AT_A_TIME = 16
 # error of a vector's direction; that of a frequency is its square
 VECTOR_TOLERANCE = 5e-6
-
-
-@dataclass(frozen=True)
-class _Space:
-    """The space that the vectors of some nodal diameters span, and the matrices on it."""
-
-    # (n_own, at least m) memory of W, with room for more
-    store: np.ndarray
-    # (n_own, m) nearly orthonormal, real
-    W: np.ndarray
-    # (m, m) projections of K0, Kc, Ks
-    K: list[np.ndarray]
-    M: list[np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -222,11 +188,11 @@ def _guessed_pairs(
         helps = i < SOLVED_DIAMETERS_BY_LEVEL[-1]
         if i in SOLVED_DIAMETERS_BY_LEVEL:
             give_back()
-            space = _extend_space(t, blocks, space, room)
+            space = extend_space(t, blocks, space, room)
             some = [n] if helps else diameters[i - SOLVED_DIAMETERS_BY_LEVEL[0] :]
             # the last ones need a step or two: guards would not pay
             guess = count + (GUARD_MODES if helps else 0)
-            starts = {m: _initial_vectors(space, t, m, guess) for m in some}
+            starts = {m: initial_vectors(space, t, m, guess) for m in some}
             # no more guesses: they are smaller than the space
             space = space if helps else None
         # what the last one took would stay with it, in pieces that do not fit
@@ -271,26 +237,6 @@ def _bare(found: Eigenpairs, count: int) -> Eigenpairs:
     return replace(found, lam=found.lam[:count], X=X, flex=None)
 
 
-def sector_span(t: Transformation, blocks: list[np.ndarray], P: sp.spmatrix) -> SectorSpan:
-    """The space that vectors of some nodal diameters span, with its matrices and motions of the
-    ports, for the reduction of all others (collective).
-
-    Args:
-        blocks: (n_own, k) vectors of each of them, as this rank's unknowns.
-        P: (n_points*dim, p) port vectors in mesh numbering.
-    """
-    space = _extend_space(t, list(blocks), None)
-    rank = t.body.comm.rank
-    own = slice(int(t.start[rank]), int(t.start[rank + 1]))
-    ports = sp.csc_matrix(P).T
-
-    def moved(T: sp.csr_matrix) -> np.ndarray:
-        local = (ports @ T).tocsc()[:, own] @ space.W
-        return np.asarray(t.body.comm.allreduce(local) if t.body.comm.size > 1 else local)
-
-    return SectorSpan(np.array(space.K), np.array(space.M), moved(t.low), moved(high_part(t)))
-
-
 def _first_pairs(
     found: Eigenpairs,
     count: int,
@@ -328,173 +274,6 @@ def _solve_pairs(
     return Eigenpairs(t, nodal_diameter, lam, X, flex)
 
 
-def _extend_space(
-    t: Transformation,
-    blocks: list[np.ndarray],
-    known: _Space | None,
-    room: int = 0,
-) -> _Space:
-    """The parts of more vectors added to a space; what it has already is projected once.
-
-    Args:
-        blocks: (n_own, k) the vectors, which are taken out: both at once would be the peak of
-            memory.
-        room: columns of a new space that are set aside for later ones.
-    """
-    new = _span_parts(blocks, t, known)
-    blocks.clear()
-    if known is not None and not new.shape[1]:
-        # it holds every motion of a coarse sector already
-        return known
-    old = 0 if known is None else known.W.shape[1]
-    width = old + new.shape[1]
-    store = np.empty((len(new), max(room, width)), order="F") if known is None else known.store
-    assert width <= store.shape[1]
-    store[:, old:width] = new
-    del new
-    W = store[:, :width]
-    columns = _project_columns(t, W, slice(old, width))
-    if known is None:
-        return _Space(store, W, *columns)
-    return _Space(
-        store,
-        W,
-        *(
-            [_append_columns(*each) for each in zip(A, B, (1, 1, -1), strict=True)]
-            for A, B in zip((known.K, known.M), columns, strict=True)
-        ),
-    )
-
-
-def _append_columns(
-    A: np.ndarray,
-    columns: np.ndarray,
-    sign: int,
-) -> np.ndarray:
-    """A symmetric (sign 1) or skew (-1) matrix with more columns, and the rows that they imply."""
-    old = len(A)
-    return np.block([[A, columns[:old]], [sign * columns[:old].T, columns[old:]]])
-
-
-def _initial_vectors(
-    space: _Space,
-    t: Transformation,
-    nodal_diameter: int,
-    count: int,
-) -> np.ndarray:
-    """(n_own, count at most) lowest vectors of the projected pencil, in single precision: the space
-    is wrong by more, and those of all nodal diameters wait side by side.
-    """
-    angle = 2 * np.pi * nodal_diameter / t.sectors
-    # a coarse sector has fewer than ``count``
-    Z = _projected_modes(space.K, space.M, angle, count)
-    if 2 * nodal_diameter % t.sectors == 0:
-        return np.asarray(linear_combinations(space.W, Z.real), np.float32)
-    out = np.empty((len(space.W), Z.shape[1]), np.complex64, order="F")
-    out.real, out.imag = linear_combinations(space.W, Z.real), linear_combinations(space.W, Z.imag)
-    return out
-
-
-def _span_parts(
-    blocks: list[np.ndarray],
-    t: Transformation,
-    known: _Space | None,
-) -> np.ndarray:
-    """(n_own, m) nearly orthonormal real basis of what all parts of the vectors add to the space
-    known.
-    """
-    parts = [part for X in blocks for part in ((X.real, X.imag) if np.iscomplexobj(X) else (X,))]
-    W = np.empty((len(parts[0]), sum(part.shape[1] for part in parts)), order="F")
-    np.concatenate(parts, axis=1, out=W)
-    gram = inner_products(t.body.comm, W, W)
-    # imaginary parts are zero where nothing joins the sectors
-    length = np.maximum(np.sqrt(gram.diagonal()), np.finfo(float).tiny ** 0.25)
-    if known is not None:
-        W = subtract_product(W, [known.W], inner_products(t.body.comm, known.W, W))
-        gram = inner_products(t.body.comm, W, W)
-    size, Z = np.linalg.eigh(gram / np.outer(length, length))
-    good = size > 1e-13
-    return linear_combinations(W, Z[:, good] / np.sqrt(size[good]) / length[:, None])
-
-
-def _project_columns(
-    t: Transformation,
-    W: np.ndarray,
-    new: slice,
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """(m, new) columns of the projections of K0, Kc, Ks and of M0, Mc, Ms."""
-    comm = t.body.comm
-    if t.opened is None:
-        stiff = [inner_products(comm, W, apply_block(A, W[:, new])) for A in t.K]
-        return stiff, [inner_products(comm, W, apply_block(A, W[:, new])) for A in t.M]
-    shared = t.opened.shared
-    W = W if shared is None else whole_part(shared, W)
-    T1 = columns_of_part(t.opened, high_part(t)[t.opened.places])
-    faces = np.flatnonzero(np.diff(T1.indptr))
-    low = columns_of_part(t.opened, t.low[t.opened.places])
-    high = _few_rows_times(T1[faces], W)
-    out = []
-    both = t.opened.K, t.opened.M
-    inner = _project_interior(both, (low, W), high, faces, new)
-    for A, (LL, HL) in zip(both, inner, strict=True):
-        beside = chosen_rows(A, faces)
-        coupling = beside.T.tocsr()
-        near = np.flatnonzero(np.diff(coupling.indptr))
-        LH = _few_rows_times(low[near], W).T @ (coupling[near] @ high[:, new])
-        own = [LL + high.T @ (beside[:, faces] @ high[:, new]), LH + HL, LH - HL]
-        out.append([comm.allreduce(part) for part in own] if comm.size > 1 else own)
-    K, M = out
-    return K, M
-
-
-def _few_rows_times(A: sp.csr_matrix, W: np.ndarray) -> np.ndarray:
-    """A W with the rows of W alone that A needs: SciPy copies what it multiplies."""
-    needed = np.unique(A.indices)
-    return np.asarray(A[:, needed] @ W[needed])
-
-
-def _project_interior(
-    both: tuple[Any, Any],
-    low: tuple[sp.csr_matrix, np.ndarray],
-    high: np.ndarray,
-    faces: np.ndarray,
-    new: slice,
-) -> list[tuple[np.ndarray, np.ndarray]]:
-    """low^T A low and high^T A low of some columns, for K and for M.
-
-    Args:
-        low: its two factors. Their product, as large as the whole space, is made a few columns at
-            a time.
-    """
-    T0, W = low
-    turned = T0.T.tocsr()
-    pieces: list[list[tuple[np.ndarray, np.ndarray]]] = [[], []]
-    for first in range(new.start, W.shape[1], COLUMNS_AT_A_TIME):
-        moved = np.ascontiguousarray(T0 @ W[:, first : first + COLUMNS_AT_A_TIME])
-        for piece, A in zip(pieces, both, strict=True):
-            image = times(A, moved)
-            piece.append((W.T @ (turned @ image), high.T @ image[faces]))
-    return [
-        (
-            np.concatenate([own for own, _ in piece], axis=1),
-            np.concatenate([x for _, x in piece], axis=1),
-        )
-        for piece in pieces
-    ]
-
-
-def _projected_modes(
-    K: list[np.ndarray],
-    M: list[np.ndarray],
-    angle: float,
-    count: int,
-) -> np.ndarray:
-    """(m, count) lowest eigenvectors of the projected pencil."""
-    sine = 1j * np.sin(angle) if abs(np.sin(angle)) > 1e-12 else 0.0
-    pencil = [A[0] + np.cos(angle) * A[1] + sine * A[2] for A in (K, M)]
-    return eigh(*[(A + A.conj().T) / 2 for A in pencil])[1][:, :count]
-
-
 def _check_inertia(
     t: Transformation,
     found: dict[int, Eigenpairs],
@@ -512,41 +291,6 @@ def _check_inertia(
 
 def _list_eigenvalues(found: dict[int, Eigenpairs]) -> dict[int, np.ndarray]:
     return {n: p.lam for n, p in found.items()}
-
-
-@dataclass(frozen=True)
-class Count:
-    """Number of eigenvalues of one nodal diameter below a shift, by inertia."""
-
-    # [rad^2/s^2]
-    shift: float
-    # eigenvalues below the shift
-    exact: int
-
-
-def lost_modes(
-    t: Transformation,
-    lam: dict[int, np.ndarray],
-    count: int,
-) -> dict[int, Count]:
-    """Nodal diameters whose eigenvalues (m,) below a shift are not as many as the inertia
-    counts.
-    """
-    give_back()
-    shift = _counting_shift([some[:count] for some in lam.values()])
-    if not shift > 0:
-        # rigid motions alone, which geometry counts
-        return {}
-    shared = _shifted_core(t, shift)
-    exact = _counts_below(t, list(lam), shift, shared)
-    del shared
-    give_back()
-    # guards beyond the count have not converged, and may be anywhere
-    return {
-        n: Count(shift, exact[n])
-        for n in lam
-        if exact[n] != np.count_nonzero(lam[n][:count] < shift)
-    }
 
 
 def found_again(
@@ -570,67 +314,3 @@ def found_again(
             f"{np.sqrt(truth.shift) / (2 * np.pi):.6g} Hz, the inertia counts {truth.exact}"
         )
     return p
-
-
-def _shifted_core(t: Transformation, shift: float) -> core.Core | None:
-    """K - shift M of the open sector with its interior eliminated, for all nodal diameters."""
-    if t.opened is None:
-        return None
-    opened = t.opened
-    return opened.elimination.shifted(entries_of_sum(opened.K, -shift, opened.M))
-
-
-def _counts_below(
-    t: Transformation,
-    diameters: list[int],
-    shift: float,
-    shared: core.Core | None,
-) -> dict[int, int]:
-    """Eigenvalues below the shift in each nodal diameter (collective).
-
-    Raises:
-        NotSolvedError: the shift is an eigenvalue, on all ranks where it is on one.
-    """
-    comm = t.body.comm
-    if shared is None:
-        return {n: _count_below(at_diameter(t, n), shift, None) for n in diameters}
-    # all ranks have the whole cut faces: each counts some of the nodal diameters
-    found: dict[int, int] = {}
-    error = None
-    try:
-        for n in diameters[comm.rank :: comm.size]:
-            found[n] = _count_below(at_diameter(t, n), shift, shared)
-    except NotSolvedError as problem:
-        error = problem
-    counts: dict[int, int] = {}
-    for some, failure in comm.allgather((found, error)):
-        if failure is not None:
-            raise failure
-        counts |= some
-    return counts
-
-
-def _count_below(
-    con: Constrained,
-    shift: float,
-    shared: core.Core | None,
-) -> int:
-    if shared is None or not isinstance(con.K, Folded):
-        return inertia(combined(con.K, -shift, con.M))
-    return core.count_negative(shared, con.K.faces)
-
-
-def _counting_shift(lists: list[np.ndarray]) -> float:
-    """A shift near the upper end of the highest gap of all eigenvalues, in what every diameter
-    covers.
-    """
-    top = min(lam[-1] for lam in lists)
-    below = np.unique(np.concatenate([lam[lam <= top] for lam in lists]))
-    below = below[below > 0]
-    if len(below) < 2:
-        return float(top) * (1 - 1e-6)
-    gap = highest_gap(below)
-    if gap is None:
-        # all are one multiple eigenvalue: between its copies there is rounding alone
-        return float(top) * (1 + MIN_GAP)
-    return float(below[gap - 1] + GAP_SHARE * (below[gap] - below[gap - 1]))

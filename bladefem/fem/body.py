@@ -42,7 +42,7 @@ from .temperature import (
 )
 
 if TYPE_CHECKING:
-    from .rotation import SteadyState
+    from .steady_state import SteadyState
 
 # degrees of quadrature for properties that vary in an element
 EXTRA_DEGREE = 2

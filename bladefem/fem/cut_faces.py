@@ -47,18 +47,18 @@ class CutTie:
     places: RealArray
 
 
-def tie_cut_faces(mesh: Mesh, name: str = "cyclic") -> CutTie:
+def tie_cut_faces(mesh: Mesh) -> CutTie:
     """The tie of a pair of cut faces.
 
     Raises:
         InputError: faces that share nodes or do not lie on each other.
     """
-    pair = mesh.pairs[name]
+    pair = mesh.pairs["cyclic"]
     faces = mesh.faces[pair.master], mesh.faces[pair.slave]
     low, high = (np.unique(face) for face in faces)
     if np.intersect1d(low, high).size:
         raise InputError("the cut faces share nodes (a solid hub on the axis), expected a bore")
-    overlap = face_overlap(mesh, name)
+    overlap = face_overlap(mesh, "cyclic")
     mass, coupling, covered = _integrals(mesh, overlap, low, high)
     if covered < COVERED_PART:
         raise InputError(

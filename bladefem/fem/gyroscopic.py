@@ -22,7 +22,7 @@ from ..errors import InputError
 from .body import Body
 from .constraint import Constrained, expand_to_mesh
 from .linalg import apply_block, inner_products
-from .rotation import AXIS
+from .steady_state import AXIS
 
 
 @dataclass(frozen=True)

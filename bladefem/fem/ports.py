@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 
 from ..data import PortModel
 from ..errors import InputError, suggestion
-from .all_diameters import Eigenpairs, KeptPairs, eigenpairs, found_again, lost_modes
+from .all_diameters import Eigenpairs, KeptPairs, eigenpairs, found_again
 from .compat import MPI
 from .constraint import Constrained, Transformation, restrict_load
 from .cyclic_schur import Rim, face_solve, inner_solve
@@ -23,6 +23,7 @@ from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .gyroscopic import Spin, constrained_coupling
 from .linalg import apply_block, hermitian_part, inner_products
+from .mode_count import lost_modes
 from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
 from .open_sector import Opened
 from .separators import reduce_load, separator_solve

@@ -37,7 +37,8 @@ from .body import Body
 from .cell_functions import few_points, order_of, tabulate
 from .cubic_functions import cubic_functions, functions_on, number_functions
 from .elasticity import stress_of
-from .rotation import SteadyState, in_mesh_numbering
+from .rotating_forms import in_mesh_numbering
+from .steady_state import SteadyState
 from .stress import solved_cells
 from .supports import POLAR_DIRECTIONS, held_directions
 from .temperature import density_at, point_temperatures, strain_tensor_at

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from ..io.stage_cache import cached_stage, code_of, key_of
 from .model import ReducedModel
+from .response import response
 from .solution import Solution
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .sweep import response
 
 
 def response_with_checkpoints(

@@ -116,7 +116,6 @@ def history_interval(
     *,
     tolerance: float = 1e-4,
     most: int = 150,
-    options: Options = DEFAULT_OPTIONS,
 ) -> HistoryInterval:
     """The interval of a resonance over all loading histories.
 
@@ -125,8 +124,8 @@ def history_interval(
         tolerance: of the height, relative.
         most: points of the balance after which no further move begins: the range is then sampled.
     """
-    here = _Place(peak, admissible_tractions(model, peak.solution, options.probe))
-    search = _Search(model, tolerance, most, options, [here], 0, [])
+    here = _Place(peak, admissible_tractions(model, peak.solution, DEFAULT_OPTIONS.probe))
+    search = _Search(model, tolerance, most, DEFAULT_OPTIONS, [here], 0, [])
     if model.loads_prescribed or not model.coupled:
         # a prescribed normal load or fixed mean displacements: nothing acts back
         return _interval(search, here, True)

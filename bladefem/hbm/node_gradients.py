@@ -27,7 +27,6 @@ def node_gradients(
     model: ReducedModel,
     solution: Solution,
     names: Iterable[str],
-    probe: int = 0,
 ) -> dict[str, np.ndarray]:
     """(n,) derivatives of the response's size at a probe by the contact parameters of each node:
     maps for a designer.
@@ -53,7 +52,7 @@ def node_gradients(
             f"parameters {names}: expected contact parameters, not {', '.join(LINEAR_PARAMETERS)}"
         )
     balance, state = solved_balance(model, solution)
-    by_force = size_by_force(model, solution, probe)
+    by_force = size_by_force(model, solution, probe=0)
     by_motion = transposed_force_change(balance, state, by_force)
     back = adjoint_inverse(balance, state)(by_motion, 1e-9)
     turned = transposed_flexibility(balance.linear.condensed.flex)

@@ -19,7 +19,8 @@ from .mode_equations import (
     mode_with_others,
     probe_amplitudes,
 )
-from .mode_path import MAX_ARCS, PathSpot, follow_mode
+from .mode_newton import PathSpot
+from .mode_path import MAX_ARCS, follow_mode
 from .model import ReducedModel
 from .validate_model import check_point
 

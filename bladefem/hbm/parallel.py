@@ -13,9 +13,9 @@ import numpy as np
 from ..util.communicator import Communicator
 from .checkpoint import response_with_checkpoints
 from .model import ReducedModel
+from .response import response
 from .solution import Solution
 from .solver.newton import DEFAULT_OPTIONS, Options
-from .sweep import response
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -110,7 +110,7 @@ def shared_response(
     folder: str | Path | None = None,
     options: Options = DEFAULT_OPTIONS,
 ) -> list[Solution]:
-    """The points of `bladefem.hbm.sweep.response`, in blocks of neighbours that the ranks share
+    """The points of `bladefem.hbm.response`, in blocks of neighbours that the ranks share
     out.
 
     The first point of each block starts from full stick, so that no number depends on which rank

@@ -14,9 +14,9 @@ from .model import ReducedModel
 from .next_frequency import first_look, local_maxima
 from .parameters import parameter_value, path_coordinate
 from .peak import Peak, find_peak
+from .response import response
 from .solution import Solution, size
 from .solver.newton import Options
-from .sweep import response
 
 # share of the highest peak below which the others are not solved again
 SOLVED_HEIGHT_SHARE = 0.7

@@ -26,6 +26,7 @@ from .flow_map import flow_map
 from .linear.condensation import condense
 from .linear.contact_flexibility import by_harmonic
 from .model import Damping, ReducedModel
+from .response import response
 from .ring_march import march_ring, state_of_solution
 from .sector_modes import sector_modes
 from .solve import solve
@@ -34,7 +35,6 @@ from .solver.newton_krylov import iterative_inverse
 from .solver.residual import Balance, evaluate_balance, linearise_balance, start_in_stick
 from .solver.walking import tangential_motions
 from .stability import linearised_contacts, stability_verdict
-from .sweep import response
 from .truncation_indicator import truncation_indicator
 
 # argument of the command line for the kernels of 1-D elements

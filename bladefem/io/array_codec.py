@@ -72,7 +72,7 @@ def tree_of(value: Any) -> tuple[str, list[np.ndarray]]:
 def _encode(value: Any, arrays: list[np.ndarray]) -> Any:
     # a text with a level, which as a plain one would come back as information
     if isinstance(value, Message):
-        return {"w": [str(value), value.level]}
+        return {"w": [str(value), value.level, value.advice, value.detail]}
     if value is None or isinstance(value, (bool, int, str)):
         return value
     if isinstance(value, float):

@@ -10,7 +10,7 @@ from bladefem.scene.kinds import kind_named
 from bladefem.scene.material_table import operating_materials
 from bladefem.scene.tables import Scene
 
-from ..study.pipeline.response_remarks import TRUSTED_STRESS
+from ..study.pipeline.best_load_remarks import TRUSTED_STRESS
 from ..util.percent import percent
 from .best_load import found_best
 from .statements import best_mass

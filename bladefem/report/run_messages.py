@@ -58,7 +58,11 @@ def _static_contact(result: SolvedRun) -> str:
         for curve in result.response.curves
     )
     found = quasi_static(patch, result.scene.material.blade, highest)
-    return method(found.sentence) if found.holds else warning(found.sentence)
+    if found.holds:
+        return method(found.sentence)
+    return warning(
+        found.sentence, "take fewer model.harmonics, or a dynamic analysis of the contact faces"
+    )
 
 
 def coriolis_messages(result: SolvedRun) -> list[str]:
@@ -77,8 +81,8 @@ def coriolis_messages(result: SolvedRun) -> list[str]:
     return [
         warning(
             f"{share}, and are left out of the responses by operation.coriolis = false: resonances "
-            "lie that much lower or higher, and amplitudes may differ; 'bladefem modes --campbell' "
-            "has both waves."
+            "lie that much lower or higher, and amplitudes may differ",
+            "set operation.coriolis = true; 'bladefem modes --campbell' has both waves",
         )
     ]
 
@@ -100,7 +104,10 @@ def damper_spin_messages(result: SolvedRun) -> list[str]:
         said.append(method(f"{share}; responses have them."))
     elif max(spin.coriolis, spin.amplitude) > least:
         said.append(
-            warning(f"{share}, and are left out of the responses by operation.coriolis = false.")
+            warning(
+                f"{share}, and are left out of the responses by operation.coriolis = false",
+                "set operation.coriolis = true",
+            )
         )
     elif spin.coriolis > 0:
         said.append(method(f"{share}; they are left out of the responses."))
@@ -111,7 +118,8 @@ def damper_spin_messages(result: SolvedRun) -> list[str]:
                 f"count, lowers the resonance of "
                 f"mode {mode} in full stick by some {percent(spin.softening)} of its frequency, "
                 f"and changes its amplitude with friction by some "
-                f"{percent(spin.softening_amplitude)}."
+                f"{percent(spin.softening_amplitude)}",
+                "count both as further errors of the resonance",
             )
         )
     return said

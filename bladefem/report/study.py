@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from ..scene.units import newtons, parse, show
 from ..study.pipeline.curve import Curve
 from ..study.pipeline.design_table import design_table
 from ..study.pipeline.run_records import Response
-from ..util.message import by_level, warning
+from ..util.message import Message, by_level, warning
 from ..util.percent import percent
 from ..view.study import BALANCE, LINEAR, MARCH, STIFF_LAYER, UNSTABLE, draw_study
 from .best_load import error_words, lowest_of_response
@@ -152,17 +152,39 @@ def warnings_of_all(names: Sequence[str], variants: Sequence[Variant]) -> list[s
     """The warnings of all runs, each with the values that it belongs to, the same sentence once;
     first those of every run, where listing more than two would bury the sentence.
     """
-    belongs: dict[str, list[str]] = {}
+    belongs: dict[tuple[str, str], dict[str, str]] = {}
     for variant in variants:
-        for text in variant.warnings:
-            belongs.setdefault(text, []).append(_label(names, variant))
+        for one in by_level(map(_as_warning, variant.warnings))["warning"]:
+            of = belongs.setdefault((str(one), one.advice), {})
+            of[_label(names, variant)] = one.detail
     every = len(variants) if len(variants) > 2 else 0
-    shared = [text for text, of in belongs.items() if len(of) == every]
-    some = {text: of for text, of in belongs.items() if len(of) != every}
-    return [
-        *(warning(f"all {every} runs: {text}") for text in shared),
-        *(warning(f"{'; '.join(of)}: {text}") for text, of in some.items()),
+    common = [
+        _warning_of_runs(f"all {every} runs", said, of)
+        for said, of in belongs.items()
+        if len(of) == every
     ]
+    others = [
+        _warning_of_runs("; ".join(of), said, of)
+        for said, of in belongs.items()
+        if len(of) != every
+    ]
+    return [*common, *others]
+
+
+def _as_warning(text: str) -> Message:
+    return text if isinstance(text, Message) else warning(text)
+
+
+def _warning_of_runs(runs: str, said: tuple[str, str], details: Mapping[str, str]) -> Message:
+    """A warning of several runs, with the details of each.
+
+    Args:
+        said: sentence and advice.
+        details: by run.
+    """
+    text, advice = said
+    each = [f"{run}: {detail}" for run, detail in details.items() if detail]
+    return warning(f"{runs}: {text}", advice, ". ".join(each))
 
 
 def _label(names: Sequence[str], variant: Variant) -> str:

@@ -27,7 +27,7 @@ from bladefem.scene.fields import value_at
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import Row, dump_scene, resolved_rows
-from bladefem.util.message import by_level
+from bladefem.util.message import Message, by_level
 
 from .captions import caption_of
 from .headlines import Headline, headlines
@@ -166,7 +166,8 @@ def page_contents(
     """Everything that the two templates print."""
     statements, shown = _shown_tables(tables)
     said = {
-        level: [_typeset(text) for text in texts] for level, texts in by_level(messages).items()
+        level: [_typeset_message(one) for one in those]
+        for level, those in by_level(messages).items()
     }
     total = sum(timings.values())
     live = {name: spec for name, spec in (page.live or {}).items() if name in figures}
@@ -216,6 +217,11 @@ def _typeset(sentence: str) -> str:
     'it keeps between 140 and 142 µm, and walks 3.5 µm/s'
     """
     return re.sub(r"(?<=\d )um\b", "µm", sentence)
+
+
+def _typeset_message(message: Message) -> Message:
+    text, advice, detail = map(_typeset, message.parts)
+    return Message(text, message.level, advice, detail)
 
 
 def _shown_tables(

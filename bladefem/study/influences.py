@@ -40,7 +40,8 @@ from .adaptive.band_sweep import solver_options
 from .adaptive.family import Family, Member, family_member, joined_elements
 from .adaptive.settings import Settings
 from .pipeline.assemble_model import LoadCase
-from .pipeline.best_load import BestLoad, find_best_load
+from .pipeline.best_load import BestLoad
+from .pipeline.best_load_search import find_best_load
 
 # factor on each side of a stiffness that the scene gives: a joint measured twice
 GIVEN_STIFFNESS = 2.0

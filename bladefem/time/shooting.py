@@ -21,6 +21,8 @@ from .system import System
 SHORTEST_STEP_SHARE = 2.0**-3
 # periods marched where Newton makes no headway
 MARCHED_PERIODS = 8
+# change over one period, relative to the size of the motion, below which it is periodic
+PERIODICITY_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,6 @@ def periodic_solution(
     system: System,
     omega: float,
     start: State | None = None,
-    tolerance: float = 1e-10,
     most: int = 40,
     samples: int = 256,
 ) -> Periodic:
@@ -61,7 +62,6 @@ def periodic_solution(
     the flow of a dissipative system leads towards its attractor.
 
     Args:
-        tolerance: accepted change over one period, relative to the size of the motion.
         most: largest number of Newton steps.
         samples: equal instants a period in the returned trajectory.
     """
@@ -70,7 +70,7 @@ def periodic_solution(
         shooting.integrate_from(start or stuck_start(system, omega)),
         lambda guess: guess.residual,
         shooting.advance_guess,
-        tolerance,
+        PERIODICITY_TOLERANCE,
         most,
     )
     end = run.state

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 from .communicator import Communicator
 
@@ -18,14 +18,13 @@ VARIABLE = "BLADEFEM_OVERSUBSCRIBE"
 
 def ranks_with_cores(
     comm: Communicator,
-    environment: Mapping[str, str] = os.environ,
 ) -> list[int]:
     """The ranks that are to work, ascending; rank 0 is one of them (collective).
 
     Of each machine's ranks the first ones, as many as there are cores on which any of them may run.
     """
     everyone = list(range(comm.size))
-    asked = environment.get(VARIABLE, "0") not in ("", "0")
+    asked = os.environ.get(VARIABLE, "0") not in ("", "0")
     places = comm.allgather((asked, os.uname().nodename, _own_cores()))
     if any(asked for asked, _, _ in places):
         return everyone

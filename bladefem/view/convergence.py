@@ -20,9 +20,6 @@ def draw_convergence(
     points: pd.DataFrame,
     summary: pd.DataFrame,
     file: str | Path | None = None,
-    *,
-    ax: Axes | None = None,
-    title: str = "",
 ) -> object:
     """Each mode's frequency against its finest one over element size; returns the figure.
 
@@ -33,11 +30,9 @@ def draw_convergence(
         points: columns size [m], mode, frequency [Hz], optionally nodal_diameter.
         summary: columns mode, frequency, limit [Hz], order [1], reason, optionally nodal_diameter.
         file: PNG to write.
-        ax: axes to draw into.
-        title: headline.
     """
     keys = [key for key in ("nodal_diameter", "mode") if key in summary]
-    with canvas(file, ax, (7.6, 4.6)) as ax:
+    with canvas(file, size=(7.6, 4.6)) as ax:
         # rigid modes have no frequency to change
         for i, row in enumerate(summary[summary["frequency"] > 0].itertuples()):
             line = points[np.logical_and.reduce([points[key] == getattr(row, key) for key in keys])]
@@ -47,7 +42,7 @@ def draw_convergence(
             xlabel="mean size of the elements [mm]",
             ylabel="frequency over that of the finest mesh, less 1 [%]",
             xlim=(0, None),
-            title=title or "mesh refinement",
+            title="mesh refinement",
         )
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
         return ax.figure

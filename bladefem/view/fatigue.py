@@ -48,7 +48,7 @@ def draw_utilisation(
         },
     ]
     image = photograph(parts, direction, RADIAL_DIRECTION, PICTURE_PIXELS)
-    with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
+    with canvas(file, size=size_for(image, margin=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, title)
         label = "alternating stress over the allowed one [1]"

@@ -25,14 +25,12 @@ DASHES = {0.0: "dash", np.inf: "dot"}
 def live_responses(
     points: pd.DataFrame,
     title: str = "",
-    per: str = "seat",
 ) -> dict[str, Any]:
     """Amplitude over frequency, a curve a load, every solved point with its numbers.
 
     Args:
         points: response table, SI columns (see ``response.py``).
         title: headline.
-        per: what carries the load.
     """
     loads = np.sort(points["load"].unique())
     colours = load_colours(loads)
@@ -68,7 +66,7 @@ def live_responses(
             "title": {"text": "vibration amplitude [µm]"},
             **_log_axis(MICRO * points["amplitude"]),
         },
-        "legend": {"title": {"text": f"normal load per {per}"}},
+        "legend": {"title": {"text": "normal load per seat"}},
         "hovermode": "closest",
     }
     return {"kind": "chart", "data": data, "layout": layout}
@@ -171,7 +169,6 @@ def _hover_line(column: str, value: Any) -> str:
 def live_optimum(
     summary: pd.DataFrame,
     own: float | None = None,
-    title: str = "optimum load",
     searched: pd.DataFrame | None = None,
     named: bool = True,
 ) -> dict[str, Any]:
@@ -180,7 +177,6 @@ def live_optimum(
     Args:
         summary: one row a load, SI columns.
         own: load that the damper's mass gives at the operating speed [N].
-        title: headline.
         searched: table of best loads by exact search, a row a mass; the star is then there, in
             the band of loads whose amplitudes keep within the accuracy of it.
         named: the data can carry an optimum; else none is marked.
@@ -206,7 +202,7 @@ def live_optimum(
     finite = summary[np.isfinite(summary["load"]) & (summary["load"] > 0)]
     loads = _log_axis(finite["load"])
     layout = {
-        "title": _escape_title(title),
+        "title": _escape_title("optimum load"),
         "showlegend": len(groups) > 1,
         "grid": {"rows": 2, "columns": 1, "pattern": "independent"},
         "xaxis": {**loads, "domain": [0, 1], "anchor": "y"},

@@ -22,13 +22,14 @@ MOST_TRIANGLES = 60_000
 LARGEST_INT16 = 32767
 # of the largest displacement: harmonics below it are not seen in the picture
 HARMONIC_SHARE = 0.005
+# modes that a page shows in motion
+LIVE_SHAPES = 4
 
 
 def live_shapes(
     mesh: Mesh,
     modes: ModeSet,
     families: Sequence[str] = (),
-    count: int = 4,
 ) -> dict[str, Any] | None:
     """Skin and shapes, for ``page.js``; None where the skin has too many triangles for a page.
 
@@ -38,9 +39,8 @@ def live_shapes(
         mesh: the sector or body.
         modes: shapes on the nodes of ``mesh``.
         families: names of the modes, where known.
-        count: how many of them.
     """
-    shown = range(min(count, len(modes.frequencies)))
+    shown = range(min(LIVE_SHAPES, len(modes.frequencies)))
     if not shown:
         return None
     surface = skin(moving_bodies(mesh, modes.shapes[0]), coarse=True)

@@ -90,6 +90,8 @@ PALE_FACE_COLOURS = {
     "trailing_edge": "#8d9aa5",
     "tip": "#e8d66c",
 }
+# of the height of a drawn damper, by which it is moved inwards
+DAMPER_SHIFT = 0.07
 FRONT_VIEW = (0.35, -0.85, 0.62)
 VIEW_FROM_BELOW = (-0.45, 0.8, 0.65)
 RADIAL_DIRECTION = (1.0, 0.0, 0.0)
@@ -349,14 +351,14 @@ def photograph_mesh(
     return photograph(parts, direction, RADIAL_DIRECTION)
 
 
-def damper_pulled_inwards(mesh: Mesh, share: float = 0.07) -> Mesh:
+def damper_pulled_inwards(mesh: Mesh) -> Mesh:
     """The mesh with the damper moved inwards by a share of the height, so that the contact
     faces can be seen.
     """
     nodes = [cells.ravel() for name, cells in mesh.bodies.items() if name.startswith("damper")]
     points = np.array(mesh.points, dtype=float)
     if nodes:
-        points[np.unique(np.concatenate(nodes)), 0] -= share * np.ptp(points[:, 0])
+        points[np.unique(np.concatenate(nodes)), 0] -= DAMPER_SHIFT * np.ptp(points[:, 0])
     return replace(mesh, points=points)
 
 

@@ -60,6 +60,8 @@ WHEEL_PIXELS = (1130, 890)
 # part of a tile's width that a picture takes, and the gap below its title [inch]
 TILE_SHARE = 0.98
 TITLE_GAP = 0.06
+# modes of a contact sheet
+SHEET_MODES = 8
 # in an animated wave
 WAVE_COLOURS = 224
 
@@ -120,7 +122,7 @@ def draw_mode(
     factor = scale_of(mesh, shape)
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction)
-    with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
+    with canvas(file, size=size_for(image, margin=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(
@@ -233,11 +235,10 @@ def draw_mode_sheet(
     modes: ModeSet,
     file: str | Path | None = None,
     *,
-    count: int = 8,
     families: Sequence[str] = (),
 ) -> object:
     """The first modes of a sector side by side; returns the figure."""
-    count = min(count, len(modes.frequencies))
+    count = min(SHEET_MODES, len(modes.frequencies))
     columns = min(count, 4)
     rows = -(-count // columns)
     direction = view_of(mesh)
@@ -387,7 +388,7 @@ def draw_wheel_mode(
         parts.append({"mesh": lines, "color": "black", "line_width": 2.2, "lighting": False})
     direction, up = wheel_camera(mesh)
     image = photograph(parts, direction, up, WHEEL_PIXELS, fine=True)
-    with canvas(file, size=size_for(image, 5.2, margin=1.0)) as ax:
+    with canvas(file, size=size_for(image, margin=1.0)) as ax:
         show_photograph(ax, image)
         headline(ax.figure, mode_title(modes, number, family))
         add_colour_bar(

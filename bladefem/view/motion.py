@@ -39,7 +39,7 @@ def draw_motion(
     factor = drawn_factor(mesh, motion)
     direction = view_of(mesh)
     image = photograph_shape(mesh, shape, factor, direction, values=amplitude)
-    with canvas(file, size=size_for(image, 5.2, margin=1.6)) as ax:
+    with canvas(file, size=size_for(image, margin=1.6)) as ax:
         show_photograph(ax, image, direction, RADIAL_DIRECTION)
         headline(ax.figure, title or "motion at the resonance")
         largest = 1e6 * float(amplitude.max(initial=0.0))

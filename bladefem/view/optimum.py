@@ -35,8 +35,6 @@ def draw_optimum(
     own: float | None = None,
     searched: pd.DataFrame | None = None,
     named: bool = True,
-    ax: Axes | None = None,
-    title: str = "",
 ) -> object:
     """Resonance amplitude and frequency over load, the optimum marked; a curve a mass if there is
     such a column.
@@ -52,10 +50,8 @@ def draw_optimum(
         searched: table of best loads by exact search, a row a mass; the star is then there,
             in the band of loads whose amplitudes keep within the accuracy of it.
         named: the data can carry an optimum; else none is marked.
-        ax: two axes to draw into, amplitude and frequency.
-        title: headline.
     """
-    with canvas(file, ax, (7.2, 5.8), (2, 1), sharex=True, height_ratios=[1.6, 1]) as axes:
+    with canvas(file, size=(7.2, 5.8), grid=(2, 1), sharex=True, height_ratios=[1.6, 1]) as axes:
         groups = summary.groupby("mass") if "mass" in summary else [(None, summary)]
         for (mass, table), colour in zip(groups, COLOURS * 9, strict=False):
             label = None if mass is None else f"damper of {1e3 * mass:.4g} g"
@@ -77,7 +73,7 @@ def draw_optimum(
                     ls=(0, (1, 1)),
                     label=f"the damper's own load, {newtons(own, 4)}" if axis is axes[0] else None,
                 )
-        axes[0].set(ylabel="resonance amplitude [µm]", title=title or "optimum load")
+        axes[0].set(ylabel="resonance amplitude [µm]", title="optimum load")
         axes[1].set(ylabel="resonance frequency [Hz]", xlabel="normal load per seat [N]")
         log_axis(axes[0], "y")
         log_axis(axes[1], "x")

@@ -19,7 +19,7 @@ from ..scene.units import newtons
 from .style import COLOURS, MICRO, canvas, log_axis
 
 MILLI = 1e3
-LIMIT_LABEL = "friction limit of a seat [N]"
+LOAD_LABEL = "normal load of a seat [N]"
 
 
 def draw_fit(
@@ -157,7 +157,6 @@ def draw_tip_responses(
     file: str | Path | None = None,
     title: str = "",
     dots: Mapping[float, np.ndarray] | None = None,
-    load: str = LIMIT_LABEL,
     crosses: Mapping[float, np.ndarray] | None = None,
 ) -> object:
     """Tip amplitude over frequency for several loads (Fig. 15); returns the figure.
@@ -165,7 +164,6 @@ def draw_tip_responses(
     Args:
         curves: load [N] to (frequency (p,) [Hz], amplitude (p,) [m]).
         dots: load [N] to the same (2, k) by another method.
-        load: what the loads are.
         crosses: as dots, by a third method.
     """
     marks = (
@@ -189,21 +187,19 @@ def draw_tip_responses(
                 ax.plot([], [], ls="none", color="#444444", label=name, **how)
         ax.set(xlabel="frequency [Hz]", ylabel="amplitude at the tip [µm]", title=title)
         log_axis(ax, "y")
-        ax.legend(title=load, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(title=LOAD_LABEL, loc="center left", bbox_to_anchor=(1.0, 0.5))
         return ax.figure
 
 
 def draw_friction_loops(
     loops: Mapping[float, tuple[np.ndarray, np.ndarray]],
     file: str | Path | None = None,
-    load: str = LIMIT_LABEL,
 ) -> object:
     """Total friction force of a seat over its relative displacement at resonance (Fig. 16); returns
     the figure.
 
     Args:
         loops: load [N] to (displacement (s,) [m], force (s,) [N]).
-        load: what the loads are.
     """
     with canvas(file, None, (7.2, 4.6)) as ax:
         shades = matplotlib.colormaps["viridis"](np.linspace(0, 0.92, len(loops)))
@@ -219,7 +215,7 @@ def draw_friction_loops(
             ylabel="friction force of a seat [N]",
             title="loops at resonance",
         )
-        ax.legend(title=load, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        ax.legend(title=LOAD_LABEL, loc="center left", bbox_to_anchor=(1.0, 0.5))
         return ax.figure
 
 
@@ -227,7 +223,6 @@ def draw_peaks(
     curves: Mapping[float, np.ndarray],
     file: str | Path | None = None,
     title: str = "",
-    load: str = LIMIT_LABEL,
     best: Mapping[float, tuple[float, float]] | None = None,
     loop: np.ndarray | None = None,
 ) -> object:
@@ -236,7 +231,6 @@ def draw_peaks(
 
     Args:
         curves: damper mass [kg] to (loads, 3) of load [N], frequency [Hz], amplitude [m].
-        load: what the loads are.
         best: damper mass [kg] to its optimum load [N] and the amplitude there [m].
         loop: (k, 3) as curves, by another method.
     """
@@ -259,7 +253,7 @@ def draw_peaks(
             right.plot(loop[:, 0], MICRO * loop[:, 2], "kx", ms=6)
         for ax in (left, right):
             ax.set_xscale("log")
-            ax.set_xlabel(load)
+            ax.set_xlabel(LOAD_LABEL)
         left.set(ylabel="resonance frequency [Hz]", title=title)
         right.set(ylabel="resonance amplitude [µm]")
         log_axis(right, "y")

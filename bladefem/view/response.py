@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # methods of a row that gives the resonance in place of the balances of its curve
+# of a drawn curve between two solved points
+SMOOTH_STEPS = 8
 MARCHED = "march in time"
 FOLLOWED = "followed to the stiff layer"
 # what the legend says of them
@@ -203,7 +205,6 @@ def pieces_of(curve: pd.DataFrame) -> list[tuple[np.ndarray, bool]]:
 def smooth_curve(
     x: np.ndarray,
     y: np.ndarray,
-    steps: int = 8,
 ) -> tuple[np.ndarray, np.ndarray]:
     """A curve through positive points without overshoot (monotone cubics of log y), NaN where a
     point is missing.
@@ -216,7 +217,9 @@ def smooth_curve(
         run = run[np.unique(x[run], return_index=True)[1]]
         if len(run) > 1:
             fine = np.interp(
-                np.arange(steps * (len(run) - 1) + 1) / steps, np.arange(len(run)), x[run]
+                np.arange(SMOOTH_STEPS * (len(run) - 1) + 1) / SMOOTH_STEPS,
+                np.arange(len(run)),
+                x[run],
             )
             xs.append(fine)
             ys.append(np.exp(PchipInterpolator(x[run], np.log(y[run]))(fine)))

@@ -24,6 +24,8 @@ SIDES = {
     ),
 }
 # cells that are drawn
+# of a wheel whose number of sectors is not known
+SHOWN_SECTORS = 5
 DRAWN_CELLS = ("triangle", "quad", "tetra", "hexahedron")
 
 
@@ -200,18 +202,18 @@ def sector_motion(mesh: Mesh, k: int) -> tuple[np.ndarray, np.ndarray]:
     return rotation, shift
 
 
-def wheel_count(mesh: Mesh, shown: int = 5) -> int:
+def wheel_count(mesh: Mesh) -> int:
     """Sectors in the picture of a wheel: all of them, or a few of a row without end."""
     if mesh.sector is None:
         return 1
-    return mesh.sector.count or shown
+    return mesh.sector.count or SHOWN_SECTORS
 
 
-def wheel_skin(mesh: Mesh, coarse: bool = True) -> Skin:
+def wheel_skin(mesh: Mesh) -> Skin:
     """The skin of the full wheel, copies of one sector in order; ``nodes`` repeats the sector's
     node numbers.
     """
-    one = skin(mesh, coarse, without=("cyclic_low", "cyclic_high"))
+    one = skin(mesh, coarse=True, without=("cyclic_low", "cyclic_high"))
     count = wheel_count(mesh)
     n = len(one.points)
     motions = [sector_motion(mesh, k) for k in range(count)]

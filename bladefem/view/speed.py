@@ -17,6 +17,7 @@ import pandas as pd
 from matplotlib.patheffects import withStroke
 
 from ..scene.units import RPM
+from ..study.modes.crossings import CLOSE_MARGIN
 from .style import COLOURS, FAILED_COLOUR, canvas
 
 if TYPE_CHECKING:
@@ -35,7 +36,6 @@ def draw_campbell(
     *,
     crossings: pd.DataFrame | None = None,
     operating: float | None = None,
-    ax: Axes | None = None,
     title: str = "",
 ) -> object:
     """Frequencies over speed with engine-order lines; crossings are ringed; returns the figure.
@@ -48,10 +48,9 @@ def draw_campbell(
         file: PNG to write.
         crossings: rows of ``campbell_crossings``: speed, frequency, engine_order.
         operating: speed to mark [rad/s].
-        ax: axes to draw into.
         title: headline.
     """
-    with canvas(file, ax, (7.6, 5.0)) as ax:
+    with canvas(file, size=(7.6, 5.0)) as ax:
         fastest = RPM * table["speed"].max()
         _draw_modes(ax, table)
         top = 1.12 * table["frequency"].max()
@@ -229,9 +228,6 @@ def draw_order_lines(
 def draw_nodal_diameters(
     table: pd.DataFrame,
     file: str | Path | None = None,
-    *,
-    ax: Axes | None = None,
-    title: str = "",
 ) -> object:
     """Frequency over nodal diameter, a line a mode number, coloured by family when it is known;
     returns the figure.
@@ -239,10 +235,8 @@ def draw_nodal_diameters(
     Args:
         table: columns nodal_diameter, mode, frequency [Hz], optionally family.
         file: PNG to write.
-        ax: axes to draw into.
-        title: headline.
     """
-    with canvas(file, ax, (7.6, 4.8)) as ax:
+    with canvas(file, size=(7.6, 4.8)) as ax:
         for _, line in table.groupby("mode"):
             line = line.sort_values("nodal_diameter")
             # modes may veer between them: no line
@@ -259,7 +253,7 @@ def draw_nodal_diameters(
         ax.set(
             xlabel="nodal diameter [1]",
             ylabel="frequency [Hz]",
-            title=title or "natural frequencies of the wheel",
+            title="natural frequencies of the wheel",
         )
         ax.set_ylim(bottom=0)
         ax.xaxis.get_major_locator().set_params(integer=True)
@@ -296,8 +290,6 @@ def draw_interference(
     file: str | Path | None = None,
     *,
     orders: Sequence[int] = (),
-    close: float = 0.05,
-    title: str = "",
 ) -> object:
     """SAFE diagram: modes over nodal diameter with the folded line of excitation frequencies;
     returns the figure.
@@ -308,10 +300,8 @@ def draw_interference(
         speed: [rad/s].
         file: PNG to write.
         orders: engine orders to mark on the line.
-        close: relative margin under which a mode is ringed.
-        title: headline.
     """
-    with canvas(file, None, (7.6, 4.8)) as ax:
+    with canvas(file, size=(7.6, 4.8)) as ax:
         draw_families(ax, table)
         top = 1.1 * table["frequency"].max()
         last = min(int(np.ceil(2 * np.pi * top / max(speed, 1e-9))), 6 * sectors, 2000)
@@ -325,12 +315,12 @@ def draw_interference(
             zorder=1,
             label=f"excitation at {RPM * speed:.5g} rpm",
         )
-        draw_excitations(ax, table, sectors, speed, orders, close)
+        draw_excitations(ax, table, sectors, speed, orders)
         ax.set(
             xlabel="nodal diameter [1]",
             ylabel="frequency [Hz]",
             ylim=(0, top),
-            title=title or "interference (SAFE) diagram",
+            title="interference (SAFE) diagram",
         )
         ax.xaxis.get_major_locator().set_params(integer=True)
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -343,7 +333,6 @@ def draw_excitations(
     sectors: int,
     speed: float,
     orders: Sequence[int],
-    close: float,
 ) -> None:
     """Chosen engine orders on the folded line, with rings round modes that are too near."""
     rings = []
@@ -365,7 +354,8 @@ def draw_excitations(
             path_effects=[withStroke(linewidth=1.5, foreground="white")],
         )
         near = table[
-            (table["nodal_diameter"] == n) & ((table["frequency"] / max(f, 1e-9) - 1).abs() < close)
+            (table["nodal_diameter"] == n)
+            & ((table["frequency"] / max(f, 1e-9) - 1).abs() < CLOSE_MARGIN)
         ]
         rings += near[["nodal_diameter", "frequency"]].to_numpy().tolist()
     if rings:
@@ -377,7 +367,7 @@ def draw_excitations(
             mew=1.6,
             ms=13,
             zorder=5,
-            label=f"closer than {100 * close:.3g} %",
+            label=f"closer than {100 * CLOSE_MARGIN:.3g} %",
         )
 
 

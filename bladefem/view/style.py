@@ -32,6 +32,11 @@ DIVERGING_COLOURS = "RdBu_r"
 INK_COLOUR = "#222222"
 # pixels of the window to one of the picture, along each side, in place of several samples a pixel
 SUPERSAMPLING = 1.5
+# of a rendering in its figure [inch]
+RENDERING_HEIGHT = 5.2
+WIDEST_RENDERING = 9.0
+# round what a rendering shows [pixel]
+BORDER = 12
 # zlib's level: two thirds of the time of the usual one, 2 to 4 % more room
 PNG_OPTIONS = {"compress_level": 4}
 # mark of images that are renderings
@@ -299,16 +304,16 @@ def aim_camera(
     plotter.renderer.ResetCameraClippingRange()
 
 
-def trim_border(image: np.ndarray, margin: int = 12) -> np.ndarray:
+def trim_border(image: np.ndarray) -> np.ndarray:
     """Cut the white border off a picture."""
     inked = np.any(image < 250, axis=2)
     rows = np.flatnonzero(inked.any(axis=1))
     columns = np.flatnonzero(inked.any(axis=0))
     if len(rows) == 0:
         return image
-    top = max(rows[0] - margin, 0)
-    left = max(columns[0] - margin, 0)
-    return image[top : rows[-1] + margin + 1, left : columns[-1] + margin + 1]
+    top = max(rows[0] - BORDER, 0)
+    left = max(columns[0] - BORDER, 0)
+    return image[top : rows[-1] + BORDER + 1, left : columns[-1] + BORDER + 1]
 
 
 def show_photograph(
@@ -331,20 +336,13 @@ def show_photograph(
         draw_triad(figure.add_axes((left, 0.0, width, height)), direction, up)
 
 
-def size_for(
-    image: np.ndarray,
-    height: float,
-    margin: float = 0.3,
-    widest: float = 9.0,
-) -> tuple[float, float]:
-    """Figure size [inch] for a rendering about ``height`` tall, with room next to it and a line
-    above and below.
+def size_for(image: np.ndarray, margin: float) -> tuple[float, float]:
+    """Figure size [inch] for a rendering RENDERING_HEIGHT tall, unless that is too wide, with a
+    margin next to it and a line above and below.
     """
     rows, columns = image.shape[:2]
+    height = min(RENDERING_HEIGHT, WIDEST_RENDERING * rows / columns)
     width = height * columns / rows
-    if width > widest:
-        width = widest
-        height = widest * rows / columns
     return max(width + margin, 4.4), height + 0.8
 
 

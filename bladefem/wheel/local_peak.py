@@ -15,7 +15,8 @@ import numpy as np
 from ..hbm.solver.newton import DEFAULT_OPTIONS, Options
 from .model import Pattern, Wheel
 from .resonance import LOST_GAIN, Respond, WheelPeak, find_wheel_peak, lost_gain
-from .solve import WheelSolution, solve_wheel
+from .solution import WheelSolution
+from .solve import solve_wheel
 
 # of the frequency: from the peak of held means to the first points on both sides, at most. On the
 # shipped wheel points 0.07 % apart take 2 s each

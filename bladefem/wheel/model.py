@@ -84,6 +84,10 @@ class Pattern:
         return total
 
 
+# all blades and dampers alike
+TUNED_PATTERN = Pattern()
+
+
 @dataclass(frozen=True)
 class Wheel:
     """A tuned wheel of N sectors with a damper between each sector and the next.

@@ -21,17 +21,20 @@ from ..util.arrays import BooleanArray, IntegerArray, RealArray
 from ..util.communicator import Communicator
 from ..util.curve_extremum import parabola_minimum
 from ..util.progress import Progress, without_progress
-from .model import Pattern, Wheel
+from .model import TUNED_PATTERN, Pattern, Wheel
 from .one_body import one_body_model
 from .pattern_peak import PatternPeak, compared_peaks, peak_heights
 from .resonance import Respond, find_wheel_peak
-from .solve import TUNED_PATTERN, WheelSolution, solve_wheel
+from .solution import WheelSolution
+from .solve import solve_wheel
 
 CONFIDENCE_LEVEL = 0.95
 # of the wheels that stay below what a design is made for
 WHEEL_SHARE = 0.95
 # of the bootstrap: its intervals then move by a few per cent of their width
 BOOTSTRAP_RESAMPLES = 1000
+# relative error of the height of a wheel's peak by its search
+PEAK_TOLERANCE = 5e-3
 
 # looks for the highest blade of a pattern under a damper load [N]
 Search = Callable[[float, Pattern], PatternPeak]
@@ -292,7 +295,6 @@ def band_search(
     wheels: Mapping[float, Wheel],
     grid: Callable[[float, Pattern], np.ndarray],
     respond: Callable[[Wheel, Pattern], Respond],
-    tolerance: float = 5e-3,
 ) -> Search:
     """A search over a band, with the means as the wheels have them.
 
@@ -300,10 +302,9 @@ def band_search(
         wheels: damper load [N] to the tuned wheel under it.
         grid: damper load and pattern to the first circular frequencies of the search.
         respond: what solves one pattern at one frequency.
-        tolerance: relative error of a peak's height by the search.
     """
     return lambda load, pattern: PatternPeak(
-        find_wheel_peak(respond(wheels[load], pattern), grid(load, pattern), tolerance)
+        find_wheel_peak(respond(wheels[load], pattern), grid(load, pattern), PEAK_TOLERANCE)
     )
 
 
@@ -403,7 +404,6 @@ def one_body_respond(
     pattern: Pattern,
     H: int,
     samples: int,
-    options: Options = DEFAULT_OPTIONS,
 ) -> Respond:
     """Amplitudes by the balance of `bladefem.hbm` on one body: small wheels, thousands of
     points.
@@ -413,7 +413,7 @@ def one_body_respond(
 
     def respond(omega: float) -> np.ndarray:
         start = min(known, key=lambda s: abs(s.omega - omega), default=None)
-        point = solve(model, omega, H, samples, start=start, options=options)
+        point = solve(model, omega, H, samples, start=start)
         if not point.converged:
             return np.full(wheel.count, np.nan)
         known.append(point)

@@ -8,7 +8,8 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 
-from bladefem.cli.tables import mesh_quality, survey_tables
+from bladefem.cli.tables import mesh_quality, message_lists, run_summary, survey_tables
+from bladefem.util.message import Message, warning
 
 
 def test_a_mesh_is_told_in_nodes():
@@ -60,3 +61,26 @@ def test_a_mode_without_a_limit_says_why():
         .splitlines()
     )
     assert "as given [Hz]" in head and first.split()[:3] == ["1", "101.00", "2.000"]
+
+
+SAID = [
+    warning("the amplitude is that of a march", "use it as given", "9 N: 120 um"),
+    Message("searched", detail="8 loads"),
+]
+
+
+def test_a_page_has_the_details_that_the_terminal_leaves_out(tmp_path):
+    run = SimpleNamespace(timings={}, messages=SAID, folder=tmp_path)
+    told = run_summary(run)
+    assert "  - the amplitude is that of a march\n    what to do: use it as given" in told
+    # no page was written
+    assert "    details: 9 N: 120 um" in told and "    details: 8 loads" in told
+    (tmp_path / "report.html").touch()
+    told = run_summary(run)
+    assert "120 um" not in told and "8 loads" not in told
+    assert "figures and reasons of each: report.html, section Answer" in told
+    assert told.index("what to do") < told.index("figures and reasons") < told.index("report: ")
+
+
+def test_a_page_is_not_referred_to_where_nothing_was_left_out():
+    assert message_lists(["plain"], "report.html") == ["information:\n  - plain"]

@@ -3,8 +3,9 @@
 import numpy as np
 from small_patch import patch_model
 
+from bladefem.hbm.response import response
 from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 
 # [N]
 FORCE = 60.0

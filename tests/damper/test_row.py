@@ -13,9 +13,9 @@ from bladefem.damper.branch import state_of
 from bladefem.damper.paper import platform
 from bladefem.errors import InputError
 from bladefem.hbm.linear_resonances import free_resonances
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.stability.verdicts import in_one_body

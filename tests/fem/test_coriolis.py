@@ -15,9 +15,9 @@ from bladefem.fem.compat import MPI, assemble_matrix, dolfinx, ufl
 from bladefem.fem.constraint import constrain, in_step, transformation
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.gyroscopic import Spin, coupling, waves
+from bladefem.fem.linear_preload import linear_tangent, unit_speed_displacement
 from bladefem.fem.modes import modes
 from bladefem.fem.ports import port_model, port_models
-from bladefem.fem.rotation import linear_tangent, unit_speed_displacement
 from bladefem.hbm.linear.bodies import Damping, port_receptance
 from bladefem.hbm.linear_resonances import wave_frequencies
 from bladefem.scene.tables import Material

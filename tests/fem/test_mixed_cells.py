@@ -19,15 +19,12 @@ from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.held_part import part_above
+from bladefem.fem.linear_preload import linear_tangent, thermal_force
 from bladefem.fem.loads import body_mass, centrifugal
 from bladefem.fem.mixed_cells import drawn_nodes
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import (
-    body_under_rotation,
-    linear_tangent,
-    preload,
-    thermal_force,
-)
+from bladefem.fem.preload import preload
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.fem.temperature import Temperatures
 from bladefem.scene.tables import Material
 from geometry.imported import read_mesh

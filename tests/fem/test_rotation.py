@@ -14,14 +14,10 @@ from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.flexibility import flexible
+from bladefem.fem.linear_preload import linear_tangent, unit_speed_displacement
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import (
-    body_under_rotation,
-    linear_tangent,
-    preload,
-    tangent,
-    unit_speed_displacement,
-)
+from bladefem.fem.preload import preload, tangent
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.scene.tables import Material
 
 # First flap of a cantilever on the axis, mu = omega sqrt(rho A L^4 / E I) over eta = Omega sqrt(rho

@@ -6,7 +6,6 @@ from structured import box, sector
 
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem import modes as modal
-from bladefem.fem.all_diameters import _counting_shift as common_shift
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import SLEPc
@@ -14,6 +13,7 @@ from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.eigensolver import Eigensolver, krylov_schur
 from bladefem.fem.flexibility import compliance, flexible
 from bladefem.fem.linalg import Doubled, apply_block, solve_block
+from bladefem.fem.mode_count import _counting_shift as common_shift
 from bladefem.fem.modes import BLOCKS, SLEPC, _counting_shift, lowest_pairs, modes, pairs_together
 from bladefem.scene.tables import Material
 

@@ -20,9 +20,11 @@ from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.cubic_functions import cubic_functions
 from bladefem.fem.flexibility import flexible
+from bladefem.fem.linear_preload import unit_speed_displacement
 from bladefem.fem.modes import modes
 from bladefem.fem.refinement import refine_uniformly
-from bladefem.fem.rotation import SteadyState, state_tangent, unit_speed_displacement
+from bladefem.fem.rotation import state_tangent
+from bladefem.fem.steady_state import SteadyState
 from bladefem.fem.stiffness_error import frequency_errors, stiffness_error
 from bladefem.scene.tables import Material
 

@@ -13,9 +13,10 @@ from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, expand_to_mesh, in_step, restrict_load
 from bladefem.fem.flexibility import compliance, flexible
+from bladefem.fem.linear_preload import unit_speed_displacement
 from bladefem.fem.loads import surface_load
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import preload, unit_speed_displacement
+from bladefem.fem.preload import preload
 from bladefem.fem.stress import (
     gauss_and_nodal_stress,
     gauss_stress,

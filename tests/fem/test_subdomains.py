@@ -9,8 +9,8 @@ import pytest
 from structured import sector
 
 from bladefem.errors import NotSolvedError
-from bladefem.fem import all_diameters as wheel
 from bladefem.fem import cyclic_schur as core
+from bladefem.fem import mode_count
 from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
@@ -140,14 +140,14 @@ def test_a_failure_of_one_rank_ends_all(both, monkeypatch):
 
 
 def test_a_count_that_fails_on_one_rank_ends_all(both, monkeypatch):
-    plain = wheel._count_below
+    plain = mode_count._count_below
 
     def fails(*args):
         if MPI.COMM_WORLD.rank == MPI.COMM_WORLD.size - 1:
             raise NotSolvedError("the shift is an eigenvalue")
         return plain(*args)
 
-    monkeypatch.setattr(wheel, "_count_below", fails)
+    monkeypatch.setattr(mode_count, "_count_below", fails)
     # one for each of up to four ranks
     with pytest.raises(NotSolvedError, match="the shift is an eigenvalue"):
         all_diameters(both[0], 4, [0, 1, 2, 3])

@@ -12,13 +12,10 @@ from bladefem.fem.all_diameters import all_diameters
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain, transformation
 from bladefem.fem.flexibility import flexible
+from bladefem.fem.linear_preload import linear_tangent, thermal_displacement
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import (
-    body_under_rotation,
-    linear_tangent,
-    preload,
-    thermal_displacement,
-)
+from bladefem.fem.preload import preload
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.fem.supports import AreaSpring, supported
 from bladefem.fem.temperature import Temperatures
 from bladefem.scene.support import area_springs, held_letters

@@ -12,20 +12,16 @@ import pytest
 from structured import box, sector, wheel
 
 from bladefem.errors import InputError, NotSolvedError
-from bladefem.fem import rotation
+from bladefem.fem import rotating_forms
 from bladefem.fem.body import assemble
 from bladefem.fem.compat import MPI
 from bladefem.fem.constraint import constrain, in_step
 from bladefem.fem.flexibility import flexible
+from bladefem.fem.linear_preload import linear_tangent, thermal_displacement
 from bladefem.fem.loads import body_mass
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import (
-    body_under_rotation,
-    linear_tangent,
-    preload,
-    tangent,
-    thermal_displacement,
-)
+from bladefem.fem.preload import preload, tangent
+from bladefem.fem.rotation import body_under_rotation
 from bladefem.fem.stress import gauss_stress, von_mises
 from bladefem.fem.temperature import Temperatures, crystal_rotation
 from bladefem.fem.temperature_field import interpolate_temperatures
@@ -270,9 +266,9 @@ def test_a_free_crystal_expands_along_its_axes(large, table):
 
 def unbalanced_force(body, u):
     """(n_points*dim,) of the whole heat, at rest."""
-    forms = rotation._potential_forms(body, (0.0, 0.0, 1.0), "exact")
-    rotation._set_heating(forms, 1.0)
-    return rotation._unbalanced_force(body, forms, u, 0.0)
+    forms = rotating_forms.potential_forms(body, (0.0, 0.0, 1.0), "exact")
+    rotating_forms.set_heating(forms, 1.0)
+    return rotating_forms.unbalanced_force(body, forms, u, 0.0)
 
 
 def rigid(points):

@@ -8,6 +8,7 @@ from structured import sector
 
 from bladefem.errors import InputError, NotSolvedError
 from bladefem.fem import all_diameters as wheel
+from bladefem.fem import mode_count
 from bladefem.fem.all_diameters import all_diameters, eigenpairs
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import at_diameter, constrain, transformation
@@ -146,6 +147,6 @@ def test_inertia_counts_like_the_spectrum():
 
 def test_a_wrong_count_is_an_error(monkeypatch):
     body = assemble(sector(8, (2, 2, 1), bump=0.2), "blade", Material())
-    monkeypatch.setattr(wheel, "_count_below", lambda *_: 99)
+    monkeypatch.setattr(mode_count, "_count_below", lambda *_: 99)
     with pytest.raises(NotSolvedError, match="the inertia counts 99"):
         all_diameters(body, 3, [0, 1])

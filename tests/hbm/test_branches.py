@@ -13,10 +13,11 @@ from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.band_path import PathLimits
 from bladefem.hbm.branches import find_branches
 from bladefem.hbm.model import Damping
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 
 BAND = (249.0, 431.0)
 # matrices of the model, for the march

@@ -3,8 +3,8 @@
 import numpy as np
 from hbm_models import chain
 
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 
 
 def test_the_whole_curve_without_tuning():

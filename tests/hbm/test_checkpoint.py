@@ -7,9 +7,9 @@ from itertools import islice
 import numpy as np
 from models import single_mass
 
-from bladefem.hbm import sweep
+from bladefem.hbm import response as response_module
 from bladefem.hbm.checkpoint import response_with_checkpoints
-from bladefem.hbm.sweep import response
+from bladefem.hbm.response import response
 
 OMEGAS = np.linspace(0.8, 1.4, 9)
 
@@ -19,9 +19,11 @@ def test_a_killed_response_goes_on(tmp_path, monkeypatch):
     list(islice(response_with_checkpoints(tmp_path, model, OMEGAS, 5, 128), 4))
     (tmp_path / "stages" / "point-000004.npz").write_bytes(b"half a file")
     solved = []
-    plain = sweep.solve_along
+    plain = response_module.solve_along
     monkeypatch.setattr(
-        sweep, "solve_along", lambda m, omegas, *a: solved.extend(omegas) or plain(m, omegas, *a)
+        response_module,
+        "solve_along",
+        lambda m, omegas, *a: solved.extend(omegas) or plain(m, omegas, *a),
     )
     again = list(response_with_checkpoints(tmp_path, model, OMEGAS, 5, 128))
     assert solved == list(OMEGAS[3:])

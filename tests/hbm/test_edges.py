@@ -11,9 +11,10 @@ from bladefem.errors import NotSolvedError
 from bladefem.hbm.model import Damping
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak
+from bladefem.hbm.response import response
 from bladefem.hbm.sensitivity import sensitivities
 from bladefem.hbm.solve import free_response, solve, stuck_response
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 
 MODELS = {
     "single mass": (single_mass(), 1.1),

@@ -17,12 +17,12 @@ from bladefem.hbm.frequency_walk import walk_in_frequency
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.arclength import path_distance
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.residual import Balance, evaluate_balance
-from bladefem.hbm.sweep import response
 from bladefem.reduction.matrices import port_model_from_matrices
 
 

@@ -7,9 +7,10 @@ from hbm_grid import grid
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.next_frequency import local_maxima
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve, stuck_response
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 
 HZ = 2 * np.pi
 

@@ -56,8 +56,8 @@ def test_the_main_job_compiles_nothing_after_the_installation():
     from bladefem.friction.aft import evaluate
     from bladefem.hbm import precompile
     from bladefem.hbm.linear.condensation import condense
+    from bladefem.hbm.response import response
     from bladefem.hbm.stability import stability_verdict
-    from bladefem.hbm.sweep import response
 
     precompile.compile_kernels()
     plane = precompile._plane_model()

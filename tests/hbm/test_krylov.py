@@ -21,6 +21,7 @@ from bladefem.hbm.linear.contact_flexibility import (
 )
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver import newton_krylov
 from bladefem.hbm.solver.deflation import _leading_directions, no_level, no_ramp, second_level
@@ -28,7 +29,6 @@ from bladefem.hbm.solver.dense_lu import back_substitute
 from bladefem.hbm.solver.krylov import NOT_FOUND, conjugate_residuals
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.newton_compiled import dense_jacobian
-from bladefem.hbm.sweep import response
 
 
 def system(strength, nodes=6, d=2, H=4):

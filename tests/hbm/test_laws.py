@@ -17,6 +17,7 @@ from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.node_gradients import node_gradients
 from bladefem.hbm.parameters import vary
+from bladefem.hbm.response import response
 from bladefem.hbm.sensitivity import sensitivities
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
@@ -24,7 +25,7 @@ from bladefem.hbm.solver import fallback
 from bladefem.hbm.solver.fallback import solve_balance
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS, Options
 from bladefem.hbm.solver.residual import Balance
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 from bladefem.hbm.truncation_indicator import truncation_indicator
 from bladefem.reduction.matrices import port_model_from_matrices
 

@@ -7,12 +7,12 @@ import pytest
 from models import block, single_mass
 
 from bladefem.errors import NotSolvedError
-from bladefem.hbm import sweep
+from bladefem.hbm import response as response_module
 from bladefem.hbm.optimum import optimum
 from bladefem.hbm.parallel import share_work, shared_response
 from bladefem.hbm.parameters import vary
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
-from bladefem.hbm.sweep import response
 
 OMEGAS = np.linspace(0.6, 1.8, 39)
 
@@ -60,7 +60,7 @@ def test_a_killed_run_goes_on_with_any_number_of_ranks(tmp_path, monkeypatch):
     """
     from mpi4py import MPI
 
-    comm, model, plain, solved = MPI.COMM_WORLD, single_mass(), sweep.solve_along, []
+    comm, model, plain, solved = MPI.COMM_WORLD, single_mass(), response_module.solve_along, []
     folder = comm.bcast(tmp_path)
     alone = shared_response(model, OMEGAS, 3, 64)
 
@@ -74,12 +74,12 @@ def test_a_killed_run_goes_on_with_any_number_of_ranks(tmp_path, monkeypatch):
         return work
 
     if comm.rank == 0:
-        monkeypatch.setattr(sweep, "solve_along", until(20))
+        monkeypatch.setattr(response_module, "solve_along", until(20))
         with pytest.raises(KeyboardInterrupt):
             shared_response(model, OMEGAS, 3, 64, folder=folder)
     comm.Barrier()
     solved.clear()
-    monkeypatch.setattr(sweep, "solve_along", until(len(OMEGAS)))
+    monkeypatch.setattr(response_module, "solve_along", until(len(OMEGAS)))
     again = shared_response(model, OMEGAS, 3, 64, comm=comm, folder=folder)
     assert comm.allreduce(len(solved)) == len(OMEGAS) - 20
     assert all(np.array_equal(one.w, other.w) for one, other in zip(again, alone, strict=True))

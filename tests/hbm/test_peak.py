@@ -18,10 +18,11 @@ from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak, with_slope
 from bladefem.hbm.peak_levels import PeakSearch, Variation, look_over_band
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 from bladefem.reduction.matrices import port_model_from_matrices
 
 HZ = 2 * np.pi

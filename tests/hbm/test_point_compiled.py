@@ -12,13 +12,13 @@ from plain import waves
 from bladefem.data import PortModel
 from bladefem.errors import InputError
 from bladefem.friction.fourier import to_complex
+from bladefem.hbm import response as response_module
 from bladefem.hbm import solve as api
-from bladefem.hbm import sweep
 from bladefem.hbm.model import Damping
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.dense_lu import back_substitute, factorise_large, factorise_small
-from bladefem.hbm.sweep import response
 
 
 def elastic_damper():
@@ -180,7 +180,7 @@ def test_a_sweep_at_once_is_the_sweep_point_by_point(points, monkeypatch):
     model = reference_model(3e6, 0.12, 8.0, phase=0.5, points=points, harmonics=3, modes=10)
     omegas = 2 * np.pi * np.linspace(780, 1300, 40)
     fast = list(response(model, omegas, 3, 64))
-    monkeypatch.setattr(sweep, "solve_along", lambda *_: [])
+    monkeypatch.setattr(response_module, "solve_along", lambda *_: [])
     monkeypatch.setattr(api, "solve_small", lambda *_: None)
     plain = list(response(replace(model), omegas, 3, 64))
     assert {p.states["stick"] == 2 * points for p in fast} == {True, False}
@@ -195,10 +195,12 @@ def test_a_sweep_at_once_is_the_sweep_point_by_point(points, monkeypatch):
 def test_a_sweep_without_compiled_points_checks_each_frequency_in_its_turn(monkeypatch):
     """Not up to 16 of them before every point; a bad one is refused all the same."""
     checked = []
-    monkeypatch.setattr(sweep, "check_point", lambda *arguments: checked.append(arguments))
-    found = sweep.response(block(), [0.9, 1.0, -1.0], 3, 64)
+    monkeypatch.setattr(
+        response_module, "check_point", lambda *arguments: checked.append(arguments)
+    )
+    found = response(block(), [0.9, 1.0, -1.0], 3, 64)
     assert next(found).converged and next(found).converged and not checked
     with pytest.raises(InputError, match=r"omega -1\.0: expected a positive"):
         next(found)
-    list(sweep.response(single_mass(), [0.9, 1.0], 3, 64))
+    list(response(single_mass(), [0.9, 1.0], 3, 64))
     assert len(checked) == 2

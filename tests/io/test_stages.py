@@ -94,9 +94,11 @@ def test_nouns_come_back_bit_by_bit(noun, tmp_path):
 
 
 def test_a_stored_warning_stays_a_warning(tmp_path):
-    write_npz(tmp_path / "x.npz", "key", [warning("coarse"), "plain"])
-    back = read_npz(tmp_path / "x.npz", "key")
-    assert by_level(back) == by_level([warning("coarse"), "plain"])
+    said = [warning("coarse", "refine", "3 of 4 cells"), "plain"]
+    write_npz(tmp_path / "x.npz", "key", said)
+    back = by_level(read_npz(tmp_path / "x.npz", "key"))
+    assert back == by_level(said)
+    assert back["warning"][0].parts == ("coarse", "refine", "3 of 4 cells")
 
 
 @pytest.mark.parametrize("rows", [2, 0])

@@ -19,6 +19,7 @@ from bladefem.report.headlines import headlines
 from bladefem.report.next_steps import next_steps
 from bladefem.report.page_tables import page_tables, without_roundoff
 from bladefem.report.run_messages import beyond_stick
+from bladefem.report.scatter_sentences import loads_on_both_sides
 from bladefem.report.statements import (
     ResponseAnswer,
     assumed_stiffness,
@@ -28,7 +29,6 @@ from bladefem.report.statements import (
     wrong_speed,
 )
 from bladefem.report.tables import readable_texts, to_latex, to_markdown, write_tables
-from bladefem.report.wheel import loads_on_both_sides
 from bladefem.report.write import inputs_hash, write_report
 from bladefem.scene.tables import Contact, Excitation, Operation, Scene, Seat
 from bladefem.scene.toml import load_scene, vary
@@ -354,6 +354,21 @@ def test_levels_stay_apart(tmp_path):
     assert not any(word in box for word in ("plain", "balance", "found"))
     assert text.index("plain") < text.index('<section id="accuracy"') < text.index("balance")
     assert text.index('<section id="timings"') < text.index("mesh: found")
+
+
+def test_both_pages_say_what_to_do_and_why(tmp_path):
+    said = [
+        warning("it is unstable", "use a march", "9 N: 120 um"),
+        Message("sought", detail="8 loads"),
+    ]
+    files = write_report(tmp_path, Scene(), {}, {}, said)
+    page, plain = (file.read_text(encoding="utf-8") for file in files)
+    box = page[page.index('<div class="warnings">') : page.index("<h3>Information")]
+    assert "<div><b>What to do:</b> use a march</div>" in box
+    assert '<div class="detail">9 N: 120 µm</div>' in box
+    assert '<div class="detail">8 loads</div>' in page
+    assert "- it is unstable\n  - What to do: use a march\n  - 9 N: 120 µm\n" in plain
+    assert "- sought\n  - 8 loads\n" in plain
 
 
 def test_every_headline_says_how_sure_it_is():

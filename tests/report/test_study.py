@@ -21,6 +21,7 @@ from bladefem.report.study import (
 from bladefem.report.study_map import write_map, write_scatter
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
+from bladefem.util.message import warning
 from bladefem.view.study import draw_study
 
 
@@ -273,6 +274,17 @@ def test_warnings_of_all_values_are_on_the_page_each_once(tmp_path):
     said = warnings_of_all(["contact.mu"], four)
     assert said[0] == "all 4 runs: a coarse mesh"
     assert said[1] == "contact.mu = 0.3; contact.mu = 0.4; contact.mu = 0.5: a torus"
+
+
+def test_warnings_of_several_values_keep_their_advice_and_all_details():
+    both = [
+        replace(one, warnings=(warning("unstable under 9 N", "use a march", f"{number} um"),))
+        for number, one in enumerate(of_values(2 * (2e-5,), 2 * (0.01,)))
+    ]
+    (said,) = warnings_of_all(["contact.mu"], both)
+    assert said == "contact.mu = 0.2; contact.mu = 0.3: unstable under 9 N"
+    assert said.advice == "use a march"
+    assert said.detail == "contact.mu = 0.2: 0 um. contact.mu = 0.3: 1 um"
 
 
 def test_bars_and_marks_tell_how_sure_each_resonance_is():

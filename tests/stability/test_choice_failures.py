@@ -18,12 +18,13 @@ from bladefem.hbm.model import Damping, ReducedModel
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, with_slope
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import as_solution, solve
 from bladefem.hbm.solver.fallback import Attempt, match_harmonics
 from bladefem.hbm.solver.newton import Options, newton
 from bladefem.hbm.solver.residual import Balance
-from bladefem.hbm.sweep import response, sweep
+from bladefem.hbm.sweep import sweep
 from bladefem.study.adaptive import check_points as watched
 from bladefem.study.adaptive import indicators
 from bladefem.study.adaptive.band_sweep import covered_band

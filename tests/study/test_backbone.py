@@ -134,8 +134,10 @@ def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     )
     assert main(["run", *arguments[1:]]) == 0
     of_run = [one for one in listed((tmp_path / "report.md").read_text()) if "estimated" in one]
-    assert any("estimated error of the resonance amplitude above the wanted" in o for o in of_run)
-    said = [one for one in of_run if "away from the resonance" in one or "above the wanted" in one]
+    assert any("estimated error of the resonance amplitude exceeds the wanted" in o for o in of_run)
+    said = [
+        one for one in of_run if "away from the resonance" in one or "exceeds the wanted" in one
+    ]
     assert len(said) == 2 and set(said) <= set(listed(page))
     # and on the terminal, as warnings
     shown = printed.split("warnings:\n")[1]

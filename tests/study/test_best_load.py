@@ -23,15 +23,11 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
-from bladefem.study.pipeline import best_load as best_load_module
+from bladefem.study.pipeline import best_load_search as search_module
 from bladefem.study.pipeline.assemble_model import LoadCase
-from bladefem.study.pipeline.best_load import (
-    CHART_LOAD_FACTORS,
-    chart_loads,
-    find_best_load,
-    load_variation,
-    search_range,
-)
+from bladefem.study.pipeline.best_load import CHART_LOAD_FACTORS, chart_loads
+from bladefem.study.pipeline.best_load_search import find_best_load, search_range
+from bladefem.study.pipeline.load_variation import load_variation
 from bladefem.study.pipeline.loads import default_loads
 
 HZ = 2 * np.pi
@@ -170,7 +166,7 @@ def test_a_search_that_is_too_large_is_made_with_less(best, monkeypatch):
     def too_large(family, settings, point, limit):
         return settings.harmonics > 3
 
-    monkeypatch.setattr(best_load_module, "too_large", too_large)
+    monkeypatch.setattr(search_module, "too_large", too_large)
     poor = replace(SETTINGS, harmonics=1, samples=64, chosen=("harmonics", "samples"))
     found = find_best_load(replace(scene(), accuracy=1e-4), case_at, family, poor, None)
     assert found.reason == "" and found.settings.harmonics == 3
@@ -183,10 +179,10 @@ def test_less_means_fewer_contact_points_first(best, monkeypatch):
     def too_large(family, settings, point, limit):
         return point.states["lift"] > 0 and settings.points * (2 * settings.harmonics + 1) > 40
 
-    monkeypatch.setattr(best_load_module, "too_large", too_large)
+    monkeypatch.setattr(search_module, "too_large", too_large)
     lifting, closed = (SimpleNamespace(states={"lift": lift}) for lift in (3, 0))
     rich = replace(SETTINGS, harmonics=15, points=16, chosen=("harmonics", "points"))
-    less = best_load_module._smaller_settings
+    less = search_module._smaller_settings
     assert less(family, rich, lifting) == replace(rich, harmonics=3, points=4)
     assert less(family, rich, closed) == rich
     given = replace(rich, chosen=("harmonics",))
@@ -218,7 +214,7 @@ def test_a_search_begins_with_few_harmonics_and_ends_with_those_that_are_needed(
     """Settings of another load may be far richer; where few harmonics are not solved, the search
     begins with these.
     """
-    search_once = best_load_module._search_once
+    search_once = search_module._search_once
     used = []
 
     def watched(search, settings, *others):
@@ -227,7 +223,7 @@ def test_a_search_begins_with_few_harmonics_and_ends_with_those_that_are_needed(
             raise NotSolvedError("no peak")
         return search_once(search, settings, *others)
 
-    monkeypatch.setattr(best_load_module, "_search_once", watched)
+    monkeypatch.setattr(search_module, "_search_once", watched)
     rich = replace(SETTINGS, harmonics=7, samples=256, chosen=("harmonics", "samples"))
     found = find_best_load(scene(), case_at, family, rich, None)
     assert used[0].harmonics == 3 and used[0].samples == 64

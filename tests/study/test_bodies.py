@@ -7,8 +7,8 @@ import pytest
 
 from bladefem.fem.constraint import at_diameter, in_step, transformation
 from bladefem.fem.flexibility import flexible
+from bladefem.fem.linear_preload import unit_speed_displacement
 from bladefem.fem.modes import modes
-from bladefem.fem.rotation import unit_speed_displacement
 from bladefem.scene.toml import load_scene
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.scene_mesh import build_mesh

@@ -14,11 +14,11 @@ from bladefem.hbm.peak import find_peak
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.solve import solve
 from bladefem.study.adaptive import choice_in_time
-from bladefem.study.adaptive import resonance_curve as resonance_curve_module
 from bladefem.study.adaptive.choice_in_time import MarchedBand, choose_in_time, marched_widely
 from bladefem.study.adaptive.family import Family, Member, family_of
 from bladefem.study.adaptive.peak_errors import PeakErrors
 from bladefem.study.adaptive.resonance_curve import resonance_curve
+from bladefem.study.adaptive.rough_curve import is_lost
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.stability.error_in_time import Marches
 
@@ -183,7 +183,7 @@ def test_a_resonance_is_lost_where_points_beside_it_are(height, converged, lost)
     points = [point(0.8, height), point(0.99, 0.9, converged), point(1.1, 0.1), point(1.3, 0.05)]
     if converged:
         points[1] = point(0.99, 0.1)
-    assert resonance_curve_module._is_lost(point(1.0, 1.0), points) is lost
+    assert is_lost(point(1.0, 1.0), points) is lost
 
 
 def test_a_curve_of_a_mass_that_hops_has_the_error_of_its_march():

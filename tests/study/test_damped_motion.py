@@ -24,13 +24,13 @@ from bladefem.scene.toml import load_scene
 from bladefem.study.modes.linear_response import excitation_load
 from bladefem.study.pipeline import damped_motion as subject
 from bladefem.study.pipeline.assemble_model import joint_model, rigid_body
+from bladefem.study.pipeline.best_load_remarks import stress_message
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import load_cases
 from bladefem.study.pipeline.coriolis import has_coriolis, with_coriolis
 from bladefem.study.pipeline.damper_contact import seat_damper
 from bladefem.study.pipeline.normal_modes import find_modes, harmonic_diameters
 from bladefem.study.pipeline.reduced_sector import reduce_sector
-from bladefem.study.pipeline.response_remarks import stress_message
 from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches

@@ -27,6 +27,7 @@ from bladefem.study.pipeline.reduced_sector import DamperSpin, reduce_sector, wi
 from bladefem.study.pipeline.run_records import Seating
 from bladefem.study.pipeline.scene_mesh import build_mesh
 from bladefem.study.pipeline.validate_mesh import found_patches
+from bladefem.util.message import by_level
 
 # of the damper over its own mass: a heavy one
 HEAVIER = 6.0
@@ -244,3 +245,4 @@ def test_what_is_said_of_it(coriolis, softening, damping, words):
     assert len(said) == len(words)
     for text, wanted in zip(said, words, strict=True):
         assert re.search(wanted, text)
+    assert all(text.advice for text in by_level(said)["warning"])

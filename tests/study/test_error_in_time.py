@@ -26,7 +26,8 @@ from bladefem.study.stability.error_in_time import (
     error_of_doubt,
 )
 from bladefem.study.stability.judged_resonance import JudgedResonance, judged_in_time
-from bladefem.study.stability.kept_band import FEWEST_POINTS, KeptBand
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.march_from_motion import FEWEST_POINTS
 from bladefem.study.stability.verdicts import Stability
 
 OMEGA = 0.9

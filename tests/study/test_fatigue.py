@@ -13,7 +13,8 @@ from bladefem.errors import InputError
 from bladefem.fem.stress import signed_von_mises, von_mises
 from bladefem.report import fatigue
 from bladefem.report.fatigue import save_fatigue_vtu, utilisation_table
-from bladefem.report.wheel import use_headlines, use_sentences, use_table
+from bladefem.report.scatter_sentences import use_headlines, use_sentences
+from bladefem.report.scatter_tables import use_table
 from bladefem.scene.tables import Fatigue, Scene
 from bladefem.scene.toml import vary
 from bladefem.study.fatigue import fatigue_utilisation, haigh_diagram

@@ -11,9 +11,9 @@ import pytest
 from numba import njit
 
 from bladefem.damper.branch import state_of
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.stability import STABLE, UNSTABLE
-from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.scene.toml import load_scene, vary
 from bladefem.study.adaptive.checked_curve import CheckedCurve
@@ -22,7 +22,8 @@ from bladefem.study.adaptive.settings import first_for
 from bladefem.study.stability import error_in_time
 from bladefem.study.stability.error_in_time import Marches
 from bladefem.study.stability.flank_motions import flank_motions
-from bladefem.study.stability.kept_band import band_by_steps, kept_band
+from bladefem.study.stability.march_by_steps import band_by_steps
+from bladefem.study.stability.march_from_motion import kept_band
 from bladefem.study.stability.verdicts import in_one_body, stability_of
 from verification.paper.plane_row import row_of_blades, whole_model
 

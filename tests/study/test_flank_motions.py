@@ -15,7 +15,8 @@ from bladefem.hbm.stability import STABLE, UNSTABLE, stability_verdict
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.curve import Curve
-from bladefem.study.pipeline.stability_remarks import unmarched_sentence, unstable_sentences
+from bladefem.study.pipeline.load_remarks import load_warnings
+from bladefem.study.pipeline.motion_warnings import unmarched_motions, unstable_resonances
 from bladefem.study.stability import flank_motions as module
 from bladefem.study.stability import judged_resonance
 from bladefem.study.stability.error_in_time import Marches
@@ -117,9 +118,11 @@ def test_marches_that_are_not_known_are_told(curve, marks, kept):
     assert found.point is curve.points[3] and kept[1] == [3.0, 2.0]
     kept[0][3.0] = (np.nan, np.nan)
     assert flank_motions(MARCHES, curve, marks, 1.0).point is None
-    reported = unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure=found.reason)])
-    assert "4 N (a march takes too many operations)" in reported
-    assert unmarched_sentence([SimpleNamespace(load=4.0, flank_march_failure="")]) == ""
+    curve = SimpleNamespace(load=4.0, mass=None, flank_march_failure=found.reason)
+    (reported,) = load_warnings(unmarched_motions([curve]))
+    assert reported.detail == "4 N: a march takes too many operations"
+    curve.flank_march_failure = ""
+    assert not list(unmarched_motions([curve]))
 
 
 @pytest.mark.parametrize(
@@ -171,11 +174,16 @@ def test_the_report_says_where_the_amplitude_was_marched_from(verdict, said):
         peak_frequency=1014.2,
         march_at_peak=KeptBand(1014.2, 1.15e-6, 3.6e-6, 350),
     )
-    (text,) = unstable_sentences([curve], 0.02)
-    assert f"the highest motion {said}, and" in text
-    assert "under 4 N, 2.149 um at 1077.3 Hz: from 2.05 um at 1014.2 Hz" in text
-    assert "between 1.15 and 3.6 um" in text
-    assert "first point of the band" in text
+    (text,) = load_warnings(unstable_resonances([curve], 0.02))
+    assert "under 4 N the amplitude given is that of an integration in time" in text
+    assert f"the highest periodic motion {said}, and" in text
+    assert "2.149 um at 1077.3 Hz; from 2.05 um at 1014.2 Hz" in text.detail
+    assert "between 1.15 and 3.6 um" in text.detail
+    # 1014.2 Hz is the first point
+    assert text.advice.startswith("widen study.band")
+    curve.frequency = np.array([1000.0, 1077.3, 1090.0])
+    (text,) = load_warnings(unstable_resonances([curve], 0.02))
+    assert text.advice == "use it as given"
     assert Curve.marched.fget(curve) == pytest.approx(1 - 1.15 / 3.6)
 
 

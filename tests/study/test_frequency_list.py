@@ -8,10 +8,10 @@ from bladefem.errors import InputError
 from bladefem.hbm.linear_resonances import free_resonances, stuck_resonances
 from bladefem.hbm.model import ReducedModel
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.sweep import response
 from bladefem.reduction.matrices import port_model_from_matrices
 from bladefem.study.adaptive.check_points import heights_of, peak_of, points_to_check
 from bladefem.study.adaptive.family import family_of

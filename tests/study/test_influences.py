@@ -22,7 +22,7 @@ from bladefem.study.influences import (
     seat_friction_range,
 )
 from bladefem.study.pipeline.assemble_model import LoadCase
-from bladefem.study.pipeline.best_load import find_best_load
+from bladefem.study.pipeline.best_load_search import find_best_load
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 MODEL = reference_model(1e6, 0.06, 1.0, harmonics=1)

@@ -20,13 +20,20 @@ from bladefem.hbm.time_model import time_system
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline.curve import Curve
-from bladefem.study.pipeline.stability_remarks import doubtful_sentence
-from bladefem.study.stability import finer_contacts, judged_resonance
-from bladefem.study.stability import kept_band as module
+from bladefem.study.pipeline.load_remarks import load_warnings
+from bladefem.study.pipeline.motion_warnings import doubtful_resonances
+from bladefem.study.stability import (
+    exact_march,
+    finer_contacts,
+    judged_resonance,
+    march_by_steps,
+    march_from_motion,
+)
 from bladefem.study.stability.error_in_time import Marches
 from bladefem.study.stability.finer_contacts import FinerMotion, unstable_with_more_points
 from bladefem.study.stability.flank_motions import FlankMotions
-from bladefem.study.stability.kept_band import kept_band
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.march_from_motion import kept_band
 from bladefem.study.stability.verdicts import Stability, in_one_body
 from bladefem.time.event_integrator import integrate_periods, state_at_rest
 
@@ -89,7 +96,7 @@ def test_the_way_down_from_an_unstable_motion_is_not_what_the_blade_keeps_to():
     # marched once
     assert judged_resonance._marched(marches, settings, point) is found
     # where a higher motion is known it is not marched on
-    short = module.band_by_steps(model, point, known=2 * truth.max())
+    short = march_by_steps.band_by_steps(model, point, known=2 * truth.max())
     assert short.periods == on_its_way.periods and short.unsettled
 
 
@@ -114,7 +121,7 @@ def test_a_stable_motion_is_kept():
 
 
 def test_what_cannot_be_marched_says_why(monkeypatch):
-    monkeypatch.setattr("bladefem.study.stability.kept_band.MAX_STEPS", 10.0)
+    monkeypatch.setattr("bladefem.study.stability.exact_march.MAX_STEPS", 10.0)
     model = rebounding(10.0, 0.1, 0.04)
     found = kept_band(model, solve(model, 3.0, 3, 128))
     assert "is not known: a march takes" in found.sentence
@@ -122,10 +129,10 @@ def test_what_cannot_be_marched_says_why(monkeypatch):
 
 def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(monkeypatch):
     """1.1e11 operations on ground faces; fewer points there end on another motion."""
-    monkeypatch.setattr(module, "march_operations", lambda model, periods: 1.1e11)
-    assert module.affordable_march(None)
-    monkeypatch.setattr(module, "march_operations", lambda model, periods: 3.5e11)
-    assert not module.affordable_march(None)
+    monkeypatch.setattr(march_from_motion, "march_operations", lambda model, periods: 1.1e11)
+    assert march_from_motion.affordable_march(None)
+    monkeypatch.setattr(march_from_motion, "march_operations", lambda model, periods: 3.5e11)
+    assert not march_from_motion.affordable_march(None)
 
 
 @pytest.mark.parametrize(
@@ -133,7 +140,7 @@ def test_a_wave_over_four_blades_is_marched_on_sixteen_contact_points_a_seat(mon
     [(0.9, 1.04, "", 0.04), (0.8, 0.95, "", 0.0), (np.nan, np.nan, "too long", 0.0)],
 )
 def test_a_band_above_the_resonance_given_is_part_of_its_error(lowest, highest, reason, share):
-    band = module.KeptBand(380.0, lowest, highest, 200, reason)
+    band = KeptBand(380.0, lowest, highest, 200, reason)
     elsewhere = SimpleNamespace(
         march_at_peak=band,
         curve_amplitude=1.0,
@@ -164,9 +171,9 @@ def test_a_march_contradicts_a_balance_of_another_amplitude_than_its_highest(
 ):
     """By more than the accuracy; 247 um under 96 N on an imported wedge go to 408 to 455."""
     point = SimpleNamespace(probe=np.array([[0.0], [1.0]]))
-    band = module.KeptBand(380.0, lowest, highest, 200)
+    band = KeptBand(380.0, lowest, highest, 200)
     assert judged_resonance._contradicts(band, point, 0.05) == contradicts
-    unknown = module.KeptBand(380.0, np.nan, np.nan, 0, "too long")
+    unknown = KeptBand(380.0, np.nan, np.nan, 0, "too long")
     assert not judged_resonance._contradicts(unknown, point, 0.05)
 
 
@@ -185,7 +192,7 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
         point.converged = True
     marks = Stability(np.array(["stable", "stable", "unstable"]), np.ones(3))
     reason = "too long" if np.isnan(kept_to) else ""
-    band = module.KeptBand(2.0, kept_to, kept_to, 200, reason)
+    band = KeptBand(2.0, kept_to, kept_to, 200, reason)
     curve = SimpleNamespace(points=points, settings=None)
     scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.05)
     models = {
@@ -200,7 +207,7 @@ def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypat
     monkeypatch.setattr(
         judged_resonance, "judged_above", lambda *args: asked.append(args[-1]) or marks
     )
-    lasting = module.KeptBand(1.0, 0.9, 0.9, 200)
+    lasting = KeptBand(1.0, 0.9, 0.9, 200)
 
     def marched_from(*args):
         return band if size(args[-1]) > 1.0 else lasting
@@ -233,7 +240,7 @@ def test_a_motion_called_stable_that_the_blade_leaves_is_not_given(monkeypatch, 
     ends = {1.2: 0.7, 0.9: held_to}
 
     def marched_from(_, point):
-        return module.KeptBand(point.frequency, ends[point.omega], ends[point.omega], 200)
+        return KeptBand(point.frequency, ends[point.omega], ends[point.omega], 200)
 
     marches = SimpleNamespace(models=None, band=marched_from)
     found = judged_resonance._at_the_highest(marches, curve, scene, marks, 2)
@@ -307,11 +314,11 @@ def test_a_march_ends_where_its_band_has_settled(monkeypatch, heights, fewest, m
         begun.append(len(found.motion))
         return found
 
-    monkeypatch.setattr(module, "march_ring", march)
-    found = module.band_by_steps(model, point)
+    monkeypatch.setattr(march_by_steps, "march_ring", march)
+    found = march_by_steps.band_by_steps(model, point)
     assert fewest <= found.periods <= most
     assert found.widens == (fewest == 800) == ("still widens" in found.sentence)
-    kept = size(point) * heights[: found.periods][-module.KEPT_BY_STEPS :]
+    kept = size(point) * heights[: found.periods][-march_by_steps.KEPT_BY_STEPS :]
     assert found.highest == pytest.approx(kept.max(), rel=2e-3)
     assert found.lowest == pytest.approx(kept.min(), rel=2e-3)
 
@@ -322,8 +329,8 @@ def test_growth_where_contacts_lift_off_is_marched_with_more_instants(monkeypatc
     model = rebounding(10.0, 0.1, 0.04)
     point = solve(model, 3.0, 15, 1024)
     assert point.states["lift"] > 0
-    monkeypatch.setattr(module, "march_ring", marches_that_grow(point, holds))
-    found = module.band_by_steps(model, point)
+    monkeypatch.setattr(march_by_steps, "march_ring", marches_that_grow(point, holds))
+    found = march_by_steps.band_by_steps(model, point)
     assert found.highest == pytest.approx(ratio * size(point))
     # where the motion stays as it is three parts will do
     assert found.periods == 75
@@ -354,9 +361,9 @@ def test_steps_too_long_for_the_bodies_are_halved(monkeypatch, ends, lowest, hig
         found = marched(heights, instants, enough)
         return SimpleNamespace(**vars(found) | {"resolved": False})
 
-    monkeypatch.setattr(module, "march_ring", march)
-    monkeypatch.setattr(module, "steps_are_resolved", lambda *_: False)
-    found = module.band_by_steps(model, point)
+    monkeypatch.setattr(march_by_steps, "march_ring", march)
+    monkeypatch.setattr(march_by_steps, "steps_are_resolved", lambda *_: False)
+    found = march_by_steps.band_by_steps(model, point)
     assert seen == asked
     assert found.lowest == pytest.approx(lowest * size(point), rel=1e-6)
     assert found.highest == pytest.approx(highest * size(point), rel=1e-6)
@@ -385,11 +392,11 @@ def test_a_march_begins_with_steps_short_enough_and_goes_on_to_shorter_ones(
         found = marched(np.full(periods, size(point)), instants, ended)
         return SimpleNamespace(**vars(found) | {"settled": instants not in failing})
 
-    monkeypatch.setattr(module, "march_ring", march)
+    monkeypatch.setattr(march_by_steps, "march_ring", march)
     monkeypatch.setattr(
-        module, "steps_are_resolved", lambda _model, _omega, instants: instants >= enough
+        march_by_steps, "steps_are_resolved", lambda _model, _omega, instants: instants >= enough
     )
-    found = module.band_by_steps(model, point)
+    found = march_by_steps.band_by_steps(model, point)
     assert seen == asked
     assert bool(found.reason) == (asked[-1][0] in failing)
 
@@ -401,7 +408,7 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
         monkeypatch.setattr(judged_resonance, name, lambda *_: None)
     monkeypatch.setattr(judged_resonance, "richer_models", lambda *_: [])
     monkeypatch.setattr(judged_resonance, "judged_above", lambda *args: args[3])
-    marches = SimpleNamespace(models=None, band=lambda *_: module.KeptBand(1.0, 0.8, 0.8, 100))
+    marches = SimpleNamespace(models=None, band=lambda *_: KeptBand(1.0, 0.8, 0.8, 100))
 
     def given(lift, harmonics):
         point = SimpleNamespace(
@@ -422,7 +429,7 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     # nothing lifts off, or a verdict has harmonics enough
     assert given(lift=0, harmonics=3).amplitude == given(lift=3, harmonics=15).amplitude == 1.0
     # what keeps within the accuracy is an error of the balance, to either side
-    marches.band = lambda *_: module.KeptBand(1.0, 0.96, 0.97, 100)
+    marches.band = lambda *_: KeptBand(1.0, 0.96, 0.97, 100)
     held = given(lift=3, harmonics=3)
     assert held.amplitude == 1.0 and held.marks.verdict[0] == STABLE
     shown = SimpleNamespace(
@@ -436,30 +443,30 @@ def test_a_motion_with_lift_off_that_few_harmonics_call_stable_is_marched(monkey
     shown.is_marched_from = Curve.is_marched_from.fget(shown)
     assert Curve.marched.fget(shown) == pytest.approx(0.04)
     # what could not be marched is said
-    marches.band = lambda *_: module.KeptBand(1.0, np.nan, np.nan, 0, "no march")
+    marches.band = lambda *_: KeptBand(1.0, np.nan, np.nan, 0, "no march")
     unknown = given(lift=3, harmonics=3)
     shown = SimpleNamespace(
-        load=580.0, march_at_peak=unknown.march, unstable_peak=None, error_march=None
+        load=580.0, mass=None, march_at_peak=unknown.march, unstable_peak=None, error_march=None
     )
-    assert "580 N (no march)" in doubtful_sentence([shown])
-    assert "580 N (a flow)" in doubtful_sentence([shown], "a flow")
+    (said,) = load_warnings(doubtful_resonances([shown]))
+    assert said.startswith("under 580 N it is not known whether") and said.detail == "no march"
+    assert load_warnings(doubtful_resonances([shown], "a flow"))[0].detail == "a flow"
     # loads that share a reason say it once
     other = SimpleNamespace(**vars(shown) | {"load": 900.0})
-    assert doubtful_sentence([shown, other]).endswith("known: 580 N, 900 N (no march)")
+    (said,) = load_warnings(doubtful_resonances([shown, other]))
+    assert said.startswith("under 580 N and 900 N it is") and said.detail == "no march"
     # but for the error that fewer contact points tell
     shown.error_march = held.march
-    assert doubtful_sentence([shown]) == ""
-    assert (
-        doubtful_sentence([SimpleNamespace(march_at_peak=held.march, unstable_peak=None, load=1.0)])
-        == ""
-    )
+    assert not list(doubtful_resonances([shown]))
+    shown = SimpleNamespace(march_at_peak=held.march, unstable_peak=None, load=1.0)
+    assert not list(doubtful_resonances([shown]))
 
 
 def test_a_march_with_fewer_points_far_from_the_balance_is_in_doubt():
     """Ground faces, 1100 N: eight points a seat keep 457 um of 536 with 16, which keep 517."""
 
     def error(points):
-        band = module.KeptBand(446.7, 457e-6, 457e-6, 100, points=points)
+        band = KeptBand(446.7, 457e-6, 457e-6, 100, points=points)
         return Curve.marched.fget(
             SimpleNamespace(
                 march_at_peak=band,
@@ -482,17 +489,19 @@ def family_marches(monkeypatch):
 
     def band(model, point, counted):
         tried.append((point.points, counted))
-        too_long = point.points is not None and counted / point.points < module.MAX_COUNTED / 8
-        return module.KeptBand(1.0, 1.0, 1.0, 100, "too long" if too_long else "", None, too_long)
+        too_long = (
+            point.points is not None and counted / point.points < march_by_steps.MAX_COUNTED / 8
+        )
+        return KeptBand(1.0, 1.0, 1.0, 100, "too long" if too_long else "", None, too_long)
 
     def moved(models, settings, point, fewer, options):
         return motion(fewer.points, fewer.points not in unsolved)
 
-    monkeypatch.setattr(module, "model_in_time", lambda *_: None)
-    monkeypatch.setattr(module, "settings_in_time", lambda _, settings: settings)
-    monkeypatch.setattr(module, "affordable_march", lambda _: True)
-    monkeypatch.setattr(module, "kept_band", band)
-    monkeypatch.setattr(module, "moved_solution", moved)
+    monkeypatch.setattr(march_from_motion, "model_in_time", lambda *_: None)
+    monkeypatch.setattr(march_from_motion, "settings_in_time", lambda _, settings: settings)
+    monkeypatch.setattr(march_from_motion, "affordable_march", lambda _: True)
+    monkeypatch.setattr(march_from_motion, "kept_band", band)
+    monkeypatch.setattr(march_from_motion, "moved_solution", moved)
     return tried, unsolved
 
 
@@ -502,7 +511,9 @@ def motion(points, converged=True):
 
 
 def kept_with(points):
-    return module.kept_of_family(None, replace(first_for(3), points=points), motion(points))
+    return march_from_motion.kept_of_family(
+        None, replace(first_for(3), points=points), motion(points)
+    )
 
 
 @pytest.mark.parametrize(
@@ -510,7 +521,7 @@ def kept_with(points):
 )
 def test_a_march_without_fewer_points_to_try_may_take_more_operations(points, most, family_marches):
     kept_with(points)
-    assert family_marches[0] == [(points, getattr(module, most))]
+    assert family_marches[0] == [(points, getattr(march_by_steps, most))]
 
 
 def test_fewer_points_are_marched_where_all_take_too_long(family_marches):
@@ -523,16 +534,16 @@ def test_a_march_may_take_more_operations_where_fewer_points_are_not_solved(fami
     tried, unsolved = family_marches
     unsolved += [8, 4]
     assert not kept_with(16).reason
-    assert tried == [(16, module.MAX_COUNTED), (16, module.MAX_COUNTED_LAST)]
+    assert tried == [(16, march_by_steps.MAX_COUNTED), (16, march_by_steps.MAX_COUNTED_LAST)]
     unsolved += [16]
     tried.clear()
     assert kept_with(32).too_long
-    assert tried == [(32, module.MAX_COUNTED), (32, module.MAX_COUNTED_LAST)]
+    assert tried == [(32, march_by_steps.MAX_COUNTED), (32, march_by_steps.MAX_COUNTED_LAST)]
 
 
 def test_no_march_begins_at_a_motion_that_is_not_solved(family_marches, monkeypatch):
     affordable = iter([False, True])
-    monkeypatch.setattr(module, "affordable_march", lambda _: next(affordable))
+    monkeypatch.setattr(march_from_motion, "affordable_march", lambda _: next(affordable))
     family_marches[1].append(16)
     assert "not solved" in kept_with(32).reason
     assert not family_marches[0]
@@ -569,7 +580,7 @@ def test_a_motion_that_more_contact_points_leave_is_marched_with_them(monkeypatc
     monkeypatch.setattr(judged_resonance, "unstable_with_more_points", lambda *_: finer)
     curve = SimpleNamespace(points=points, settings=None)
     scene = SimpleNamespace(study=SimpleNamespace(stability=True), accuracy=0.02)
-    marches = SimpleNamespace(models=None, band=lambda *_: module.KeptBand(1.0, 0.9, 1.15, 400))
+    marches = SimpleNamespace(models=None, band=lambda *_: KeptBand(1.0, 0.9, 1.15, 400))
     found = judged_resonance.judged_resonance(marches, curve, scene)
     assert size(found.point) == pytest.approx(1.2)
     assert found.march_replaces_balance and found.amplitude == pytest.approx(1.38)
@@ -607,14 +618,14 @@ def test_stability_is_asked_of_all_contact_points_and_of_the_fewest_that_tell(mo
 
 def test_a_march_that_is_too_long_is_told_in_seconds_and_what_shortens_it():
     """No count of operations, and no power of ten, which nobody can act on."""
-    band = module.band_by_steps(bouncing(), solve(bouncing(), 1.3, 7, 256), counted=1e3)
+    band = march_by_steps.band_by_steps(bouncing(), solve(bouncing(), 1.3, 7, 256), counted=1e3)
     assert band.too_long
     assert re.search(r"takes (less than|about) \d+ (s|min) of one core", band.reason)
     assert "contact.points" in band.reason and not re.search(r"\de\+\d|operations", band.reason)
 
 
 def test_steps_of_an_exact_march_that_is_too_long_are_told_alike(monkeypatch):
-    monkeypatch.setattr(module, "MAX_STEPS", 1e4)
+    monkeypatch.setattr(exact_march, "MAX_STEPS", 1e4)
     model = rebounding(10.0, 0.1, 0.04)
-    reason = module.exact_band(model, solve(model, 3.0, 15, 1024)).reason
+    reason = exact_march.exact_band(model, solve(model, 3.0, 15, 1024)).reason
     assert "of one core" in reason and not re.search(r"\de\+\d|steps", reason)

@@ -9,9 +9,11 @@ from wheels import bodies as wheel_bodies
 
 from bladefem.contact.patch import normal_ports, port_matrix
 from bladefem.contact.seating import condense_body, solve_seating, spin_axis
-from bladefem.fem import rotation
+from bladefem.fem import rotating_forms
 from bladefem.fem.constraint import expand_to_mesh, in_step, restrict_load
 from bladefem.fem.flexibility import compliance, flexible
+from bladefem.fem.preload import tangent
+from bladefem.fem.steady_state import SteadyState
 from bladefem.scene.toml import load_scene
 from bladefem.study.mistuning.own_stress import KnownMotion, own_offset
 from bladefem.study.modes.linear_response import steady_state
@@ -34,12 +36,12 @@ def balanced(bodies, push):
     """
     body = bodies.still_blade
     speed, axis = bodies.scene.operation.speed, spin_axis(bodies.mesh)
-    forms = rotation._potential_forms(body, axis, "exact")
-    rotation._set_heating(forms, 1.0)
+    forms = rotating_forms.potential_forms(body, axis, "exact")
+    rotating_forms.set_heating(forms, 1.0)
     u = bodies.state.displacement.copy()
     for _ in range(3):
-        force = rotation._unbalanced_force(body, forms, u, speed**2) - push
-        stiffness = rotation.tangent(body, rotation.SteadyState(u, speed, axis, large=True), axis)
+        force = rotating_forms.unbalanced_force(body, forms, u, speed**2) - push
+        stiffness = tangent(body, SteadyState(u, speed, axis, large=True), axis)
         con = in_step(replace(body, K=stiffness))
         step = compliance(flexible(con, settled=False), -restrict_load(con, force))
         u = u + expand_to_mesh(con, step)[:, :, 0].real

@@ -10,8 +10,8 @@ from scipy import linalg
 
 from bladefem.hbm.model import Damping
 from bladefem.study.mistuning.pattern_response import LINEAR_POINTS, free_factor, linear_grid
+from bladefem.wheel.linear_motion import free_wheel
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
-from bladefem.wheel.solve import free_wheel
 
 BLADES = LumpedBlades(count=12)
 M, K, _ = lumped_matrices(BLADES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -13,9 +14,11 @@ from bladefem.hbm.solution import mostly_lifts_off, size
 from bladefem.hbm.solve import solve
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
+from bladefem.study.pipeline import accuracy_warnings, motion_warnings
 from bladefem.study.pipeline import loads as loads_module
 from bladefem.study.pipeline import response_remarks as remarks_module
-from bladefem.study.pipeline.stability_remarks import lower_sentence
+from bladefem.study.pipeline.load_remarks import LoadRemark, Reason, load_warnings
+from bladefem.study.pipeline.motion_warnings import lower_motions
 from bladefem.study.stability import lower_motion as module
 from bladefem.study.stability.kept_band import KeptBand
 from bladefem.study.stability.lower_motion import LowerMotion, lower_motion
@@ -112,25 +115,34 @@ def test_it_is_sought_at_the_resonance_that_is_given(monkeypatch, asked, sought,
 def test_the_report_tells_both_motions():
     def curve(load, lower):
         return SimpleNamespace(
-            load=load, lower=lower, curve_amplitude=610e-6, peak_frequency=369.54
+            load=load, mass=None, lower=lower, curve_amplitude=610e-6, peak_frequency=369.54
         )
 
-    said = lower_sentence([curve(36.0, LowerMotion(131e-6)), curve(73.0, None)])
-    assert "some 130 um in place of 610 um at 369.54 Hz under 36 N;" in said
-    assert "73 N" not in said and "not known" not in said
-    assert "not known: too long" in lower_sentence([curve(9.0, LowerMotion(1e-4, "too long"))])
-    assert lower_sentence([curve(73.0, None)]) == ""
+    (said,) = load_warnings(lower_motions([curve(36.0, LowerMotion(131e-6)), curve(73.0, None)]))
+    assert said.endswith("under 36 N (some 130 um in place of 610 um)")
+    assert "36 N: some 130 um in place of 610 um at 369.54 Hz" in said.detail
+    assert "73 N" not in said.detail and "not known" not in said.detail
+    (said,) = load_warnings(lower_motions([curve(9.0, LowerMotion(1e-4, "too long"))]))
+    assert "not known: too long" in said.detail
+    assert not list(lower_motions([curve(73.0, None)]))
 
 
-def test_the_remarks_on_responses_have_that_sentence(monkeypatch):
-    for name in vars(remarks_module):
-        if name.endswith("_sentence"):
-            monkeypatch.setattr(remarks_module, name, lambda *_: "")
-    for name in ("_of_settings", "history_remarks", "resonance_warnings"):
+def test_every_warning_on_curves_reaches_the_remarks(monkeypatch):
+    """Each of the two modules of warnings, whatever functions they have."""
+    given = []
+    for part in (motion_warnings, accuracy_warnings):
+        own = {k: v for k, v in vars(part).items() if getattr(v, "__module__", "") == part.__name__}
+        for name in own:
+            if inspect.isfunction(own[name]) and not name.startswith("_"):
+                given.append(name)
+                remark = LoadRemark(Reason(f"{name} under {{loads}}", "wait"), "9 N")
+                monkeypatch.setattr(part, name, lambda *_, remark=remark: [remark])
+    for name in ("ripple_sentence", "undriven_sentence"):
+        monkeypatch.setattr(remarks_module, name, lambda *_: "")
+    for name in ("_of_settings", "history_remarks"):
         monkeypatch.setattr(remarks_module, name, lambda *_: [])
-    monkeypatch.setattr(remarks_module, "beyond_tolerance", lambda *_: "")
-    monkeypatch.setattr(remarks_module, "lower_sentence", lambda _: "two motions")
     scene = SimpleNamespace(study=SimpleNamespace(stability=False), accuracy=0.05)
     judged = SimpleNamespace(reason="")
-    (said,) = remarks_module.response_remarks(scene, SETTINGS, [], 8, judged)
-    assert said == "two motions" and said.level == "warning"
+    said = remarks_module.response_remarks(scene, SETTINGS, [], 8, judged)
+    assert len(given) == 17 and {f"{name} under 9 N" for name in given} == set(said)
+    assert all(one.level == "warning" and one.advice for one in said)

@@ -25,12 +25,9 @@ from bladefem.report.fatigue import (
     utilisation_table,
     worst_utilisation,
 )
-from bladefem.report.wheel import (
-    pattern_headlines,
-    pattern_table,
-    scatter_sentences,
-    scatter_table,
-)
+from bladefem.report.scatter_sentences import scatter_sentences
+from bladefem.report.scatter_tables import scatter_table
+from bladefem.report.wheel import pattern_headlines, pattern_table
 from bladefem.scene.other_blades import other_blades
 from bladefem.scene.tables import Fatigue
 from bladefem.scene.toml import load_scene, vary
@@ -68,8 +65,9 @@ from bladefem.study.pipeline.utilisation import (
     blade_nodes,
     run_utilisation,
 )
+from bladefem.wheel.linear_motion import free_wheel
 from bladefem.wheel.model import Pattern, frequency_pattern
-from bladefem.wheel.solve import free_wheel, solve_wheel
+from bladefem.wheel.solve import solve_wheel
 
 
 @pytest.fixture(scope="module")

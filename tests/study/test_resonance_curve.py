@@ -24,6 +24,7 @@ from bladefem.hbm.stability import STABLE, UNSTABLE, Verdict
 from bladefem.hbm.sweep import sweep
 from bladefem.study.adaptive import check_points, flank_checks, followed_settings
 from bladefem.study.adaptive import resonance_curve as curve_module
+from bladefem.study.adaptive import rough_curve as rough_module
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.peak_errors import PeakErrors
@@ -166,7 +167,7 @@ def test_many_folds_are_looked_at_with_more_samples(found, monkeypatch):
     covered = curve_module.covered_band
 
     def counted(model, settings, *args, **given):
-        asked.append((settings.samples, args[-1] if len(args) == 8 else None))
+        asked.append((settings.samples, given.get("limits")))
         return covered(model, settings, *args, **given)
 
     monkeypatch.setattr(curve_module, "covered_band", counted)
@@ -265,7 +266,8 @@ def counted_sweeps(monkeypatch):
         asked.append(settings)
         return covered(model, settings, *args, **given)
 
-    monkeypatch.setattr(curve_module, "covered_band", counted)
+    for module in (rough_module, curve_module):
+        monkeypatch.setattr(module, "covered_band", counted)
     return asked
 
 

@@ -10,9 +10,9 @@ import pytest
 from models import folding_pair, rebounding, single_mass
 
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.report.response_points import points_of
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
@@ -185,7 +185,7 @@ def test_a_resonance_sought_in_time_is_the_one_of_the_curve():
     # of the march neither is known
     assert np.isnan([row["slipping"], row["drift"]]).all()
     assert points_of(replace(curve, resonance_by_march=None))["method"].tolist() == [1.0]
-    assert sought.band.startswith("the blade keeps between 1900 and 2000 um at 101 Hz (")
+    assert sought.sentence.startswith("the blade keeps between 1900 and 2000 um at 101 Hz (")
 
 
 def test_the_resonance_of_a_stiff_layer_is_the_one_of_the_curve():

@@ -10,10 +10,12 @@ import pytest
 from models import FOLDING, folding_pair
 
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
-from bladefem.hbm.sweep import response
 from bladefem.report.resonance_table import resonance_table
-from bladefem.study.pipeline.resonance_list import local_resonances, motions_at, reach_sentence
+from bladefem.study.pipeline.load_remarks import load_warnings
+from bladefem.study.pipeline.motion_warnings import selective_sweeps
+from bladefem.study.pipeline.resonance_list import local_resonances, motions_at, reach_of_resonance
 from bladefem.study.stability.lower_motion import LowerMotion
 
 BAND = (249.0, 431.0)
@@ -34,7 +36,7 @@ def curve_of(points) -> SimpleNamespace:
     peak = max(columns["amplitude"])
     arrays = {name: np.array(values) for name, values in columns.items()}
     return SimpleNamespace(
-        **arrays, load=80.0, balance_amplitude=peak, resonance_by_march=None, lower=None
+        **arrays, load=80.0, mass=None, balance_amplitude=peak, resonance_by_march=None, lower=None
     )
 
 
@@ -50,10 +52,11 @@ def test_columns_give_what_the_paths_gave():
         assert one.motions == truth.multiplicity
         assert one.reached == truth.reached
     assert listed[0].reached == "down"
-    assert reach_sentence(curve_of(found.points)) == (
-        "load 80 N: the resonance is reached by a slow sweep down; a sweep up keeps to "
-        f"{1e6 * listed[1].amplitude:.4g} um and less"
-    )
+    keeps = f"{1e6 * listed[1].amplitude:.4g} um and less"
+    assert reach_of_resonance(curve_of(found.points)) == ("down", keeps)
+    (said,) = load_warnings(selective_sweeps([curve_of(found.points)]))
+    assert said == "under 80 N only a slow sweep down reaches the resonance given"
+    assert said.detail == f"80 N: the other sweep keeps to {keeps}"
 
 
 def test_a_plain_sweep_has_one_motion_that_both_sweeps_reach():
@@ -63,7 +66,8 @@ def test_a_plain_sweep_has_one_motion_that_both_sweeps_reach():
     listed = local_resonances(curve_of(points))
     assert [(r.motions, r.reached) for r in listed] == [(1, "up and down")] * len(listed)
     assert listed[0].amplitude == max(map(size, points))
-    assert reach_sentence(curve_of(points)) == ""
+    assert reach_of_resonance(curve_of(points)) == ("", "")
+    assert not list(selective_sweeps([curve_of(points)]))
 
 
 def sweep_with(*motions, branch=2) -> SimpleNamespace:
@@ -136,7 +140,7 @@ def test_a_lower_motion_counts_at_the_resonance_and_has_a_row(doubt, stability):
     assert (resonance.frequency, resonance.motions) == (top, 2)
     # elsewhere it was not sought
     assert motions_at(curve, 1.01 * top) == 1
-    assert reach_sentence(curve) == ""
+    assert reach_of_resonance(curve) == ("", "")
     (table,) = resonance_table([curve]).values()
     assert list(table["reached"]) == ["up and down", "from rest"]
     assert list(table["motions"]) == [2, 2] and list(table["frequency"]) == [top, top]

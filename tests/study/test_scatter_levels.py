@@ -10,16 +10,15 @@ import pytest
 from test_walking_dampers import BLADES, free_dampers, resonance
 
 from bladefem.hbm.solver.newton import DEFAULT_OPTIONS
-from bladefem.report.tables import readable_texts
-from bladefem.report.wheel import (
+from bladefem.report.scatter_sentences import scatter_headlines, scatter_sentences
+from bladefem.report.scatter_tables import (
     optimum_is_known,
     optimum_table,
-    scatter_headlines,
-    scatter_sentences,
     scatter_table,
     shown_wheels,
     wheel_table,
 )
+from bladefem.report.tables import readable_texts
 from bladefem.study.mistuning import peak_choice
 from bladefem.study.mistuning.law_level import with_checks
 from bladefem.study.mistuning.peak_choice import SearchedWheel, chosen_peak, pattern_peak

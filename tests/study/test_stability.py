@@ -13,8 +13,8 @@ from bladefem.damper.branch import inclined_contact
 from bladefem.errors import InputError
 from bladefem.hbm.continuation import follow
 from bladefem.hbm.reference_blade import reference_model
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.io.stage_cache import cached_stage
 from bladefem.report.tables import readable_texts, units_of
 from bladefem.scene.toml import load_scene
@@ -22,11 +22,12 @@ from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import first_for
 from bladefem.study.pipeline import loads
 from bladefem.study.pipeline.assemble_model import LoadCase
+from bladefem.study.pipeline.load_remarks import load_warnings
 from bladefem.study.pipeline.loads import curve_of
+from bladefem.study.pipeline.motion_warnings import unstable_resonances
 from bladefem.study.pipeline.stability_remarks import (
     ripple_sentence,
     stability_sentence,
-    unstable_sentences,
 )
 from bladefem.study.stability.kept_band import KeptBand
 from bladefem.study.stability.resonance_in_time import ResonanceInTime
@@ -135,22 +136,32 @@ def rippling(kept):
 def test_a_ripple_is_told_apart_from_another_amplitude():
     near, far = (KeptBand(100.0, 0.99e-3, high, 200) for high in (1.02e-3, 1.2e-3))
     assert "within 2.0 %" in ripple_sentence([rippling(near), rippling(far)], 0.05)
-    assert unstable_sentences([rippling(near)], 0.05) == []
-    (said,) = unstable_sentences([rippling(far), rippling(far)], 0.05)
-    assert said.count("keeps between 990 and 1200 um") == 2
-    assert said.count("given as the resonance") == 1
+    assert not list(unstable_resonances([rippling(near)], 0.05))
+    (said,) = load_warnings(unstable_resonances([rippling(far), rippling(far)], 0.05))
+    assert "the resonance given is an unstable motion" in said and "its error" in said.advice
+    assert said.detail.count("keeps between 990 and 1200 um") == 2
     assert ripple_sentence([rippling(far)], 0.05) == ""
     # given in place of the balance where the mesh leaves little of the accuracy
     instead = SimpleNamespace(**vars(rippling(near)) | {"march_replaces_balance": True})
     assert ripple_sentence([instead], 0.05) == ""
-    given = (
-        "the amplitude given is that of an integration in time (a march): under 50 N, 1000 um at"
-    )
-    assert given in unstable_sentences([instead], 0.05)[0]
     marched = SimpleNamespace(
         **vars(rippling(far)) | {"march_replaces_balance": True, "peak_amplitude": 1.2e-3}
     )
-    assert given in unstable_sentences([marched], 0.05)[0]
+    for one in (instead, marched):
+        (said,) = load_warnings(unstable_resonances([one], 0.05))
+        assert said.startswith("under 50 N the amplitude given is that of an integration in time")
+        assert "50 N: unstable motion of 1000 um at 100 Hz (torus); marched in time" in said.detail
+
+
+def test_an_unstable_resonance_that_no_march_follows_says_so():
+    lost = rippling(KeptBand(100.0, np.nan, np.nan, 0, "too long"))
+    (said,) = load_warnings(unstable_resonances([lost], 0.05))
+    assert "what the blade comes to after it is not known" in said
+    assert "is not known: too long" in said.detail and "contact.points" in said.advice
+    below = SimpleNamespace(**vars(lost) | {"keeps_unstable": False, "peak_amplitude": 0.9e-3})
+    (said,) = load_warnings(unstable_resonances([below], 0.05))
+    assert "is the highest motion that is not unstable" in said
+    assert "given 900 um at 100 Hz" in said.detail
 
 
 @pytest.mark.parametrize("by_law", [True, False])
@@ -185,7 +196,8 @@ def test_a_curve_from_the_folder_says_what_the_fresh_one_said(tmp_path):
     again, seconds = cached_stage(tmp_path, "curve", "key", lambda: None)
     assert seconds is not None and fresh.keeps_unstable and again.keeps_unstable
     assert ripple_sentence([again], 0.05) == ripple_sentence([fresh], 0.05) != ""
-    assert unstable_sentences([again], 0.001) == unstable_sentences([fresh], 0.001) != []
+    said = list(unstable_resonances([fresh], 0.001))
+    assert list(unstable_resonances([again], 0.001)) == said != []
     above = replace(band, lowest=2e-3, highest=2.5e-3)
     marched = replace(again, march_at_peak=above, march_replaces_balance=True)
     assert marched.peak_amplitude == 2.5e-3 and marched.balance_amplitude == again.peak_amplitude

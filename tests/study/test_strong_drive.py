@@ -10,15 +10,15 @@ import pytest
 from models import folding_pair, rebounding
 
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.family import family_of
 from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline.stability_remarks import undriven_sentence
 from bladefem.study.stability import strong_drive as module
 from bladefem.study.stability.error_in_time import Marches
-from bladefem.study.stability.kept_band import band_by_steps
+from bladefem.study.stability.march_by_steps import band_by_steps
 from bladefem.study.stability.strong_drive import (
     STRONG_DRIVE,
     StrongDrives,

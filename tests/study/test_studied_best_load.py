@@ -15,9 +15,9 @@ from bladefem.study.adaptive.settings import Settings
 from bladefem.study.pipeline import kept_best_load, pipeline, response_stage
 from bladefem.study.pipeline.assemble_model import LoadCase
 from bladefem.study.pipeline.best_load import BestLoad
+from bladefem.study.pipeline.best_load_remarks import best_load_remarks
 from bladefem.study.pipeline.kept_best_load import MAX_ROUNDS, study_kept_loads
 from bladefem.study.pipeline.loads import Search, StudiedLoads, best_curve, study_loads
-from bladefem.study.pipeline.response_remarks import best_load_remarks
 
 
 def best(load: float, mass: float | None = None, reason: str = "") -> BestLoad:
@@ -61,7 +61,8 @@ def studied(cases, found):
 def test_a_search_is_told_as_a_search():
     """Its end is the answer only where the judged resonances carry it."""
     (found,) = best_load_remarks(SimpleNamespace(accuracy=0.05), (best(78.9107),))
-    assert found.startswith("search for the best load: it ended at 78.91 N, between 0.5 N and ")
+    assert found.startswith("search for the best load: it ended at 78.91 N; no load near it lowers")
+    assert found.detail.startswith("searched between 0.5 N and ") and "model: " in found.detail
     (lost,) = best_load_remarks(SimpleNamespace(accuracy=0.05), (best(1.0, reason="no maximum"),))
     assert lost.startswith("best load: not found between") and lost.endswith("no maximum")
 

@@ -9,22 +9,24 @@ from models import bouncing, bouncing_wave
 
 from bladefem.hbm import sweep as sweep_module
 from bladefem.hbm.model import Damping
+from bladefem.hbm.response import response
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import STABLE, UNKNOWN, UNSTABLE, Verdict, stability_verdict
-from bladefem.hbm.sweep import response
 from bladefem.study.adaptive.band_sweep import covered_band
 from bladefem.study.adaptive.family import Family, Member
 from bladefem.study.adaptive.settings import first_for
-from bladefem.study.pipeline.response_remarks import search_sentence
+from bladefem.study.pipeline.accuracy_warnings import unfinished_searches
+from bladefem.study.pipeline.load_remarks import load_warnings
+from bladefem.study.pipeline.motion_warnings import unjudged_resonances
 from bladefem.study.pipeline.stability_remarks import (
     Disturbances,
     judged_disturbances,
     stability_sentence,
-    unjudged_sentence,
 )
 from bladefem.study.stability import verdicts as stability
 from bladefem.study.stability.highest_stable import highest_lasting, next_to_judge
-from bladefem.study.stability.kept_band import KeptBand, kept_band
+from bladefem.study.stability.kept_band import KeptBand
+from bladefem.study.stability.march_from_motion import kept_band
 from bladefem.study.stability.verdicts import RicherModel, judged_above, model_in_time, stability_of
 
 
@@ -54,14 +56,14 @@ def test_the_sentence_says_which_disturbances_a_wave_was_judged_against():
     blades = [judged_disturbances(family, settings).blades for family in (wave, alone)]
     assert blades == [4, 1]
     verdicts = [(np.array([STABLE]), np.array([0.5]))]
-    said = stability_sentence(verdicts, Disturbances(4))
+    said = stability_sentence(verdicts, Disturbances(4)).detail
     assert "repeat after 4 blades" in said and "not those of other nodal diameters" in said
     # engine order 9 of 36: harmonics 0 to 3 are diameters 0, 9, 18 and 9 again
     wheel = judged_disturbances(wave, settings, 9, 36)
     assert wheel.diameters == (0, 9, 18) and wheel.possible == 19
-    said = stability_sentence(verdicts, wheel)
+    said = stability_sentence(verdicts, wheel).detail
     assert "(nodal diameters 0, 9, 18), not those of the other 16 nodal diameters" in said
-    assert "blades" not in stability_sentence(verdicts)
+    assert "blades" not in "".join(stability_sentence(verdicts).parts)
 
 
 def test_the_sentence_says_why_nothing_could_be_judged():
@@ -108,7 +110,8 @@ def test_where_verdicts_are_dear_the_highest_point_and_some_others_are_judged(mo
     judged = alone.verdict != UNKNOWN
     assert judged.sum() == 1
     said = stability_sentence([(alone.verdict, alone.multiplier)])
-    assert f"{(~judged).sum()} not judged (where the verdicts on a curve" in said
+    assert said.endswith(f"{(~judged).sum()} not judged")
+    assert said.detail.startswith("where the verdicts on a curve")
 
 
 def test_unstable_motions_are_judged_again_with_more_harmonics(monkeypatch):
@@ -221,10 +224,12 @@ def test_what_a_sweep_left_open_reaches_the_remarks(monkeypatch):
     covered_band(model, first_for(3), tuple(hertz), 1, 0.05, paths=False, notes=notes)
     assert len(notes) == 1 and "the sweep ended after 3 points" in notes[0]
     curve = SimpleNamespace(load=36.0, mass=None, notes=(*notes, "a", "b", "c"))
-    said = search_sentence(curve)
-    assert said.startswith("load 36 N: the sweep ended after 3 points")
-    assert said.endswith("; a; b; and 1 more of the kind")
-    assert search_sentence(SimpleNamespace(load=36.0, mass=None, notes=())) == ""
+    (said,) = load_warnings(unfinished_searches([curve]))
+    assert said.startswith("under 36 N the search for all motions")
+    assert said.detail.startswith("36 N: the sweep ended after 3 points")
+    assert said.detail.endswith(", a, b, 1 more of the kind")
+    curve.notes = ()
+    assert not list(unfinished_searches([curve]))
 
 
 def judge(branch, heights, stable, most=99):
@@ -290,15 +295,17 @@ def test_a_motion_that_was_not_judged_is_no_lasting_one():
     # a curve says so where that motion is its resonance
     curve = SimpleNamespace(
         load=7.0,
+        mass=None,
         is_march=False,
         frequency=np.array([1.0, 1.0, 2.0]),
         amplitude=heights,
         stability=np.array([UNKNOWN, STABLE, STABLE]),
         peak=SimpleNamespace(frequency=1.0, probe=np.array([[0.0], [3.0]])),
     )
-    assert "under 7 N the motion at the resonance was not judged" in unjudged_sentence([curve])
+    (said,) = load_warnings(unjudged_resonances([curve]))
+    assert said.startswith("under 7 N the motion at the resonance was not judged")
     curve.is_march = True
-    assert unjudged_sentence([curve]) == ""
+    assert not list(unjudged_resonances([curve]))
     curve.is_march = False
     curve.peak.probe[1] = 2.0
-    assert unjudged_sentence([curve]) == ""
+    assert not list(unjudged_resonances([curve]))

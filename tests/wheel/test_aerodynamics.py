@@ -15,8 +15,9 @@ from bladefem.hbm.nonlinear_modes import nonlinear_mode
 from bladefem.hbm.solve import solve
 from bladefem.hbm.solver.newton import Options
 from bladefem.wheel.aerodynamics import limit_cycles
+from bladefem.wheel.linear_motion import free_wheel
 from bladefem.wheel.model import Pattern, engine_order
-from bladefem.wheel.solve import free_wheel, solve_wheel
+from bladefem.wheel.solve import solve_wheel
 from bladefem.wheel.tuned import tuned_sector
 
 

@@ -11,8 +11,8 @@ from bladefem.fem.constraint import constrain
 from bladefem.fem.ports import port_model
 from bladefem.hbm.model import Damping
 from bladefem.scene.tables import Material
+from bladefem.wheel.linear_motion import free_wheel
 from bladefem.wheel.model import Pattern, engine_order, tuned_wheel
-from bladefem.wheel.solve import free_wheel
 
 COUNT = 6
 ORDER = 2

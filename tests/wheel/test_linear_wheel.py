@@ -8,10 +8,11 @@ from scipy import linalg
 from bladefem.errors import InputError
 from bladefem.hbm.linear.bodies import port_receptance
 from bladefem.hbm.model import Damping
+from bladefem.wheel.linear_motion import free_wheel
 from bladefem.wheel.lumped import LumpedBlades, lumped_matrices, lumped_pattern, lumped_wheel
 from bladefem.wheel.model import Pattern, engine_order, frequency_pattern
 from bladefem.wheel.one_body import one_body_model
-from bladefem.wheel.solve import free_wheel, solve_wheel
+from bladefem.wheel.solve import solve_wheel
 
 
 def test_free_wheel_is_the_dense_ring():

@@ -20,11 +20,11 @@ from bladefem.fem.cut_sector import cut_sector, harmonic_motion, static_motion
 from bladefem.fem.flexibility import flexible
 from bladefem.fem.forced_motion import forced_motion
 from bladefem.fem.held_part import held_part, part_above, section_motions, section_readings
+from bladefem.fem.linear_preload import unit_speed_displacement
 from bladefem.fem.loads import centrifugal
 from bladefem.fem.modes import modes
 from bladefem.fem.ports import port_model
 from bladefem.fem.readings import modal_readings
-from bladefem.fem.rotation import unit_speed_displacement
 from bladefem.fem.stress import nodal_stress, signed_von_mises
 from bladefem.hbm.model import Damping
 from bladefem.scene.tables import Material
@@ -37,9 +37,9 @@ from bladefem.study.mistuning.other_blades import (
 )
 from bladefem.study.mistuning.own_stress import steady_root_forces
 from bladefem.wheel.flexibility import wheel_flexibility
+from bladefem.wheel.linear_motion import excitation_forces, free_wheel, without_contact
 from bladefem.wheel.model import Pattern, engine_order, tuned_wheel
 from bladefem.wheel.pattern_file import BladeDeviations
-from bladefem.wheel.solve import excitation_forces, free_wheel, without_contact
 
 COUNT = 6
 ORDER = 2

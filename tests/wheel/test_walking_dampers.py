@@ -31,10 +31,11 @@ from bladefem.wheel.local_peak import (
 from bladefem.wheel.lumped import PLATFORM, TIP, LumpedBlades, lumped_matrices, lumped_pattern
 from bladefem.wheel.model import engine_order, tuned_wheel
 from bladefem.wheel.resonance import find_wheel_peak
-from bladefem.wheel.solve import solve_wheel, undecided_dampers
+from bladefem.wheel.solve import solve_wheel
 from bladefem.wheel.statistics import scatter_statistics, wheel_respond
 from bladefem.wheel.tuned import tuned_sector
 from bladefem.wheel.walking import slipping_dampers
+from bladefem.wheel.walking_search import undecided_dampers
 
 COUNT, ORDER = 12, 3
 BLADES = LumpedBlades(count=COUNT, damping=0.02)

@@ -155,7 +155,6 @@ def first_mode(folder: Path) -> Iterator[Claim]:
         curves,
         folder / "fig_15_mode_1.png",
         "mode 1, damper of 60 g, 1e6 N/m a seat",
-        load="normal load of a seat [N]",
     )
     heights = [1e6 * size(s) for s in tops]
     rises = tops[-1].frequency > tops[0].frequency

@@ -61,7 +61,6 @@ def optima(folder: Path) -> Iterator[Claim]:
             {m: tables[contact, mode, m] for m in MASSES},
             folder / f"fig_17_{contact}_{mode}.png",
             f"mode {mode}, {contact} contact",
-            "normal load of a seat [N]",
             {m: least[contact, mode, m] for m in MASSES},
             loop,
         )

@@ -47,11 +47,10 @@ def responses(folder: Path) -> Iterator[Claim]:
         folder / "fig_15.png",
         "mode 2, damper of 60 g, 1e6 N/m a seat",
         dots,
-        "normal load of a seat [N]",
         crosses,
     )
     loops = {load: seat_loop(top) for load, top in tops.items()}
-    draw_friction_loops(loops, folder / "fig_16.png", "normal load of a seat [N]")
+    draw_friction_loops(loops, folder / "fig_16.png")
     yield from _resonances(tops)
     yield from _loops(tops, loops)
 

@@ -13,10 +13,10 @@ from bladefem.damper.branch import state_of
 from bladefem.damper.direct import direct
 from bladefem.damper.explicit import Cycle, explicit_march
 from bladefem.hbm.model import ReducedModel
+from bladefem.hbm.response import response
 from bladefem.hbm.solution import Solution, size
 from bladefem.hbm.solve import solve
 from bladefem.hbm.stability import stability_verdict
-from bladefem.hbm.sweep import response
 from bladefem.hbm.time_model import time_system
 from bladefem.study.stability.verdicts import in_one_body, judged_motion
 from bladefem.time.shooting import floquet_multipliers, periodic_solution, probe_harmonics

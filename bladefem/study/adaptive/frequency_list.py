@@ -13,10 +13,10 @@ from ...errors import InputError, NotSolvedError
 from ...hbm.from_neighbours import solve_from
 from ...hbm.full_stick import sticks_safely
 from ...hbm.predictor import PREDICTOR_POINTS, extrapolate_solution
+from ...hbm.response import response
 from ...hbm.solution import Solution, size
 from ...hbm.solver.fallback import match_harmonics
 from ...hbm.solver.newton import Options
-from ...hbm.sweep import response
 from .band_sweep import solver_options
 from .check_points import heights_of, left_out_motion, points_to_check
 from .checked_curve import CheckedCurve

@@ -18,8 +18,9 @@ from geometry.mesh import sector_of
 
 from ...data import ModeSet, Patch
 from ...util.arrays import ComplexArray
+from ...wheel.linear_motion import deviation_forces
 from ...wheel.model import Pattern, Wheel
-from ...wheel.solve import WheelSolution, deviation_forces
+from ...wheel.solution import WheelSolution
 from ..pipeline.assemble_model import LoadCase
 from ..pipeline.bodies import Bodies
 from ..pipeline.coriolis import response_damping

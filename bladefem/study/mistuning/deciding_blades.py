@@ -15,7 +15,8 @@ import numpy as np
 
 from ...wheel.local_peak import LocalBalances, LocalPeak
 from ...wheel.model import Pattern
-from ...wheel.solve import WheelSolution, solve_wheel
+from ...wheel.solution import WheelSolution
+from ...wheel.solve import solve_wheel
 from ..pipeline.damped_motion import DampedStress
 from .other_blades import OtherBlades
 from .own_stress import OwnStress

@@ -16,10 +16,9 @@ from ...io.stage_cache import cached_stage, key_of, on_root
 from ...scene.tables import Scene
 from ...util.communicator import Communicator
 from ...util.progress import Progress
-from ...wheel.model import Pattern, Wheel, frequency_pattern
+from ...wheel.model import TUNED_PATTERN, Pattern, Wheel, frequency_pattern
 from ...wheel.pattern_peak import PatternPeak
 from ...wheel.scatter import MAX_DEVIATIONS, drawn_patterns
-from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification, scatter_statistics, unknown_statistics
 from ...wheel.walking import with_free_means
 from ..adaptive.band_sweep import solver_options

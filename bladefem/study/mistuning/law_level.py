@@ -15,10 +15,9 @@ from ...util.progress import Progress, without_progress
 from ...wheel.damper_law import DamperLaw, damper_law, law_harmonics, scaled_elements
 from ...wheel.family import ModeFamily, family_of_modes
 from ...wheel.law_response import LawWheels, ScatteredLaw, law_statistics, pattern_deviations
-from ...wheel.model import Pattern, Wheel, heavier_damper
+from ...wheel.model import TUNED_PATTERN, Pattern, Wheel, heavier_damper
 from ...wheel.pattern_peak import PatternPeak, compared_peaks, peak_heights
 from ...wheel.scatter import Scatter, drawn_deviations
-from ...wheel.solve import TUNED_PATTERN
 from ...wheel.statistics import Amplification
 from ...wheel.tuned import travelling_order
 from ..pipeline.curve import Curve

@@ -93,8 +93,8 @@ def _steady_pull(part: HeldPart, speed: float) -> np.ndarray:
 
 def _steady_loads(body: Body, speed: float, mesh: Mesh) -> np.ndarray:
     """(n_points*dim,) of rotation and heat [N]."""
+    from ...fem.linear_preload import thermal_force
     from ...fem.loads import centrifugal
-    from ...fem.rotation import thermal_force
 
     return np.asarray(centrifugal(body, speed, spin_axis(mesh)) + thermal_force(body))
 
@@ -164,7 +164,7 @@ def own_offset(bodies: Bodies, known: KnownMotion) -> RealArray:
     wheel's.
     """
     from ...fem.cut_sector import HELD, cut_sector, static_motion
-    from ...fem.rotation import preload
+    from ...fem.preload import preload
 
     body = bodies.still_blade
     sector = cut_sector(body)

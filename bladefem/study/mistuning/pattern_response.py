@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...hbm.linear_resonances import free_resonances
+from ...wheel.linear_motion import free_wheel, stuck_wheel
 from ...wheel.local_peak import LocalBalances
 from ...wheel.model import Pattern, Wheel
 from ...wheel.resonance import WheelPeak, find_wheel_peak
-from ...wheel.solve import WheelSolution, free_wheel, stuck_wheel
+from ...wheel.solution import WheelSolution
 from ...wheel.statistics import wheel_respond
 from ...wheel.tuned import tuned_sector
 from ..pipeline.curve import Curve

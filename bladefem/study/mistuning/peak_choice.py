@@ -12,7 +12,8 @@ from ...wheel.local_peak import LocalBalances, LocalPeak, find_local_peak
 from ...wheel.model import Pattern, Wheel
 from ...wheel.pattern_peak import PatternPeak
 from ...wheel.resonance import Respond, WheelPeak, find_wheel_peak
-from ...wheel.solve import WheelSolution, solve_wheel
+from ...wheel.solution import WheelSolution
+from ...wheel.solve import solve_wheel
 from ...wheel.statistics import wheel_respond
 from ..pipeline.curve import Curve
 

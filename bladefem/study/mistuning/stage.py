@@ -18,7 +18,7 @@ from ...util.message import warning
 from ...util.progress import Progress, without_progress
 from ...wheel.model import Pattern, Wheel
 from ...wheel.pattern_file import BladeDeviations
-from ...wheel.solve import WheelSolution
+from ...wheel.solution import WheelSolution
 from ...wheel.statistics import (
     Amplification,
     joined_loads,

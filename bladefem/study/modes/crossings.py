@@ -17,6 +17,8 @@ from scipy.optimize import brentq
 
 # of the speed at which an order crosses a line
 CROSSING_TOLERANCE = 1e-9
+# relative distance of an excitation from a mode, below which it is too near
+CLOSE_MARGIN = 0.05
 # verdict where engine orders have the frequency zero
 AT_REST = "not excited at rest"
 
@@ -178,10 +180,9 @@ def crossing_margins(
     sectors: int,
     speed: float,
     orders: Iterable[int],
-    least: float = 0.05,
 ) -> pd.DataFrame:
-    """The closest mode to each engine order, with a verdict: "ok" when at least ``least`` apart,
-    else "close"; at rest the lowest mode, "not excited at rest".
+    """The closest mode to each engine order, with a verdict: "close" below CLOSE_MARGIN, else
+    "ok"; at rest the lowest mode, "not excited at rest".
     """
     rows = interference_table(table, sectors, speed, orders)
     if rows.empty:
@@ -191,5 +192,5 @@ def crossing_margins(
         return lowest.assign(verdict=AT_REST).reset_index(drop=True)
     closest = rows.loc[rows.groupby("engine_order")["margin"].apply(lambda m: m.abs().idxmin())]
     return closest.assign(
-        verdict=np.where(closest["margin"].abs() >= least, "ok", "close")
+        verdict=np.where(closest["margin"].abs() >= CLOSE_MARGIN, "ok", "close")
     ).reset_index(drop=True)

@@ -29,7 +29,7 @@ from ..pipeline.ports import blade_ports
 
 if TYPE_CHECKING:
     from ...fem.flexibility import Flexibility
-    from ...fem.rotation import SteadyState
+    from ...fem.steady_state import SteadyState
 
 DEFAULT_MODES = 20
 
@@ -220,7 +220,7 @@ def steady_state(bodies: Bodies) -> SteadyState:
     A leaning blade straightens: at 800 rad/s the linear answer of a twisted one of 200 mm that
     leans by 20 mm is 45 mm, where it moves by 14.
     """
-    from ...fem.rotation import SteadyState
+    from ...fem.steady_state import SteadyState
 
     if bodies.state is not None and bodies.on_large_state:
         return bodies.state

@@ -169,7 +169,7 @@ def stress_states(
     """Displacements (n_points, 3) [m] by name: of rotation and heat, of modes scaled to 1 mm, of
     resonances.
     """
-    from ...fem.rotation import has_thermal_strain
+    from ...fem.thermal_strain import has_thermal_strain
 
     states = {}
     heated = has_thermal_strain(bodies.still_blade)

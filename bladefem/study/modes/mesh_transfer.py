@@ -7,6 +7,8 @@ from scipy.spatial import cKDTree
 
 from geometry.mesh import Mesh
 
+# nearest cells that are looked into for each point
+CANDIDATE_CELLS = 24
 # Six tetrahedra of a hexahedron round its diagonal 0-6, two triangles of a quadrilateral.
 SIMPLICES_OF = {
     "hexahedron": (
@@ -50,7 +52,6 @@ def transfer_fields(
     mesh: Mesh,
     fields: np.ndarray,
     points: np.ndarray,
-    candidates: int = 24,
 ) -> np.ndarray:
     """(m, k, 3) fields of a mesh at other points, by the shape functions of the nearest cell.
 
@@ -61,14 +62,13 @@ def transfer_fields(
         mesh: where the fields live.
         fields: (m, n, 3), real or complex.
         points: (k, 3) [m].
-        candidates: nearest cells that are looked into for each point.
     """
     cells = np.concatenate(list(mesh.bodies.values()))
     pieces = simplices(mesh, cells)
     owner = np.repeat(np.arange(len(cells)), pieces.shape[1])
     pieces = pieces.reshape(-1, pieces.shape[2])
     piece, weights = locate_points(
-        mesh.points[pieces][..., : mesh.dimension], points[:, : mesh.dimension], candidates
+        mesh.points[pieces][..., : mesh.dimension], points[:, : mesh.dimension], CANDIDATE_CELLS
     )
     if mesh.cell_type in MID_SIDE_EDGES:
         nodes = cells[owner[piece]]

@@ -45,8 +45,8 @@ def mode_strength(bodies: Bodies, modes: ModeSet) -> Strength:
     Args:
         modes: of the nodal diameter that the engine order excites.
     """
-    from ...fem.rotation import has_thermal_strain
     from ...fem.stress import nodal_stress, signed_von_mises
+    from ...fem.thermal_strain import has_thermal_strain
 
     excitation = bodies.scene.excitation
     ports = blade_ports(bodies.mesh, [], excitation)

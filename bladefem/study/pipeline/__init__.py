@@ -11,12 +11,15 @@
 - models: ``assemble_model`` one load case, ``case_models`` its family from poor to rich,
   ``changed_cases`` another contact parameter, ``joined_contacts`` fewer contact points
 - responses: ``response_stage`` the stage, ``loads`` a curve a load, ``curve`` its record,
-  ``best_load`` the search, ``kept_best_load`` where the blade keeps to other motions,
   ``resonance_list`` all maxima, ``linear_limits``, ``load_interval``,
   ``shared_accuracy`` one accuracy for all errors, ``body_mesh`` the error by the mesh
+- the best load: ``best_load`` its record, ``best_load_search`` with ``load_variation``,
+  ``kept_best_load`` where the blade keeps to other motions
 - verdicts in the other nodal diameters: ``other_diameters``
 - at the resonance: ``contact_cycle`` stick and slip, ``damped_motion`` motion and stress of all
   nodes, ``utilisation`` of the endurance
 - flutter: ``flow`` damping of each wave, ``flutter`` limit cycles
-- words and tables: ``response_remarks``, ``stability_remarks``, ``load_remarks``, ``design_table``
+- words: ``response_remarks`` all of a run, ``motion_warnings`` and ``accuracy_warnings`` with
+  ``load_remarks`` one warning a reason, ``stability_remarks``, ``best_load_remarks``
+- tables: ``design_table``
 """

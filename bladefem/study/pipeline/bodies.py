@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from ...fem.constraint import Transformation
     from ...fem.flexibility import Flexibility
     from ...fem.gyroscopic import Spin
-    from ...fem.rotation import SteadyState
+    from ...fem.steady_state import SteadyState
     from ...fem.temperature import Temperatures
 
 Result = TypeVar("Result")
@@ -162,7 +162,9 @@ class Bodies:
 
     def state_at(self, speed: float) -> SteadyState | None:
         """The static state at a speed [rad/s]; None at rest."""
-        from ...fem.rotation import SteadyState, has_thermal_strain, preload
+        from ...fem.preload import preload
+        from ...fem.steady_state import SteadyState
+        from ...fem.thermal_strain import has_thermal_strain
 
         if speed == 0 and not has_thermal_strain(self.still_blade):
             return None
@@ -221,14 +223,15 @@ class Bodies:
     @cached_property
     def swell(self) -> np.ndarray:
         """(n_points, dim) linear displacement of the blade for unit rotation [m s^2]."""
-        from ...fem.rotation import unit_speed_displacement
+        from ...fem.linear_preload import unit_speed_displacement
 
         return unit_speed_displacement(self.still, spin_axis(self.mesh))
 
     @cached_property
     def thermal_displacement(self) -> np.ndarray:
         """(n_points, dim) linear displacement of the blade by its temperatures [m]."""
-        from ...fem.rotation import has_thermal_strain, thermal_displacement
+        from ...fem.linear_preload import thermal_displacement
+        from ...fem.thermal_strain import has_thermal_strain
 
         if not has_thermal_strain(self.still_blade):
             return np.zeros((len(self.mesh.points), self.mesh.dimension))

@@ -63,7 +63,8 @@ def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
 
 def thermal_gap(bodies: Bodies, patches: list[Patch]) -> np.ndarray:
     """(n,) gap of the seats that the thermal strains of blade and damper open [m]."""
-    from ...fem.rotation import has_thermal_strain, thermal_displacement
+    from ...fem.linear_preload import thermal_displacement
+    from ...fem.thermal_strain import has_thermal_strain
 
     mesh = bodies.mesh
     ports = normal_ports(patches, mesh)

@@ -1,28 +1,71 @@
-"""Remarks on single loads: those of one kind are one sentence with what each load adds."""
+"""Warnings on loads: those that have one reason are one warning, with what each load adds."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
+
+from ...util.message import Message, warning
+
+# loads that a sentence names; more are counted, and named in its details
+MAX_NAMED = 5
+
+
+class Reason(NamedTuple):
+    """What a warning says of all its loads."""
+
+    # what it means for the user, one sentence with {loads} in it
+    text: str
+    # what the user can do about it
+    advice: str
+    # why it is so, for the details
+    cause: str = ""
 
 
 class LoadRemark(NamedTuple):
-    """What is said of one load."""
+    """That a reason holds for one load."""
 
-    # of all loads of its kind
-    kind: str
-    # of this one
-    detail: str
+    reason: Reason
+    load: str
+    # figures of this load, for the details
+    detail: str = ""
+    # the one figure of it that the sentence itself should have
+    figure: str = ""
 
 
-def sentences_of_kinds(remarks: Iterable[LoadRemark | None]) -> list[str]:
-    """One sentence a kind, in the order in which they first occur.
+def load_warnings(remarks: Iterable[LoadRemark | None]) -> list[Message]:
+    """One warning a reason, in the order in which they first occur.
 
-    >>> remarks = [LoadRemark("it lifts off", f"under {load} N") for load in (1, 2)]
-    >>> sentences_of_kinds([*remarks, None])
-    ['it lifts off: under 1 N; under 2 N']
+    >>> lifted = Reason("contacts lift off under {loads}", "nothing")
+    >>> (said,) = load_warnings([LoadRemark(lifted, f"{n} N", f"{n} um") for n in (1, 2)])
+    >>> said, said.detail
+    ('contacts lift off under 1 N and 2 N', '1 N: 1 um; 2 N: 2 um')
     """
-    kinds: dict[str, list[str]] = {}
+    found: dict[Reason, list[LoadRemark]] = {}
     for remark in filter(None, remarks):
-        kinds.setdefault(remark.kind, []).append(remark.detail)
-    return [f"{kind}: {'; '.join(details)}" for kind, details in kinds.items()]
+        found.setdefault(remark.reason, []).append(remark)
+    return [_warning(reason, those) for reason, those in found.items()]
+
+
+def _warning(reason: Reason, remarks: Sequence[LoadRemark]) -> Message:
+    named = len(remarks) <= MAX_NAMED
+    texts = [r.load + (f" ({r.figure})" if r.figure else "") for r in remarks]
+    loads = enumeration(texts) if named else f"{len(remarks)} loads"
+    lines = [_line(r) for r in remarks if r.detail or not named]
+    detail = ". ".join(filter(None, [reason.cause, "; ".join(lines)]))
+    return warning(reason.text.format(loads=loads), reason.advice, detail)
+
+
+def _line(remark: LoadRemark) -> str:
+    """What the details say of one load."""
+    known = remark.detail or remark.figure
+    return f"{remark.load}: {known}" if known else remark.load
+
+
+def enumeration(texts: Sequence[str]) -> str:
+    """Texts in one line.
+
+    >>> enumeration(["9 N", "18 N", "36 N"]), enumeration(["9 N"])
+    ('9 N, 18 N and 36 N', '9 N')
+    """
+    return " and ".join(filter(None, [", ".join(texts[:-1]), *texts[-1:]]))

@@ -25,7 +25,8 @@ from ..stability.judged_resonance import JudgedResonance, judged_in_time, judged
 from ..stability.lower_motion import LowerMotion, lower_motion
 from ..stability.resonance_in_time import ResonanceInTime, resonance_in_time
 from .assemble_model import LoadCase
-from .best_load import BestLoad, holding_load, studied_load
+from .best_load import BestLoad, studied_load
+from .best_load_search import holding_load
 from .body_mesh import SofterBody
 from .curve import Curve
 from .load_interval import LoadInterval, load_interval

@@ -164,8 +164,9 @@ def _reduced_diameters(
     """The blade side in each nodal diameter, which groups of ranks share out; and what the modes
     span, where it is asked for and one rank can have them all, or all ranks share each.
     """
-    from ...fem.all_diameters import Eigenpairs, sector_span
+    from ...fem.all_diameters import Eigenpairs
     from ...fem.compat import MPI
+    from ...fem.diameter_space import sector_span
     from ...fem.groups import shared_out
     from ...fem.ports import port_models
 
@@ -256,8 +257,8 @@ def _span_of_ranks(
     Args:
         blocks: nodal diameter to vectors; emptied.
     """
-    from ...fem.all_diameters import sector_span
     from ...fem.compat import MPI
+    from ...fem.diameter_space import sector_span
 
     comm = bodies.comm or MPI.COMM_WORLD
     every: list[np.ndarray] = []

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...hbm.slow_sweep import DOWN, ISOLATED, UP, Visit, reached_by, visited_pieces
-from ...scene.units import newtons
 from ..stability.lower_motion import OTHER_MOTION
 from .curve import Curve
 
@@ -134,29 +133,19 @@ def _crossing(curve: Curve, pieces: Sequence[_Piece], frequency: float) -> int:
     return len(there) + (not known)
 
 
-def reach_sentence(curve: Curve) -> str:
-    """How the resonance that is given is reached, where not every slow sweep comes to it; "" for
-    one that marches have found.
+def reach_of_resonance(curve: Curve) -> tuple[str, str]:
+    """Which slow sweep alone reaches the resonance that is given, UP, DOWN or ISOLATED (neither),
+    and what the others keep to, in words; "" where all come to it, and where marches have found it.
     """
     if curve.resonance_by_march is not None:
-        return ""
+        return "", ""
     listed = local_resonances(curve)
     given = [r for r in listed if abs(r.amplitude / curve.balance_amplitude - 1) < SAME_HEIGHT]
     if not given or given[0].reached == f"{UP} and {DOWN}":
-        return ""
+        return "", ""
     reached = given[0].reached
     other = [r.amplitude for r in listed if reached != r.reached and r.reached != ISOLATED]
-    keeps = f"{1e6 * max(other):.4g} um and less" if other else "lower motions"
-    if reached == ISOLATED:
-        return (
-            f"load {newtons(curve.load)}: the resonance is reached by no slow sweep, only from "
-            f"motions that start near it; sweeps keep to {keeps}"
-        )
-    way = UP if reached == DOWN else DOWN
-    return (
-        f"load {newtons(curve.load)}: the resonance is reached by a slow sweep {reached}; a sweep "
-        f"{way} keeps to {keeps}"
-    )
+    return reached, f"{1e6 * max(other):.4g} um and less" if other else "lower motions"
 
 
 def _pieces_of(curve: Curve) -> list[_Piece]:

@@ -23,7 +23,13 @@ from ..adaptive.family import Family
 from ..adaptive.settings import Settings
 from ..influences import Influence, influences, parameters_of
 from .assemble_model import LoadCase, rigid_body
-from .best_load import BestLoad, chart_loads, find_best_load
+from .best_load import BestLoad, chart_loads
+from .best_load_remarks import (
+    best_load_remarks,
+    lower_studied_remarks,
+    stress_message,
+)
+from .best_load_search import find_best_load
 from .bodies import Bodies, is_wheel
 from .body_mesh import SofterBody
 from .case_models import family_of_case, load_cases, softer_body
@@ -43,12 +49,7 @@ from .linear_limits import Limit, judged_limits
 from .loads import Search, best_curve, curve_of, study_loads
 from .other_diameters import ClassVerdict, class_verdicts, sentence_of_classes
 from .reduced_sector import with_damper_mass
-from .response_remarks import (
-    best_load_remarks,
-    lower_studied_remarks,
-    response_remarks,
-    stress_message,
-)
+from .response_remarks import response_remarks
 from .run_records import ReducedRun, Response, Seating, SolvedRun
 from .seated_loads import seat_at_loads, studied_loads, with_more_loads
 from .stability_remarks import Disturbances, judged_disturbances

@@ -2,7 +2,7 @@
 
 Where contacts lift off, balances with more harmonics are often not solved, or end on another motion
 of several: their difference says little of the one that is given. A march in time has no harmonics
-left out, and begins at the very motion that is judged (`bladefem.study.stability.kept_band`).
+left out, and begins at the very motion that is judged (``march_from_motion``).
 """
 
 from __future__ import annotations
@@ -22,15 +22,10 @@ from ..adaptive.choice_in_time import COVERED_IN_TIME, MarchedBand
 from ..adaptive.family import Family, Member, carried_displacements, family_member
 from ..adaptive.resonance_choice import LIFTING_POINTS
 from ..adaptive.settings import Settings
-from .kept_band import (
-    FEWEST_POINTS,
-    MAX_COUNTED_LAST,
-    KeptBand,
-    affordable_march,
-    band_by_steps,
-    exact_band,
-    kept_band,
-)
+from .exact_march import exact_band
+from .kept_band import KeptBand
+from .march_by_steps import MAX_COUNTED_LAST, band_by_steps
+from .march_from_motion import FEWEST_POINTS, affordable_march, kept_band
 from .verdicts import model_in_time, settings_in_time
 
 # relative, of an error that was summed twice

@@ -18,7 +18,8 @@ from ...util.arrays import RealArray
 from ..adaptive.check_points import heights_of
 from ..adaptive.checked_curve import CheckedCurve
 from .error_in_time import Marches
-from .kept_band import KeptBand, band_by_steps
+from .kept_band import KeptBand
+from .march_by_steps import band_by_steps
 from .verdicts import Stability, model_in_time, settings_in_time
 
 # share of the resonance amplitude from which an unstable motion is marched from

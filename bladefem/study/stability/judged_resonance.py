@@ -19,7 +19,8 @@ from .error_in_time import Marches, error_in_time, error_of_doubt
 from .finer_contacts import FinerMotion, unstable_with_more_points
 from .flank_motions import flank_motions
 from .highest_stable import highest_lasting
-from .kept_band import KeptBand, kept_of_family, scaled_band
+from .kept_band import KeptBand, scaled_band
+from .march_from_motion import kept_of_family
 from .strong_drive import strong_drives
 from .verdicts import Stability, judged_above, model_in_time, richer_models, stability_of
 

@@ -18,7 +18,7 @@ from ...hbm.solver.newton import DEFAULT_OPTIONS
 from ...hbm.stability import STABLE, UNIQUE, stability_verdict
 from ..adaptive.family import Family, family_member, lowest_harmonics
 from ..adaptive.settings import FIRST_SETTINGS, Settings
-from .kept_band import band_by_steps
+from .march_by_steps import band_by_steps
 from .verdicts import (
     CURVE_OPERATIONS,
     JUDGED_HARMONICS,

@@ -80,17 +80,7 @@ class ResonanceInTime:
     by_law: bool = False
 
     @property
-    def search(self) -> str:
-        """What was done, in words."""
-        law = " with the law of the layer" if self.by_law else ""
-        return (
-            "most contacts lift off, and the harmonic balance does not give the resonance; it was "
-            f"sought by integration in time (marching){law}, with {self.points} contact points a "
-            "seat"
-        )
-
-    @property
-    def band(self) -> str:
+    def sentence(self) -> str:
         """What was found, in words."""
         return (
             f"the blade keeps between {1e6 * self.lowest:.4g} and {1e6 * self.highest:.4g} um at "
