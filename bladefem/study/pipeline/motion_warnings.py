@@ -55,8 +55,7 @@ UNJUDGED = Reason(
 UNMARCHED = Reason(
     "under {loads} the blade may keep to a higher motion than the resonance given: others nearly "
     "as high are unstable, and what it comes to after some of them is not known",
-    "take fewer contact.points, or contact.kt_area below that of rigid faces, so that they can be "
-    "marched from",
+    "take fewer contact.points or model.modes, so that they can be marched from",
 )
 DOUBTFUL = Reason(
     "under {loads} it is not known whether the blade keeps to the motion at the resonance: "
