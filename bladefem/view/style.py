@@ -142,32 +142,22 @@ def _fit_photographs(figure: Any) -> None:
 def take_words_as_they_are(drawn: Any) -> None:
     """Titles, labels and legends of a figure, or of axes, hold the user's own words: a dollar sign
     in one is no formula.
-
-    Numbers along logarithmic axes are formulas of matplotlib's own and stay so.
     """
-    suspects = [text for text in _texts(drawn) if "$" in text.get_text()]
-    if not suspects:
-        return
-    numbers = {
-        id(label)
-        for ax in np.ravel(drawn.axes)
-        for axis in (ax.xaxis, ax.yaxis)
-        for tick in (*axis.get_major_ticks(), *axis.get_minor_ticks())
-        for label in (tick.label1, tick.label2)
-    }
-    for text in suspects:
-        if id(text) not in numbers:
+    for text in _texts(drawn):
+        if "$" in text.get_text():
             text.set_parse_math(False)
 
 
 def _texts(artist: Any) -> Iterator[Text]:
-    """All texts of a figure but those of axes that are switched off: making their ticks takes as
-    long as the picture itself.
+    """All texts of a figure but the numbers along its axes: those of logarithmic ones are formulas
+    of matplotlib's own, and making them takes as long as the picture itself.
     """
     if isinstance(artist, Text):
         yield artist
     for child in artist.get_children():
-        if not (isinstance(child, Axis) and not child.axes.axison):
+        if isinstance(child, Axis):
+            yield child.label
+        else:
             yield from _texts(child)
 
 
