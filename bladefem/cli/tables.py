@@ -276,7 +276,7 @@ def message_lists(messages: Iterable[str], page: str | None = None) -> list[str]
         if said[level]
     ]
     if page is not None and any(one.detail for entries in said.values() for one in entries):
-        lists.append(f"figures and reasons of each: {page}, section Answer")
+        lists.append(f"figures and reasons of each: {page}")
     return lists
 
 

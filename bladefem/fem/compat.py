@@ -93,8 +93,9 @@ def _set_allocator(blocks: int, end: int) -> None:
 
 @contextmanager
 def pages_kept(large: bool = False) -> Iterator[None]:
-    """What is freed amid the block serves again there, until ``memory.give_back``: the system
-    clears pages that it hands out anew, which is a tenth of the processor time of a factorisation.
+    """What is freed amid the block serves again there, until ``memory.give_back``, or until such a
+    block within it ends: the system clears pages that it hands out anew, which is a tenth of the
+    processor time of a factorisation.
 
     Args:
         large: blocks of any size; else those below ``LARGE_BLOCK``.

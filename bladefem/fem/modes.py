@@ -106,8 +106,10 @@ def proven_pairs(
     if not keep:
         # the count takes their place: not given back in between
         release(flex.con.K, flex.factor)
-    exact = count_below(flex.con, upper)
-    give_back()
+    try:
+        exact = count_below(flex.con, upper)
+    finally:
+        give_back()
     if exact == expected:
         return lam, X
     flex = flex if keep else flexible(flex.con)

@@ -96,23 +96,25 @@ def _petsc_calls_back() -> bool:
     """Whether a solve comes to the call back: of three unknowns, for it costs a sweep."""
     diagonal = sp.identity(3, format="csr")
     matrix = shared_matrix((3, 3), diagonal.indptr, diagonal.indices, diagonal.data)
-    factor = factorise_matrix(matrix, definite=True, schur=np.array([2]))
-    matrix.destroy()
     heard: list[int] = []
 
     def listen(r: np.ndarray) -> np.ndarray:
         heard.append(1)
         return r
 
-    made = _with_call_back(factor, 1)
+    factor = None
     try:
+        factor = factorise_matrix(matrix, definite=True, schur=np.array([2]))
+        made = _with_call_back(factor, 1)
         with no_error_messages():
             if made is not None:
                 solve_through_boundary(made, np.zeros((3, 1)), listen)
     except (PETSc.Error, NotSolvedError):
         return False
     finally:
-        factor.matrix.destroy()
+        matrix.destroy()
+        if factor is not None:
+            factor.matrix.destroy()
     return bool(heard)
 
 

@@ -156,7 +156,8 @@ def warnings_of_all(names: Sequence[str], variants: Sequence[Variant]) -> list[s
     for variant in variants:
         for one in by_level(map(_as_warning, variant.warnings))["warning"]:
             of = belongs.setdefault((str(one), one.advice), {})
-            of[_label(names, variant)] = one.detail
+            label = _label(names, variant)
+            of[label] = ". ".join(filter(None, [of.get(label, ""), one.detail]))
     every = len(variants) if len(variants) > 2 else 0
     common = [
         _warning_of_runs(f"all {every} runs", said, of)

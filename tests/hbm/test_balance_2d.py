@@ -44,11 +44,16 @@ def rubbing(nodes=2):
     )
 
 
-def walking(nodes=2):
+def walking(nodes=2, stiff=None):
     """A balance whose damper walks along both tangents, and displacements that all contacts slip
     by.
+
+    Args:
+        stiff: (nodes,) share of its stiffness that each contact has; all of it when left out.
     """
     model = rubbing(nodes)
+    if stiff is not None:
+        model = replace(model, elements=replace(model.elements, kt=model.elements.kt * stiff))
     balance = Balance(model, condense(model, 1.1, 3), SAMPLES)
     balance = replace(balance, walk=newton.tangential_motions(model, balance.linear.B))
     assert balance.walk.shape == (2 * nodes, 2)
@@ -69,6 +74,7 @@ CASES = {
     "rigid damper": resting(block(damper=True), 2.0),
     "prescribed loads": resting(rubbing(3), 1.0),
     "walking": walking(),
+    "walking, one without stiffness": walking(3, np.array([1.0, 1.0, 0.0])),
 }
 
 

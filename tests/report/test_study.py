@@ -285,6 +285,9 @@ def test_warnings_of_several_values_keep_their_advice_and_all_details():
     assert said == "contact.mu = 0.2; contact.mu = 0.3: unstable under 9 N"
     assert said.advice == "use a march"
     assert said.detail == "contact.mu = 0.2: 0 um. contact.mu = 0.3: 1 um"
+    # two of one run that differ in their details
+    twice = [replace(both[0], warnings=(*both[0].warnings, *both[1].warnings))]
+    assert warnings_of_all(["contact.mu"], twice)[0].detail == "contact.mu = 0.2: 0 um. 1 um"
 
 
 def test_bars_and_marks_tell_how_sure_each_resonance_is():

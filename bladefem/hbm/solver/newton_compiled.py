@@ -268,7 +268,7 @@ def moving_nodes(J, springs, d, sticks):
     balance.
 
     Args:
-        sticks: share of a node's stiffness that dp/dw must exceed.
+        sticks: share of a node's stiffness that dp/dw must exceed; below zero: all nodes.
     """
     n = J.shape[0]
     first = J.shape[1] - d
@@ -290,7 +290,8 @@ def moving_nodes(J, springs, d, sticks):
                             value -= springs[node * d + b]
                         block[b * K + k, e * K + l] = value
                         largest = max(largest, abs(value))
-        if largest > sticks * stiffest:
+        # also an element without stiffness, where every node is asked for
+        if sticks < 0.0 or largest > sticks * stiffest:
             found[count] = node
             count += 1
     return found[:count], C[:count]

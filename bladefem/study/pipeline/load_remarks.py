@@ -41,19 +41,25 @@ def load_warnings(remarks: Iterable[LoadRemark | None]) -> list[Message]:
     >>> said, said.detail
     ('contacts lift off under 1 N and 2 N', '1 N: 1 um; 2 N: 2 um')
     """
-    found: dict[Reason, list[LoadRemark]] = {}
+    found: dict[tuple[str, str], list[LoadRemark]] = {}
     for remark in filter(None, remarks):
-        found.setdefault(remark.reason, []).append(remark)
-    return [_warning(reason, those) for reason, those in found.items()]
+        found.setdefault((remark.reason.text, remark.reason.advice), []).append(remark)
+    return [_warning(*said, those) for said, those in found.items()]
 
 
-def _warning(reason: Reason, remarks: Sequence[LoadRemark]) -> Message:
+def _warning(text: str, advice: str, remarks: Sequence[LoadRemark]) -> Message:
     named = len(remarks) <= MAX_NAMED
     texts = [r.load + (f" ({r.figure})" if r.figure else "") for r in remarks]
     loads = enumeration(texts) if named else f"{len(remarks)} loads"
-    lines = [_line(r) for r in remarks if r.detail or not named]
-    detail = ". ".join(filter(None, [reason.cause, "; ".join(lines)]))
-    return warning(reason.text.format(loads=loads), reason.advice, detail)
+    # loads with the same cause have it once
+    of_cause: dict[str, list[LoadRemark]] = {}
+    for remark in remarks:
+        of_cause.setdefault(remark.reason.cause, []).append(remark)
+    details = []
+    for cause, those in of_cause.items():
+        lines = "; ".join(_line(r) for r in those if r.detail or not named or len(of_cause) > 1)
+        details += [part for part in (cause, lines) if part]
+    return warning(text.format(loads=loads), advice, ". ".join(details))
 
 
 def _line(remark: LoadRemark) -> str:

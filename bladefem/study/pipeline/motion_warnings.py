@@ -20,7 +20,8 @@ MARCH_GIVEN = "under {loads} the amplitude given is that of an integration in ti
 FOLDED = Reason(
     "under {loads} the blade has several steady vibrations (motions) at one frequency, as the "
     "curve folds back over itself",
-    "see in local_resonances.csv which sweep reaches which motion",
+    "see in points.csv which points belong to one branch, and local_resonances.csv, where there is "
+    "one, for the sweep that reaches each maximum",
 )
 LOWER = Reason(
     "from rest the blade may keep to a far lower motion than the one given, at the same frequency, "
