@@ -11,6 +11,7 @@ from bladefem.friction.aft import dissipated_energy, evaluate
 from bladefem.hbm import policy
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import Damping, ReducedModel
+from bladefem.hbm.solve import solve
 from bladefem.hbm.solver import newton, residual
 from bladefem.hbm.solver.newton_compiled import dense_jacobian
 from bladefem.hbm.solver.newton_krylov import Memory
@@ -44,16 +45,11 @@ def rubbing(nodes=2):
     )
 
 
-def walking(nodes=2, stiff=None):
+def walking(nodes=2):
     """A balance whose damper walks along both tangents, and displacements that all contacts slip
     by.
-
-    Args:
-        stiff: (nodes,) share of its stiffness that each contact has; all of it when left out.
     """
     model = rubbing(nodes)
-    if stiff is not None:
-        model = replace(model, elements=replace(model.elements, kt=model.elements.kt * stiff))
     balance = Balance(model, condense(model, 1.1, 3), SAMPLES)
     balance = replace(balance, walk=newton.tangential_motions(model, balance.linear.B))
     assert balance.walk.shape == (2 * nodes, 2)
@@ -74,7 +70,6 @@ CASES = {
     "rigid damper": resting(block(damper=True), 2.0),
     "prescribed loads": resting(rubbing(3), 1.0),
     "walking": walking(),
-    "walking, one without stiffness": walking(3, np.array([1.0, 1.0, 0.0])),
 }
 
 
@@ -198,6 +193,20 @@ def test_nodes_that_stick_are_left_out_of_the_matrix():
     expected = np.linalg.solve(system, state.residual.ravel()).reshape(w.shape)
     step = linearise_balance(balance, state)(state.residual)
     np.testing.assert_allclose(step, expected, rtol=0, atol=1e-11 * abs(expected).max())
+
+
+@pytest.mark.parametrize("omega", [0.7, 0.9, 1.1])
+def test_a_damper_walks_beside_a_contact_without_stiffness(omega):
+    """As beside one without friction."""
+    model = rubbing(3)
+    e, exact = model.elements, newton.Options(tolerance=1e-10)
+    found, without = (
+        solve(replace(model, elements=elements), omega, 3, SAMPLES, options=exact)
+        for elements in (replace(e, kt=e.kt * [1, 1, 0]), replace(e, mu=e.mu * [1, 1, 0]))
+    )
+    assert found.converged and found.walk is not None and without.converged
+    moved, expected = found.w[:, :, 1:], without.w[:, :, 1:]
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-6 * abs(expected).max())
 
 
 def test_states_that_newton_begins_with_are_those_at_its_starts():
