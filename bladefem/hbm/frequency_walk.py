@@ -40,7 +40,7 @@ def walk_in_frequency(
     Args:
         enough: share of the way after which the walk ends.
     """
-    brief = replace(options, iterations=min(options.iterations, WALK_ITERATIONS))
+    brief = replace(options, iterations=min(options.iterations, WALK_ITERATIONS), fallbacks=False)
     way = [start]
     step = (omega - start.omega) / 2
     shortest = SHORTEST_WALK_STEP * abs(omega - start.omega)

@@ -10,8 +10,9 @@ from dataclasses import replace
 from ..errors import NotSolvedError
 from .frequency_walk import walk_in_frequency
 from .model import ReducedModel
-from .solution import Solution
+from .solution import Solution, mostly_lifts_off
 from .solve import solve, solve_near
+from .solver.fallback import match_harmonics
 from .solver.newton import DEFAULT_OPTIONS, Options
 
 # of a frequency: how far next to a resonance without damping a sweep solves, where it hits it
@@ -29,19 +30,39 @@ def solve_from(
     starts: Sequence[Solution],
     options: Options = DEFAULT_OPTIONS,
 ) -> Solution:
-    """The point from the first of several neighbours that leads to it, at once or in small steps,
-    before fallbacks, which take far longer.
+    """The point from the first of several neighbours, or the line between them, that leads to it,
+    at once or in small steps, before fallbacks, which take far longer.
 
     Next to a fold of the curve only the neighbour on its other side does.
     """
     simply = replace(options, fallbacks=False)
+    tried = [*line_between(starts, omega, H), *starts]
     tries = (
-        (solve_off_resonance(model, omega, H, samples, start, simply) for start in starts)
+        (solve_off_resonance(model, omega, H, samples, start, simply) for start in tried)
         if len(starts) > 1
         else ()
     )
     found = next((point for point in tries if point.converged), None)
     return found or walk_from(model, omega, H, samples, starts, options)[-1]
+
+
+def line_between(starts: Sequence[Solution], omega: float, H: int) -> list[Solution]:
+    """A start on the line through two solved points on both sides of a frequency, where most
+    contacts lift off at both: neither of them leads far there, and fails slowly.
+
+    None where the damper walks at one of them alone, since the response jumps between them.
+
+    Args:
+        starts: the nearest point, and the nearest on its other side.
+    """
+    if len(starts) < 2 or not all(mostly_lifts_off(point) for point in starts[:2]):
+        return []
+    near, beyond = starts[:2]
+    if (near.walk is None) != (beyond.walk is None):
+        return []
+    share = (omega - near.omega) / (beyond.omega - near.omega)
+    first, last = (match_harmonics(point.w, H) for point in (near, beyond))
+    return [replace(near, w=first + share * (last - first))]
 
 
 def nearest_neighbours(points: Iterable[Solution], omega: float) -> list[Solution]:

@@ -13,7 +13,7 @@ from .full_stick import INSTANTS_PER_HARMONIC, leading_stuck_points, sticks_safe
 from .linear.condensation import Linear, condense, own_flexibility
 from .model import ReducedModel
 from .point_measures import MEASURES, count_states, measure_point
-from .solution import Solution, Work, probe_motion
+from .solution import Solution, Work, mostly_lifts_off, probe_motion
 from .solver.fallback import (
     NEWTON_MERITS,
     Attempt,
@@ -68,8 +68,9 @@ def solve(
     if first is not None:
         return first
     balance = Balance(model, condense(model, omega, H), samples)
+    bounces = start is not None and mostly_lifts_off(start)
     attempts = solve_balance(
-        balance, None if start is None else match_harmonics(start.w, H), options
+        balance, None if start is None else match_harmonics(start.w, H), options, not bounces
     )
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
     reason = best.end.reason if best.end.converged else _failure_reasons(balance, attempts)

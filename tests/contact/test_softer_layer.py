@@ -8,14 +8,15 @@ import pytest
 from small_patch import blade_side, patch_model, patch_on_half_space, problem_of
 
 from bladefem.contact.numerical_stiffness import numerical_stiffness
+from bladefem.hbm.from_neighbours import line_between
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import softened_layer
 from bladefem.hbm.peak import Peak, find_peak
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve, solve_near
 from bladefem.hbm.solver import fallback
-from bladefem.hbm.solver.newton import Options
-from bladefem.hbm.solver.residual import Balance, start_in_stick
+from bladefem.hbm.solver.newton import Newton, Options
+from bladefem.hbm.solver.residual import Balance, evaluate_balance, start_in_stick
 from bladefem.study.adaptive import stiff_layer
 from bladefem.study.adaptive.family import family_member, family_of
 from bladefem.study.adaptive.resonance_choice import has_final_harmonics
@@ -139,6 +140,43 @@ def test_newton_lowers_the_step_first_where_a_layer_is_split(stiff, fallbacks, m
 
     assert tried(stiff) == methods
     assert tried(softened_layer(stiff))[0] == "newton on the residual"
+
+
+def test_full_stick_is_no_start_beside_a_bouncing_neighbour(stiff, monkeypatch):
+    """Under 80 N on the shipped wedge it leads nowhere, in 0.15 s a point."""
+    soft = softened_layer(stiff)
+    point = solve(soft, OMEGA, 3, 64)
+    asked = []
+
+    def failing(balance, w, options, merit, walks=True):
+        asked.append(w)
+        state = evaluate_balance(balance, w, "single")
+        return Newton(state, 1, False, "made to fail")
+
+    monkeypatch.setattr(fallback, "newton", failing)
+    options = Options(fallbacks=False)
+    for lifting, starts in ((len(point.w), 1), (0, 2)):
+        near = replace(point, states={**point.states, "lift": lifting})
+        asked.clear()
+        assert not solve(soft, 1.001 * OMEGA, 3, 64, start=near, options=options).converged
+        assert len(asked) == starts
+        np.testing.assert_array_equal(asked[0], near.w)
+
+
+def test_points_between_bouncing_neighbours_start_on_the_line_through_them(stiff):
+    """The start is nearer to the solution than either; none where the damper walks at one alone."""
+    soft = softened_layer(stiff)
+    ends = [solve(soft, ratio * OMEGA, 3, 64) for ratio in (0.999, 1.001)]
+    true = solve(soft, OMEGA, 3, 64)
+    bouncing = [replace(p, states={**p.states, "lift": len(p.w)}) for p in ends]
+    (start,) = line_between(bouncing, OMEGA, 3)
+    off = [np.linalg.norm(p.w - true.w) for p in (start, *ends)]
+    assert off[0] < 0.1 * min(off[1:])
+    walking = replace(bouncing[1], walk=np.zeros((true.w[:, :, 0].size, 1)))
+    assert line_between([bouncing[0], walking], OMEGA, 3) == []
+    closed = [replace(p, states={**p.states, "lift": 0}) for p in ends]
+    assert line_between(closed, OMEGA, 3) == []
+    assert line_between(bouncing[:1], OMEGA, 3) == []
 
 
 def test_a_neighbour_of_a_split_layer_lowers_the_step(stiff):

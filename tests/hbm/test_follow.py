@@ -11,7 +11,7 @@ from models import block, single_mass
 
 from bladefem.data import Elements
 from bladefem.errors import InputError
-from bladefem.hbm import continuation, from_neighbours
+from bladefem.hbm import continuation, frequency_walk, from_neighbours
 from bladefem.hbm.continuation import follow
 from bladefem.hbm.frequency_walk import walk_in_frequency
 from bladefem.hbm.linear.condensation import condense
@@ -135,6 +135,20 @@ def test_a_walk_ends_at_the_frequency_or_before_a_fold():
     assert [p.omega for p in begun] == [pytest.approx((low.omega + 1.05) / 2)]
     beyond = walk_in_frequency(model, 3.0, 5, 0, low, Options(iterations=3))
     assert all(p.converged for p in beyond)
+
+
+def test_points_of_a_walk_have_no_fallbacks(monkeypatch):
+    """Where one is not found its step is shortened, which takes less than all ways of starting it."""
+    model, asked = stop(), []
+    plain = frequency_walk.solve_near
+
+    def counted(*arguments):
+        asked.append(arguments[-1])
+        return plain(*arguments)
+
+    monkeypatch.setattr(frequency_walk, "solve_near", counted)
+    assert walk_in_frequency(model, 1.05, 5, 0, solve(model, 1.0, 5, 0), Options(fallbacks=True))
+    assert asked and not any(options.fallbacks for options in asked)
 
 
 def twins(coupling):

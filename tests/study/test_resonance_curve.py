@@ -27,7 +27,7 @@ from bladefem.study.adaptive import resonance_curve as curve_module
 from bladefem.study.adaptive import rough_curve as rough_module
 from bladefem.study.adaptive.check_points import peak_of
 from bladefem.study.adaptive.family import Family, Member
-from bladefem.study.adaptive.peak_errors import PeakErrors
+from bladefem.study.adaptive.peak_errors import LIFTING_JUDGE, PeakErrors
 from bladefem.study.adaptive.resonance_curve import resonance_curve
 from bladefem.study.adaptive.settings import first_for
 
@@ -127,10 +127,11 @@ def test_flanks_are_judged_by_a_model_as_large_as_that_of_the_peak(monkeypatch):
         for k, amplitude in enumerate((0.3, 0.6, 0.9, 1.0, 0.9, 0.6, 0.3))
     ]
     top = points[3]
-    asked, shifts = [], []
+    asked, shifts, limits = [], [], []
 
-    def compared(family, settings, other, name, point):
+    def compared(family, settings, other, name, point, largest_with_points):
         asked.append(point)
+        limits.append(largest_with_points)
         return settings, other, 1.0
 
     def moved(family, settings, point, *given):
@@ -153,6 +154,8 @@ def test_flanks_are_judged_by_a_model_as_large_as_that_of_the_peak(monkeypatch):
     found = flank_checks.checked_flanks(None, first_for(4), points, top, peak, errors)
     assert len(found) > 1 and len(asked) == len(found) - 1
     assert all(point is top for point in asked)
+    # with four times the contact points of a bouncing damper two flanks took 4 of 21 s
+    assert set(limits) == {LIFTING_JUDGE}
     flanks = [omega for omega in found if omega != top.omega]
     assert shifts == pytest.approx([omega * 103.5 / 102.5 for omega in flanks])
 
@@ -277,6 +280,45 @@ def test_a_curve_is_swept_once_with_the_harmonics_that_a_flank_asks_for(monkeypa
     _, curve = curve_of_seed(164)
     assert [s.harmonics for s in asked] == [asked[0].harmonics] * (len(asked) - 1) + [15]
     assert len(asked) <= 3 and curve.settings.harmonics == 15
+
+
+def test_flanks_are_judged_on_the_last_sweep_alone(monkeypatch):
+    """Seed 164 is swept again with more harmonics, its flanks are not judged before."""
+    sweeps, judged = counted_sweeps(monkeypatch), []
+    plain = curve_module.checked_flanks
+
+    def checked(*arguments):
+        judged.append(len(sweeps))
+        return plain(*arguments)
+
+    monkeypatch.setattr(curve_module, "checked_flanks", checked)
+    _, curve = curve_of_seed(164)
+    assert judged == [len(sweeps)] and len(sweeps) > 1
+    assert any(omega != peak_of(curve.points).omega for omega in curve.errors)
+
+
+@pytest.mark.parametrize(("harmonics", "chosen_at"), [(15, "fine"), (7, "rough")])
+def test_settings_of_a_bouncing_stiff_layer_are_chosen_on_the_final_sweep(
+    harmonics, chosen_at, monkeypatch
+):
+    """Points of the rough one serve it; chosen at the rough one's top, 53.6 um for 55.2, judges took
+    9 of 21 s for nothing (1e4 N/mm^3, 80 N).
+    """
+
+    class ChosenError(Exception):
+        """The point that settings are chosen at is known."""
+
+    def chosen(curve, settings, begun, points, top):
+        assert begun is not None
+        raise ChosenError(points[0])
+
+    settings = replace(first_for(10), harmonics=harmonics, softened=True)
+    monkeypatch.setattr(curve_module, "rough_curve", lambda *_: (settings, ["rough"]))
+    monkeypatch.setattr(curve_module, "_swept", lambda *_: ["fine"])
+    monkeypatch.setattr(curve_module, "peak_of", lambda points: points[0])
+    monkeypatch.setattr(curve_module, "_chosen_for_curve", chosen)
+    with pytest.raises(ChosenError, match=chosen_at):
+        resonance_curve(None, settings, None, 1, 0.05)
 
 
 def test_steps_of_harmonics_are_counted():

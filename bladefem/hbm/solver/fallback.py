@@ -60,10 +60,16 @@ def solve_balance(
     balance: Balance,
     start: np.ndarray | None,
     options: Options,
+    from_stick: bool = True,
 ) -> list[Attempt]:
-    """The attempts made, the last one converged unless every way failed."""
+    """The attempts made, the last one converged unless every way failed.
+
+    Args:
+        from_stick: whether full stick is a start worth trying where one is given and no fallbacks
+            are wanted.
+    """
     attempts = []
-    for attempt in _attempts_in_order(balance, start, options):
+    for attempt in _attempts_in_order(balance, start, options, from_stick):
         attempts.append(attempt)
         if attempt.end.converged:
             break
@@ -82,6 +88,7 @@ def _newton_attempts(
     balance: Balance,
     start: np.ndarray | None,
     options: Options,
+    from_stick: bool = True,
 ) -> Iterator[Attempt]:
     """Newton from the given start and from full stick, with each merit function."""
     # Where the loop is not compiled the residual is cheaper, and on 3-D patches that lift off it
@@ -91,9 +98,11 @@ def _newton_attempts(
     compiled = runs_compiled(balance)
     step_first = lowers_step_first(balance)
     merits: Sequence[tuple[str, str]] = NEWTON_MERITS if step_first else NEWTON_MERITS[::-1]
-    if balance.model.series is not None and not options.fallbacks and start is not None:
+    split = balance.model.series is not None
+    if (split or not from_stick) and not options.fallbacks and start is not None:
         # of 69 points with stiff layers that the start did not lead to, full stick led to one, in
-        # a quarter of the time of all; what one merit does not find is better sought beside it
+        # a quarter of the time of all, and where most contacts lift off it takes 0.15 s a point for
+        # nothing; what one merit does not find is better sought beside it
         starts, merits = starts[:1], merits[:1]
     for w, (method, merit) in _runs_in_order(starts, merits, step_first, options.fallbacks):
         walks = merit == merits[0][1]
@@ -127,10 +136,11 @@ def _attempts_in_order(
     balance: Balance,
     start: np.ndarray | None,
     options: Options,
+    from_stick: bool,
 ) -> Iterator[Attempt]:
     """Every way to the solution, the cheapest first; each is tried when it is asked for."""
     plain = []
-    for attempt in _newton_attempts(balance, start, options):
+    for attempt in _newton_attempts(balance, start, options, from_stick):
         yield attempt
         plain.append(attempt.end)
     if not options.fallbacks:

@@ -19,7 +19,14 @@ from .check_points import (
 )
 from .family import Family, family_member
 from .indicators import moved_solution, richer_settings
-from .peak_errors import JUDGE_STEPS, OVERTONES, PeakErrors, compared_settings, judge_settings
+from .peak_errors import (
+    JUDGE_STEPS,
+    LIFTING_JUDGE,
+    OVERTONES,
+    PeakErrors,
+    compared_settings,
+    judge_settings,
+)
 from .settings import Settings, enriched_settings
 
 
@@ -117,7 +124,7 @@ def _change(
             which that model judged (11 900 unknowns in place of 6000 took half of a curve's time
             under 190 N on an imported wedge).
     """
-    pair = compared_settings(family, settings, other, name, largest)
+    pair = compared_settings(family, settings, other, name, largest, LIFTING_JUDGE)
     if pair is None:
         return np.inf
     own, judge, factor = pair

@@ -110,9 +110,13 @@ def resonance_curve(
     """
     curve = _Curve(family, band, mode, accuracy, march, fixed)
     settings, points = rough_curve(family, settings, band, mode, accuracy)
-    used, top = settings, peak_of(points)
-    swept, left = _Sweep(settings, 1.0), MISSED_STEPS
     notes: list[str] = []
+    swept, left = _Sweep(settings, 1.0), MISSED_STEPS
+    if has_final_harmonics(settings):
+        # a rough sweep leads to a lower part of a flat top, whose judges take seconds for nothing
+        points = _swept(curve, settings, points, swept, notes, USUAL_LIMITS)
+        swept = _Sweep(settings, accuracy)
+    used, top = settings, peak_of(points)
     for number in range(MAX_SWEEPS):
         begun = settings if number == 0 else None
         (used, peak, errors), asked = _chosen_for_curve(curve, used, begun, points, top)
@@ -133,12 +137,13 @@ def resonance_curve(
             return CheckedCurve(used, points, {top.omega: used.error}, tuple(notes), _parts(errors))
         used, higher = _judged_top(curve, used, peak, points, top)
         significant = checked_significant(family, used, points, top, accuracy) if asked else {}
-        found = significant | checked_flanks(family, used, points, top, peak, errors)
         missed = harmonics_missed(family, used, points, top, significant, accuracy, left)
         if number == MAX_SWEEPS - 1 or (missed is None and not higher):
             break
         left -= steps_of_harmonics(used, missed or used)
         used = missed or used
+    # flanks are judged once: those of a peak that is left for a higher one say nothing
+    found = significant | checked_flanks(family, used, points, top, peak, errors)
     return CheckedCurve(used, points, found, tuple(notes), _parts(errors))
 
 
