@@ -206,7 +206,8 @@ def test_a_damper_walks_beside_a_contact_without_stiffness(omega):
     )
     assert found.converged and found.walk is not None and without.converged
     moved, expected = found.w[:, :, 1:], without.w[:, :, 1:]
-    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-6 * abs(expected).max())
+    # forces are marched until they repeat, which they do to some 1e-6
+    np.testing.assert_allclose(moved, expected, rtol=0, atol=1e-5 * abs(expected).max())
 
 
 def test_states_that_newton_begins_with_are_those_at_its_starts():
