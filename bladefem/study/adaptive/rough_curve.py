@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...data import RigidBody
 from ...errors import NotSolvedError
 from ...hbm.solution import Solution, size
 from .band_sweep import covered_band
@@ -77,7 +78,8 @@ def _swept_roughly(
 def _with_free_harmonics(family: Family, settings: Settings) -> Settings:
     """More than one harmonic where normal loads do not follow the motion and the points cost no
     more than Python does with them: one in three of such models needs them, and its curve is not
-    swept, nor its peak judged, twice.
+    swept, nor its peak judged, twice. Not of a damper that friction alone holds: it may walk, and
+    a point that has no solution then takes twice as long (seed 34 of benchmarks/choice_random.py).
     """
     richer = enriched_settings(settings, "harmonics")
     if settings.harmonics > 1 or richer is None or "harmonics" not in settings.chosen:
@@ -85,7 +87,7 @@ def _with_free_harmonics(family: Family, settings: Settings) -> Settings:
     model = family_member(family, richer).model
     each = model.unknowns(richer.harmonics) * model.directions * max(richer.samples, 1)
     small = model.loads_prescribed and each <= PYTHON_OPERATIONS
-    return richer if small else settings
+    return richer if small and not isinstance(model.damper, RigidBody) else settings
 
 
 def _with_stiff_layer(
