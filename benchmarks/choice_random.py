@@ -31,8 +31,8 @@ Above 1.1 at 2 % for another reason than the time of Python (164 and 192 are non
     73      3.5     31 harmonics; a followed curve is given up after 100 points
     95      5.1     needs 31 harmonics
     158     1.1     two points of the band are hard with seven harmonics and 64 samples
-    164     2.9     a flank asks for 15 harmonics, whose points are hard with few samples
-    192     1.5     needs 31 harmonics, the rich model of 15 is 1.6 % off
+    164     3.0     a flank asks for 15 harmonics, whose points are hard with few samples
+    192     7       needs 31 harmonics, which 63 judge in 2.7 s; those of 15 are 1.6 % off
 The other ones (30, 62, 100, 126, 134) take 10 to 40 ms, most of it Python.
 
 Where the fixed rich model has its curve in 8 to 20 ms a point of either takes 0.3 ms, nearly all of
