@@ -41,17 +41,21 @@ def cheaper_settings(
     peak: Peak,
     errors: PeakErrors,
     accuracy: float,
+    held: tuple[str, ...] = (),
 ) -> Choice:
     """Settings from `choose_at_peak`, poorer in what is not needed.
 
     A respect is made poorer where the error that its step back is expected to leave fits into the
     accuracy, where the sweep that follows saves more than the poorer peak takes, and where that
     peak lies as near as the accuracy asks for. What it differs by is added to the errors.
+
+    Args:
+        held: respects that stay as they are, since the curve gets more of them anyway.
     """
     left = SUFFICIENT_SHARE * accuracy - sum(errors.needs.values())
     for name, growth in ERROR_GROWTH.items():
         poorer = _one_step_back(family, settings, name)
-        if poorer is None or left <= 0 or _too_few_points(poorer, peak):
+        if name in held or poorer is None or left <= 0 or _too_few_points(poorer, peak):
             continue
         expected = (growth - 1) * errors.needs[name]
         if expected > left or not _saves(family, settings, poorer):

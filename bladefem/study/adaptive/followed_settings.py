@@ -41,25 +41,31 @@ def with_free_samples(
     points: Sequence[Solution],
     accuracy: float,
 ) -> tuple[Settings, Peak | None]:
-    """More samples, and the peak with them, where the curve will be followed round folds and they
-    take no longer than Python does; the same as before where that peak is not found.
-    """
-    lifts = any(lifts_off(p) for p in points if p.converged)
-    open_samples = "samples" in settings.chosen and settings.samples > 0
-    if peak is None or not (lifts and open_samples) or too_large_to_follow(family, settings):
-        return settings, peak
-    model = family_member(family, settings).model
-    each = model.unknowns(settings.harmonics) * model.directions
-    samples = settings.samples
-    while 2 * samples <= FREE_SAMPLES and 2 * samples * each <= PYTHON_OPERATIONS:
-        samples *= 2
-    if samples == settings.samples:
+    """`free_samples`, and the peak with them; the same as before where that peak is not found."""
+    samples = free_samples(family, settings, points)
+    if peak is None or samples == settings.samples:
         return settings, peak
     finer = replace(settings, samples=samples)
     try:
         return finer, peak_from(family, settings, peak, finer, accuracy)
     except NotSolvedError:
         return settings, peak
+
+
+def free_samples(family: Family, settings: Settings, points: Sequence[Solution]) -> int:
+    """More samples where the curve will be followed round folds and they take no longer than Python
+    does; as many as before elsewhere.
+    """
+    lifts = any(lifts_off(p) for p in points if p.converged)
+    open_samples = "samples" in settings.chosen and settings.samples > 0
+    if not (lifts and open_samples) or too_large_to_follow(family, settings):
+        return settings.samples
+    model = family_member(family, settings).model
+    each = model.unknowns(settings.harmonics) * model.directions
+    samples = settings.samples
+    while 2 * samples <= FREE_SAMPLES and 2 * samples * each <= PYTHON_OPERATIONS:
+        samples *= 2
+    return samples
 
 
 def with_fewer_folds(settings: Settings, peak: Peak | None) -> Settings | None:

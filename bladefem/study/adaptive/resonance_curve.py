@@ -26,6 +26,7 @@ from .flank_checks import checked_flanks, checked_significant, harmonics_missed,
 from .followed_settings import (
     MANY_FOLDS,
     MANY_POINTS,
+    free_samples,
     refined_top,
     too_large_to_follow,
     with_fewer_folds,
@@ -160,7 +161,7 @@ def _chosen_for_curve(
     Args:
         begun: settings of the rough sweep, whose points these are; None after it.
     """
-    chosen = _chosen(curve, settings, top, begun is not None)
+    chosen = _chosen(curve, settings, top, points if begun is not None else None)
     asked = _asks_for_harmonics(chosen, top, curve.march)
     if begun is not None and asked and same_settings(chosen.settings, begun):
         chosen = _with_missed(curve, points, top, chosen)
@@ -234,7 +235,7 @@ def _with_missed(
     )
     if richer is None:
         return chosen
-    return _chosen(replace(curve, march=None), richer, top, lower=False)
+    return _chosen(replace(curve, march=None), richer, top, None)
 
 
 def _resonance(family: Family, settings: Settings, points: Sequence[Solution]) -> Solution:
@@ -280,12 +281,15 @@ def _same_points(one: _Sweep, other: _Sweep) -> bool:
     return equally and same_settings(one.settings, other.settings)
 
 
-def _chosen(curve: _Curve, settings: Settings, top: Solution, lower: bool) -> _Chosen:
+def _chosen(
+    curve: _Curve, settings: Settings, top: Solution, rough: Sequence[Solution] | None
+) -> _Chosen:
     """Settings that hold at the peak next to a point; the same with an unknown error where that
     peak was not closed in.
 
     Args:
-        lower: they may become poorer where not all is needed.
+        rough: points of the rough sweep, after which settings may become poorer where not all is
+            needed; None: they may not.
     """
     family, accuracy, march, fixed = curve.family, curve.accuracy, curve.march, curve.fixed
     try:
@@ -296,8 +300,11 @@ def _chosen(curve: _Curve, settings: Settings, top: Solution, lower: bool) -> _C
                 return _Chosen(*choice)
         enough = choose_at_peak(family, settings, peak, accuracy, fixed)
         # points of a softened layer are swept already with what is chosen
-        cheaper = lower and not settings.softened
-        return _Chosen(*(cheaper_settings(family, *enough, accuracy) if cheaper else enough))
+        if rough is None or settings.softened:
+            return _Chosen(*enough)
+        free = free_samples(family, enough.settings, rough) > enough.settings.samples
+        held = ("samples",) if free else ()
+        return _Chosen(*cheaper_settings(family, *enough, accuracy, held))
     except NotSolvedError:
         return _Chosen(replace(settings, error=np.inf), None, None)
 

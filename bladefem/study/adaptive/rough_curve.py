@@ -9,9 +9,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...data import RigidBody
 from ...errors import NotSolvedError
 from ...hbm.solution import Solution, size
 from .band_sweep import covered_band
+from .cheaper_settings import PYTHON_OPERATIONS
 from .check_points import (
     peak_of,
 )
@@ -20,7 +22,7 @@ from .resonance_choice import (
     lacks_harmonics_for_lift_off,
     settings_of_lift_off,
 )
-from .settings import Settings
+from .settings import Settings, enriched_settings
 from .stiff_layer import climbed_to, settings_of_stiff_layer, softened_where_lifting
 
 # share of a resonance with poor settings below which richer ones, whose points were not solved
@@ -59,6 +61,7 @@ def _swept_roughly(
     lift off at its peak and ask for them, unless that peak is lost with them.
     """
     settings = with_excited_harmonics(family, replace(settings, error=None))
+    settings = _with_free_harmonics(family, settings)
     points = covered_band(family_member(family, settings).model, settings, band, mode, 1.0)
     top = peak_of(points)
     suited = _suited_to_lift_off(family, settings, top)
@@ -70,6 +73,21 @@ def _swept_roughly(
         # no point converged
         return settings, points
     return (settings, points) if is_lost(top, richer) else (suited, richer)
+
+
+def _with_free_harmonics(family: Family, settings: Settings) -> Settings:
+    """More than one harmonic where normal loads do not follow the motion and the points cost no
+    more than Python does with them: one in three of such models needs them, and its curve is not
+    swept, nor its peak judged, twice. Not of a damper that friction alone holds: it may walk, and
+    a point that has no solution then takes twice as long (seed 34 of benchmarks/choice_random.py).
+    """
+    richer = enriched_settings(settings, "harmonics")
+    if settings.harmonics > 1 or richer is None or "harmonics" not in settings.chosen:
+        return settings
+    model = family_member(family, richer).model
+    each = model.unknowns(richer.harmonics) * model.directions * max(richer.samples, 1)
+    small = model.loads_prescribed and each <= PYTHON_OPERATIONS
+    return richer if small and not isinstance(model.damper, RigidBody) else settings
 
 
 def _with_stiff_layer(
