@@ -10,7 +10,7 @@
 - peaks: ``peak`` found and followed, ``peak_levels`` and ``next_parameter`` of a search,
   ``optimum`` the lowest peak, ``peak_ripples`` made by sampling, ``truncation_indicator``
 - several motions: ``continuation`` round folds, ``branches`` of a band, ``band_path``,
-  ``path_maxima``, ``slow_sweep``, ``one_path`` where a sweep shows no folds
+  ``path_maxima``, ``slow_sweep``
 - derivatives: ``sensitivity``, ``parameter_derivatives``, ``node_gradients``,
   ``traction_gradient`` and ``history_interval`` for static friction forces
 - nonlinear modes: ``nonlinear_modes``, ``mode_path`` with ``mode_newton``, ``mode_arc`` and

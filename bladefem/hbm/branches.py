@@ -122,7 +122,7 @@ def find_branches(
     if limits.points is not None:
         limit = min(limit, limits.points)
     budget = limit
-    further = further_motions(model, band, solved[0], H, samples, options)
+    further = _further(model, band, solved[0], H, samples, options)
     for start in chain(solved[:1], solved[-1:], solved, further):
         forward = start is not solved[-1]
         at_end = start is solved[0] or start is solved[-1]
@@ -157,7 +157,7 @@ def _runs(on_path: Sequence[bool], solved: Sequence[Solution]) -> list[list[Solu
     return runs
 
 
-def further_motions(
+def _further(
     model: ReducedModel,
     band: tuple[float, float],
     like: Solution,

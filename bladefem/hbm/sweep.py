@@ -238,16 +238,11 @@ def _needs_continuation(search: _BandSearch, solved: Mapping[float, Solution]) -
     if len(good) < 2:
         return False
     if model.unknowns(search.H) <= MAX_PATH_UNKNOWNS:
-        return may_have_folds(good)
+        opened = {p.states["open"] for p in good}
+        return len(opened) > 1 or any(lifts_off(p) for p in good)
     if len(good) < len(points):
         return True
     heights = np.array([size(p, search.options.probe) for p in good])
     steps = np.diff([p.omega for p in good])
     near = steps < JUMP_WIDTH * (good[-1].omega - good[0].omega)
     return bool(np.any(near & (abs(np.diff(heights)) > JUMP_HEIGHT_SHARE * heights.max())))
-
-
-def may_have_folds(points: Sequence[Solution]) -> bool:
-    """Contacts lift off at some of the converged points."""
-    opened = {p.states["open"] for p in points}
-    return len(opened) > 1 or any(lifts_off(p) for p in points)

@@ -12,11 +12,9 @@ from ...errors import NotSolvedError
 from ...hbm.band_path import USUAL_LIMITS, PathLimits
 from ...hbm.linear_resonances import free_resonances, stuck_partners
 from ...hbm.model import ReducedModel
-from ...hbm.next_frequency import first_look
-from ...hbm.one_path import has_jump, joined_path
 from ...hbm.solution import Solution
 from ...hbm.solver.newton import Options
-from ...hbm.sweep import MAX_PATH_UNKNOWNS, may_have_folds, sweep
+from ...hbm.sweep import sweep
 from .check_points import peak_of
 from .settings import Settings
 
@@ -103,31 +101,17 @@ def response_points(
         peak=min(accuracy / 10, 1e-2),
         curve=0.2 if rough else 0.02,
         notes=notes,
+        paths=not rough if paths is None else paths,
+        known=[p for p in known if p.converged and ends[0] <= p.omega <= ends[1]],
         limits=limits,
         similar=similar,
     )
-    inside = [p for p in known if p.converged and ends[0] <= p.omega <= ends[1]]
-    options = replace(solver_options(accuracy), fallbacks=not rough)
-    follow = not rough if paths is None else paths
-    if follow and _may_have_no_folds(model, settings, similar):
-        plain = sorted(swept(options=options, known=inside, paths=False), key=lambda s: s.omega)
-        good = [p for p in plain if p.converged]
-        if len(good) == len(plain) and not may_have_folds(good):
-            return plain
-        path = joined_path(model, plain, settings.harmonics, settings.samples, options)
-        if path and (limits.points is None or len(path) < limits.points):
-            return [replace(p, branch=1) for p in path]
-        if notes is not None:
-            notes.clear()
-        # what it begins with in any case
-        begun = set(first_look(model, ends).tolist())
-        inside += [p for p in good if p.omega in begun and p not in inside]
-    points = list(swept(options=options, known=inside, paths=follow))
+    options = solver_options(accuracy)
+    points = list(swept(options=replace(options, fallbacks=not rough)))
     if rough and 2 * sum(p.converged for p in points) < len(points):
         if notes is not None:
             notes.clear()
-        again = replace(options, fallbacks=True)
-        points = list(swept(options=again, known=inside, paths=follow))
+        points = list(swept(options=options))
     points.sort(key=lambda s: s.omega)
     if any(p.branch for p in points):
         points = [p for p in points if p.branch or not p.converged]
@@ -137,16 +121,6 @@ def response_points(
             f"because: {points[0].reason}"
         )
     return points
-
-
-def _may_have_no_folds(
-    model: ReducedModel, settings: Settings, similar: Sequence[Solution]
-) -> bool:
-    """The response would be followed round folds wherever contacts lift off, but that of a poorer
-    model does not jump: sweeping it costs far less, and tells whether there are any.
-    """
-    small = model.unknowns(settings.harmonics) <= MAX_PATH_UNKNOWNS
-    return bool(similar) and small and not model.loads_prescribed and not has_jump(similar)
 
 
 def solver_options(accuracy: float) -> Options:
