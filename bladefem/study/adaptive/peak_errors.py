@@ -302,7 +302,8 @@ def _judging_peak(
     under 73 N 31 from 15 in 3 s by 23, in 24 s without.
 
     Where normal loads do not follow the motion one solution leads there, mostly, and that peak in
-    between is left out: it took up to half of a judge's time.
+    between is left out: it took up to half of a judge's time. Not where it is another one by more
+    than the accuracy, since an overtone may have split the resonance, and led to the lower part.
 
     Raises:
         NotSolvedError: a point was not solved, or no maximum was closed in.
@@ -311,7 +312,7 @@ def _judging_peak(
     more = _half_as_many_again(own) if many else judging_harmonics(own.harmonics)
     if more < judge.harmonics:
         found = _peak_at_once(family, own, base, judge, accuracy)
-        if found is not None:
+        if found is not None and abs(base.height / found.height - 1) <= accuracy:
             return found
         between = replace(own, harmonics=more, samples=judge.samples)
         try:
