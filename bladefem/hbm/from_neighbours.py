@@ -6,6 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from functools import partial
+
+import numpy as np
 
 from ..errors import NotSolvedError
 from .frequency_walk import walk_in_frequency
@@ -20,6 +23,9 @@ from .solver.newton import DEFAULT_OPTIONS, Options
 OFF_RESONANCE = 1e-7
 # times the samples that are tried where walks end close to a point
 MORE_SAMPLES = (2, 4)
+# change between two motions, over the larger one, from which on a point between them need not lie
+# near the line through them
+FAR_APART = 0.5
 
 
 def solve_from(
@@ -36,21 +42,21 @@ def solve_from(
     Next to a fold of the curve only the neighbour on its other side does.
     """
     simply = replace(options, fallbacks=False)
-    tried = [*line_between(starts, omega, H), *starts]
-    tries = (
-        (solve_off_resonance(model, omega, H, samples, start, simply) for start in tried)
-        if len(starts) > 1
-        else ()
-    )
+    line = line_between(starts, omega, H)
+    # between bouncing points full stick leads nowhere, slowly
+    stick = not line
+    tried = [*line, *starts] if len(starts) > 1 else []
+    tries = (solve_off_resonance(model, omega, H, samples, start, simply, stick) for start in tried)
     found = next((point for point in tries if point.converged), None)
-    return found or walk_from(model, omega, H, samples, starts, options)[-1]
+    return found or walk_from(model, omega, H, samples, starts, options, stick)[-1]
 
 
 def line_between(starts: Sequence[Solution], omega: float, H: int) -> list[Solution]:
     """A start on the line through two solved points on both sides of a frequency, where most
     contacts lift off at both: neither of them leads far there, and fails slowly.
 
-    None where the damper walks at one of them alone, since the response jumps between them.
+    None where the damper walks at one of them alone, or their motions are far apart, since the
+    response may jump between them.
 
     Args:
         starts: the nearest point, and the nearest on its other side.
@@ -62,6 +68,9 @@ def line_between(starts: Sequence[Solution], omega: float, H: int) -> list[Solut
         return []
     share = (omega - near.omega) / (beyond.omega - near.omega)
     first, last = (match_harmonics(point.w, H) for point in (near, beyond))
+    moving = [np.linalg.norm(w[:, :, 1:]) for w in (last - first, first, last)]
+    if moving[0] > FAR_APART * max(moving[1:]):
+        return []
     return [replace(near, w=first + share * (last - first))]
 
 
@@ -82,6 +91,7 @@ def walk_from(
     samples: int,
     starts: Sequence[Solution],
     options: Options,
+    from_stick: bool = True,
 ) -> list[Solution]:
     """Points on the way from one of several neighbours to a frequency, the last one at it; with
     more samples where walks end close to it, by fallbacks where no neighbour leads there.
@@ -101,7 +111,7 @@ def walk_from(
             if point.converged:
                 return [*walked, replace(point, method="more samples")]
     first = starts[0] if starts else None
-    return [*walked, solve_off_resonance(model, omega, H, samples, first, options)]
+    return [*walked, solve_off_resonance(model, omega, H, samples, first, options, from_stick)]
 
 
 def solve_off_resonance(
@@ -111,9 +121,13 @@ def solve_off_resonance(
     samples: int,
     start: Solution | None,
     options: Options,
+    from_stick: bool = True,
 ) -> Solution:
     """The point, or the one just next to it."""
+    solved = partial(
+        solve, model, H=H, samples=samples, start=start, options=options, from_stick=from_stick
+    )
     try:
-        return solve(model, omega, H, samples, start=start, options=options)
+        return solved(omega)
     except NotSolvedError:
-        return solve(model, omega * (1 + OFF_RESONANCE), H, samples, start=start, options=options)
+        return solved(omega * (1 + OFF_RESONANCE))

@@ -13,7 +13,7 @@ from .full_stick import INSTANTS_PER_HARMONIC, leading_stuck_points, sticks_safe
 from .linear.condensation import Linear, condense, own_flexibility
 from .model import ReducedModel
 from .point_measures import MEASURES, count_states, measure_point
-from .solution import Solution, Work, mostly_lifts_off, probe_motion
+from .solution import Solution, Work, probe_motion
 from .solver.fallback import (
     NEWTON_MERITS,
     Attempt,
@@ -40,6 +40,7 @@ def solve(
     *,
     start: Solution | None = None,
     options: Options = DEFAULT_OPTIONS,
+    from_stick: bool = True,
 ) -> Solution:
     """The periodic response at circular frequency omega [rad/s] with harmonics 0..H.
 
@@ -47,6 +48,8 @@ def solve(
         samples: time samples a period for the friction forces; 0 locates the transitions of 1-D
             elements exactly.
         start: a solved neighbour; full stick when left out.
+        from_stick: also without fallbacks full stick is tried where the neighbour does not lead to
+            the point.
 
     Returns:
         a Solution whose `converged` and `reason` must be read; it is never a silent guess.
@@ -68,9 +71,8 @@ def solve(
     if first is not None:
         return first
     balance = Balance(model, condense(model, omega, H), samples)
-    bounces = start is not None and mostly_lifts_off(start)
     attempts = solve_balance(
-        balance, None if start is None else match_harmonics(start.w, H), options, not bounces
+        balance, None if start is None else match_harmonics(start.w, H), options, from_stick
     )
     best = min(attempts, key=lambda a: (not a.end.converged, a.end.state.error))
     reason = best.end.reason if best.end.converged else _failure_reasons(balance, attempts)

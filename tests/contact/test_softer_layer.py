@@ -8,6 +8,7 @@ import pytest
 from small_patch import blade_side, patch_model, patch_on_half_space, problem_of
 
 from bladefem.contact.numerical_stiffness import numerical_stiffness
+from bladefem.hbm import from_neighbours
 from bladefem.hbm.from_neighbours import line_between
 from bladefem.hbm.linear.condensation import condense
 from bladefem.hbm.model import softened_layer
@@ -142,10 +143,12 @@ def test_newton_lowers_the_step_first_where_a_layer_is_split(stiff, fallbacks, m
     assert tried(softened_layer(stiff))[0] == "newton on the residual"
 
 
-def test_full_stick_is_no_start_beside_a_bouncing_neighbour(stiff, monkeypatch):
-    """Under 80 N on the shipped wedge it leads nowhere, in 0.15 s a point."""
+def test_full_stick_is_no_start_where_a_neighbour_alone_is_asked_for(stiff, monkeypatch):
+    """Between bouncing points of the shipped wedge under 80 N it leads nowhere, in 0.15 s a
+    point.
+    """
     soft = softened_layer(stiff)
-    point = solve(soft, OMEGA, 3, 64)
+    near = solve(soft, OMEGA, 3, 64)
     asked = []
 
     def failing(balance, w, options, merit, walks=True):
@@ -155,12 +158,36 @@ def test_full_stick_is_no_start_beside_a_bouncing_neighbour(stiff, monkeypatch):
 
     monkeypatch.setattr(fallback, "newton", failing)
     options = Options(fallbacks=False)
-    for lifting, starts in ((len(point.w), 1), (0, 2)):
-        near = replace(point, states={**point.states, "lift": lifting})
+    for from_stick, starts in ((False, 1), (True, 2)):
         asked.clear()
-        assert not solve(soft, 1.001 * OMEGA, 3, 64, start=near, options=options).converged
-        assert len(asked) == starts
+        found = solve(
+            soft, 1.001 * OMEGA, 3, 64, start=near, options=options, from_stick=from_stick
+        )
+        assert not found.converged and len(asked) == starts
         np.testing.assert_array_equal(asked[0], near.w)
+
+
+@pytest.mark.parametrize(("lifting", "apart", "sticks"), [(1, 1.1, 0), (0, 1.1, 1), (1, 5.0, 1)])
+def test_points_between_bouncing_neighbours_start_on_their_line(
+    stiff, monkeypatch, lifting, apart, sticks
+):
+    """And not in full stick; neighbours far apart may lie on two branches."""
+    point = solve(softened_layer(stiff), OMEGA, 3, 64)
+    near = replace(point, states={**point.states, "lift": lifting * len(point.w)})
+    beyond = replace(near, omega=1.1 * OMEGA, w=apart * near.w)
+    asked = []
+
+    def failing(model, omega, H, samples, start, options, from_stick=True):
+        asked.append((start, from_stick))
+        return replace(point, converged=False)
+
+    monkeypatch.setattr(from_neighbours, "solve", failing)
+    options = Options(fallbacks=False)
+    between = 1.05 * OMEGA
+    from_neighbours.solve_from(stiff, between, 3, 64, [near, beyond], options)
+    assert {from_stick for _, from_stick in asked} == {bool(sticks)}
+    expected = near.w if sticks else (1 + apart) / 2 * near.w
+    np.testing.assert_allclose(asked[0][0].w, expected, rtol=1e-12)
 
 
 def test_points_between_bouncing_neighbours_start_on_the_line_through_them(stiff):

@@ -159,13 +159,16 @@ def _newton_of_free_damper(
     tried = None if walks or not runs_compiled(balance) else 1
     # what a search without fallbacks does not find soon it looks for from nearer by
     alone = not options.fallbacks and not runs_compiled(balance)
+    ends = []
     for start in islice(_likely_starts(balance, w), LIKELIEST_KINDS if alone else tried):
         end = _newton_of_one_kind(start, options, merit)
         iterations += end.iterations
         if end.converged:
             return replace(end, iterations=iterations)
+        ends.append(end)
     if alone:
-        return replace(end, iterations=iterations)
+        nearest = min(ends, key=lambda end: end.state.error)
+        return replace(nearest, iterations=iterations)
     # springs on the mean lead to a start from which the rest is near
     led = newton_as_given(held_balance(balance), w, options, merit)
     iterations += led.iterations

@@ -41,6 +41,9 @@ JUDGE_ACCURACY_SHARE = 0.2
 JUDGE_ENOUGH_SHARE = 0.2
 # the same where a softer layer stands for a stiff one: 30 s with 23 harmonics otherwise
 SOFTENED_ENOUGH_SHARE = 0.5
+# of the accuracy: change of a resonance by a model that judges it, reached at once, that is
+# believed
+AT_ONCE_SHARE = 0.5
 # Newton steps of a point of such a peak
 JUDGE_STEPS = 15
 # the same of a model that only estimates an error there, and of one with more contact points, whose
@@ -303,7 +306,8 @@ def _judging_peak(
 
     Where normal loads do not follow the motion one solution leads there, mostly, and that peak in
     between is left out: it took up to half of a judge's time. Not where it is another one by more
-    than the accuracy, since an overtone may have split the resonance, and led to the lower part.
+    than AT_ONCE_SHARE of the accuracy, since an overtone may have split the resonance, and led to
+    the lower part.
 
     Raises:
         NotSolvedError: a point was not solved, or no maximum was closed in.
@@ -312,7 +316,7 @@ def _judging_peak(
     more = _half_as_many_again(own) if many else judging_harmonics(own.harmonics)
     if more < judge.harmonics:
         found = _peak_at_once(family, own, base, judge, accuracy)
-        if found is not None and abs(base.height / found.height - 1) <= accuracy:
+        if found is not None and abs(base.height / found.height - 1) <= accuracy * AT_ONCE_SHARE:
             return found
         between = replace(own, harmonics=more, samples=judge.samples)
         try:
