@@ -33,8 +33,8 @@ RENEWING_PRODUCTS = 80
 # passes of conjugate residuals after the first one
 MOST_RESTARTS = 6
 # directions of one solve from which a second level of an earlier derivative is given up: forming
-# one costs about as many
-RENEWING_DIRECTIONS = 30
+# one costs about as many, and with 30 of them steps of a patch between rigid faces end nowhere
+RENEWING_DIRECTIONS = 12
 
 
 @dataclass
