@@ -17,8 +17,8 @@
   ``mode_detour``, ``mode_equations``
 - stability: ``stability`` multipliers, ``flow_map``, ``linearised_flow``, ``closed_contacts``,
   ``other_diameters``
-- marches in time: ``ring_march`` all blades of a wave, ``ring_contacts``, ``ring_readings``,
-  ``sector_modes``, ``step_forces`` and ``blade_forces`` of a step, ``stiffening_layer`` the
-  law of one, ``envelope`` leaps, ``time_model`` for shooting
+- marches in time: ``ring_march`` all blades of a wave, ``ring_steps``, ``ring_contacts``,
+  ``ring_readings``, ``sector_modes``, ``step_forces`` and ``blade_forces`` of a step,
+  ``stiffening_layer`` the law of one, ``envelope`` leaps, ``time_model`` for shooting
 - ``precompile`` the kernels
 """

@@ -4,24 +4,21 @@ free to move as they like.
 The steady motion without contact forces is known; what is marched is the motion that the contact
 forces add to it. The bodies are integrated exactly for forces that are linear between two instants,
 or constant where steps are too long for that (`bladefem.hbm.linearised_flow`); the forces at the
-end of a step follow from the friction law (`bladefem.hbm.step_forces`).
+end of a step follow from the friction law (`bladefem.hbm.step_forces`). The steps themselves are in
+`bladefem.hbm.ring_steps`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from ..errors import InputError
 from ..friction.fourier import synthesis, to_complex, to_real
-from ..util.numba_options import INNER_KERNEL, KERNEL
 from .blade_forces import no_factors
 from .envelope import PERIODS_OF_PART, first_amplitudes, leap_from_end, moved_envelope, scatter
-from .linear.array_copy import clear_vector, copy_vector
 from .linear.condensation import condense
 from .linearised_flow import linear_steps, longest_linear_step
 from .model import ReducedModel
@@ -33,20 +30,12 @@ from .ring_contacts import (
     places_of_nodes,
     ring_contacts,
 )
-from .ring_readings import (
-    ReadingRoom,
-    RingReadings,
-    displacements,
-    push,
-    read,
-    reading_room,
-    ring_readings,
-)
+from .ring_readings import displacements, ring_readings
+from .ring_steps import Ring, march_room, march_steps, step_terms
 from .sector_modes import SectorModes, sector_modes
 from .solution import Solution
 from .solve import free_response
-from .step_forces import StepRoom, contact_forces, less_preload, step_room
-from .stiffening_layer import RingLayer, reached_springs, ring_layer, stiffening_forces
+from .stiffening_layer import RingLayer, reached_springs, ring_layer
 
 # of the instants of a period
 INSTANTS_PER_PERIOD = 256
@@ -141,7 +130,8 @@ def march_ring(
     # each blade is a share of a period ahead of the one before
     S = r * -(-instants // r)
     y, forces = start.modal.copy(), forces_in_places(start.forces, r)
-    resolved, layer, prepared = _prepared(model, start, S)
+    layer = ring_layer(model)
+    ring, resolved = _ring(model, start, S)
     motion = np.empty((periods, S, r))
     friction_work = np.zeros(periods)
     work = np.zeros(1)
@@ -154,7 +144,7 @@ def march_ring(
         # the first period tells what the others take
         begin, done = done, min(done - done % at_once + at_once, periods) if done else 1
         part = slice(begin, done)
-        settled = _marched(y, forces, prepared, motion[part], friction_work[part], work)
+        settled = _marched(y, forces, (ring, layer), motion[part], friction_work[part], work)
         operations = of_bodies + work[0] * periods / done
         if operations > most:
             break
@@ -164,21 +154,22 @@ def march_ring(
         # what follows a leap has to tell where it led
         if whole and leaps and periods - done >= 3 * at_once:
             part_marched = motion[done - at_once : done].transpose(0, 2, 1)
-            if _leapt(_system(model), start.drive.omega, envelope, part_marched, y, prepared):
+            if _leapt(_system(model), start.drive.omega, envelope, part_marched, y, ring):
                 leapt = done
     if resolved and layer is not None and settled:
         step = 2 * np.pi / start.drive.omega / S
         resolved = step <= _longest_step(model, reached_springs(model, layer))
     marched = motion[leapt:done].transpose(0, 2, 1)
-    spent = friction_work[leapt:done] / r
     end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
-    return RingMarch(marched, spent, done, settled, resolved, operations, end)
+    return RingMarch(
+        marched, friction_work[leapt:done] / r, done, settled, resolved, operations, end
+    )
 
 
 def _marched(
     y: np.ndarray,
     forces: np.ndarray,
-    prepared: tuple[Any, ...],
+    marched: tuple[Ring, RingLayer | None],
     motion: np.ndarray,
     friction_work: np.ndarray,
     work: np.ndarray,
@@ -187,7 +178,7 @@ def _marched(
     False where the forces of a step were not found, or are no numbers.
     """
     try:
-        done = _march(y, forces, *prepared, motion, friction_work, work)
+        done = march_steps(y, forces, *marched, motion, friction_work, work)
     except np.linalg.LinAlgError:
         # of a Newton step that is not determined
         done = 0
@@ -201,7 +192,7 @@ def _leapt(
     envelope: list[complex],
     motion: np.ndarray,
     y: np.ndarray,
-    prepared: tuple[Any, ...],
+    ring: Ring,
 ) -> bool:
     """Leap along the envelope where it tells how far; whether it did.
 
@@ -215,20 +206,18 @@ def _leapt(
     leap = leap_from_end(envelope, scatter(amplitudes))
     if not leap:
         return False
-    _leap(system, omega, leap, y, prepared)
+    _leap(system, omega, leap, y, ring)
     envelope.clear()
     return True
 
 
-def _leap(
-    system: SectorModes, omega: float, leap: complex, y: np.ndarray, prepared: tuple[Any, ...]
-) -> None:
+def _leap(system: SectorModes, omega: float, leap: complex, y: np.ndarray, ring: Ring) -> None:
     """Move the modal state y along the envelope, and the contacts with it, so that no step of
     theirs is a large one.
     """
-    w, readings, probe = prepared[0], prepared[2], prepared[-2][0]
-    moved = moved_envelope(system, probe, y, omega, leap)
-    w += displacements(readings, (moved - y)[: len(system.stiffness)])
+    moved = moved_envelope(system, ring.probe, y, omega, leap)
+    contacts = ring.displacements
+    contacts += displacements(ring.readings, (moved - y)[: len(system.stiffness)])
     y[:] = moved
 
 
@@ -289,12 +278,9 @@ def _system(model: ReducedModel) -> SectorModes:
     return model.once("ring", lambda: sector_modes(model))
 
 
-def _prepared(
-    model: ReducedModel, start: RingState, S: int
-) -> tuple[bool, RingLayer | None, tuple[Any, ...]]:
-    """Whether steps at S instants a period are short enough for forces that are linear in them, the
-    layer that stiffens, and what `_march` takes after state and forces: displacements, which it
-    changes, and the steps of the bodies.
+def _ring(model: ReducedModel, start: RingState, S: int) -> tuple[Ring, bool]:
+    """The ring at S instants a period, and whether its steps are short enough for forces that are
+    linear in them.
     """
     system = _system(model)
     r, M = system.blades, len(system.stiffness)
@@ -308,7 +294,6 @@ def _prepared(
     resolved = steps_are_resolved(model, omega, S)
     E, G0, G1 = linear_steps(system, dt, mean=not resolved)
     e = model.elements
-    layer = ring_layer(model)
     own = len(model.preload)
     extra = start.forces[:, : 1 + e.tangents].ravel() - np.tile(model.preload, r)
     w = free[0] + system.contact @ start.modal[:M] - system.residual @ extra
@@ -317,46 +302,24 @@ def _prepared(
     nodes = places_of_nodes(len(e.kt))
     probes = len(system.probe) // r
     readings = ring_readings(system, places)
-    return (
-        resolved,
-        layer,
-        (
-            in_places(w.reshape(r, own), places),
-            tuple(map(_step_terms, (E, -G0, -G1))),
-            readings,
-            ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
-            layer,
-            no_factors(r, len(places)),
-            # a place without a node is open
-            in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
-            in_places(free.reshape(S, r, own), places),
-            (
-                np.ascontiguousarray(system.probe[::probes]),
-                in_places(system.probe_residual[::probes].reshape(r, r, own), places).reshape(
-                    r, -1
-                ),
-                np.ascontiguousarray(free_probe),
-            ),
-            _march_room(readings, r, len(nodes)),
-        ),
+    flexible = system.probe_residual[::probes].reshape(r, r, own)
+    ring = Ring(
+        displacements=in_places(w.reshape(r, own), places),
+        flow=step_terms(E),
+        before=step_terms(-G0),
+        after=step_terms(-G1),
+        readings=readings,
+        contacts=ring_contacts(np.column_stack([e.kt, e.kn, e.mu]), F, model.preload),
+        kept=no_factors(r, len(places)),
+        # a place without a node is open
+        load=in_places(_normal_loads(model, r, S).reshape(S, r, -1), nodes, -1.0),
+        free=in_places(free.reshape(S, r, own), places),
+        probe=np.ascontiguousarray(system.probe[::probes]),
+        probe_flexibility=in_places(flexible, places).reshape(r, -1),
+        probe_free=np.ascontiguousarray(free_probe),
+        room=march_room(readings, r, len(nodes)),
     )
-
-
-class _StepTerms(NamedTuple):
-    """A matrix as terms with one entry of each row: few, unless the damping couples the modes."""
-
-    # (terms, rows)
-    columns: np.ndarray
-    values: np.ndarray
-
-
-def _step_terms(matrix: np.ndarray) -> _StepTerms:
-    used = matrix != 0
-    terms = max(1, int(used.sum(axis=1).max()))
-    # entries of each row first
-    columns = np.argsort(~used, axis=1, kind="stable")[:, :terms]
-    values = np.take_along_axis(matrix, columns, axis=1)
-    return _StepTerms(columns.T.copy(), values.T.copy())
+    return ring, resolved
 
 
 def _of_blades(amplitudes: np.ndarray, r: int, S: int) -> np.ndarray:
@@ -445,135 +408,3 @@ def _of_wave(amplitudes: np.ndarray, r: int) -> np.ndarray:
 def _blades_at_start(amplitudes: np.ndarray, r: int) -> np.ndarray:
     """(r rows,) of all blades at phase zero from complex amplitudes (H+1, rows) of one."""
     return np.asarray(_of_wave(amplitudes, r).sum(axis=0).real)
-
-
-class _MarchRoom(NamedTuple):
-    """What the steps of a march fill anew, kept so that none makes arrays."""
-
-    # of the contacts (`bladefem.hbm.step_forces`), and of readings (`bladefem.hbm.ring_readings`)
-    step: StepRoom
-    reading: ReadingRoom
-    # (M,) modal forces, (2 M,) modal displacements and velocities after the step
-    modal: np.ndarray
-    moved: np.ndarray
-    # (r, 3 width) contact forces beyond the preload, and displacements without them
-    extra: np.ndarray
-    free: np.ndarray
-    # (2, r, 3, width) changes of the forces in the last steps
-    change: np.ndarray
-
-
-def _march_room(readings: RingReadings, blades: int, width: int) -> _MarchRoom:
-    M = len(readings.by_mode)
-    rows = blades, 3 * width
-    return _MarchRoom(
-        step_room(blades, width),
-        reading_room(readings),
-        modal=np.zeros(M),
-        moved=np.zeros(2 * M),
-        extra=np.zeros(rows),
-        free=np.zeros(rows),
-        change=np.zeros((2, blades, 3, width)),
-    )
-
-
-@njit(_nrt=False, **KERNEL)
-def _march(
-    y,
-    f,
-    w,
-    steps,
-    readings,
-    contacts,
-    layer,
-    kept,
-    load,
-    free,
-    probe,
-    room,
-    motion,
-    friction_work,
-    work,
-):
-    """Fill motion (periods, S, r), and friction_work (periods,) of all blades, step by step.
-
-    Args:
-        y: (2M,) modal displacements and velocities, changed.
-        f: (r, 3, width) contact forces, changed; w: (r, 3 width) relative displacements, changed.
-        steps: of `linear_steps`; the last two for contact forces in the modes.
-        readings: of the contacts; contacts: their flexibility is that for the forces after a step.
-        layer: that stiffens; None: linear.
-        kept: from step to step, changed.
-        load: (S, r, width) normal load at zero displacement.
-        free: (S, r, 3 width) motion without contact forces.
-        probe: readings (r, M), flexibility (r, r 3 width) and free motion (S, r).
-        work: (1,) takes the operations of the contact forces.
-
-    Returns:
-        the number of the step whose forces were not found; periods S where all were.
-    """
-    E, before, after = steps
-    reading, flexible, steady = probe
-    periods, S, _ = motion.shape
-    moved, modal, c, extra, change = room.moved, room.modal, room.free, room.extra, room.change
-    for b in range(len(w)):
-        less_preload(f[b].reshape(extra.shape[1]), contacts.preload, extra[b])
-    clear_vector(change.reshape(change.size))
-    push(readings, extra, modal, room.reading)
-    for k in range(periods * S):
-        for b in range(len(reading)):
-            seen = _product(reading[b], y) - _product(flexible[b], extra.reshape(extra.size))
-            motion[k // S, k % S, b] = steady[k % S, b] + seen
-        j = (k + 1) % S
-        clear_vector(moved)
-        _add_product(E, y, moved)
-        _add_product(before, modal, moved)
-        read(readings, moved, c, room.reading)
-        for b in range(len(c)):
-            for place in range(c.shape[1]):
-                c[b, place] += free[j, b, place]
-        state = c, contacts, kept, w, f, change, extra, load[k % S], load[j], work, room.step
-        if layer is None:
-            found = contact_forces(*state)
-        else:
-            found = stiffening_forces(*state[:2], layer, *state[2:])
-        if not found:
-            return k
-        friction_work[k // S] += _work_of_step(room.step.forces, room.step.displacements, f, w)
-        push(readings, extra, modal, room.reading)
-        _add_product(after, modal, moved)
-        copy_vector(moved, y)
-    return periods * S
-
-
-@njit(_nrt=False, **INNER_KERNEL)
-def _work_of_step(f_before, w_before, f, w):
-    """Work of the tangential forces (r, 3, width) on displacements (r, 3 width) in a step, by the
-    trapezoidal rule [J].
-    """
-    total = 0.0
-    width = f.shape[2]
-    for b in range(len(f)):
-        for d in range(1, 3):
-            for k in range(width):
-                moved = w[b, d * width + k] - w_before[b, d * width + k]
-                total += 0.5 * (f_before[b, d, k] + f[b, d, k]) * moved
-    return total
-
-
-# the order of the sum is free, so that it is vectorised
-@njit(fastmath={"reassoc", "contract"}, _nrt=False, **INNER_KERNEL)
-def _product(row, values):
-    """Sum of row (n,) times the first n values."""
-    total = 0.0
-    for k in range(len(row)):
-        total += row[k] * values[k]
-    return total
-
-
-@njit(_nrt=False, **INNER_KERNEL)
-def _add_product(terms, x, target):
-    """target (n,) becomes target plus the matrix (n, k) times x (k,)."""
-    for term in range(len(terms.columns)):
-        for i in range(len(target)):
-            target[i] += terms.values[term, i] * x[terms.columns[term, i]]

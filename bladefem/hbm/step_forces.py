@@ -356,7 +356,7 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
             extra[b * m + k] = f[b, k // width, k % width] - contacts.preload[k]
     for b in range(blades):
         for k in range(m):
-            w[b, k] = c[b, k] - _product(F[b * m + k], extra)
+            w[b, k] = c[b, k] - inner_product(F[b * m + k], extra)
     total = 0.0
     for b in range(blades):
         table = contacts.table[b]
@@ -375,7 +375,8 @@ def _violations(c, contacts, F, w, f, before, load1, B, gap):
 
 # the order of the sum is free, so that it is vectorised
 @njit(fastmath={"reassoc", "contract"}, _nrt=False, **INNER_KERNEL)
-def _product(a, b):
+def inner_product(a, b):
+    """Sum of the entries of a (n,) times the first n of b."""
     total = 0.0
     for k in range(len(a)):
         total += a[k] * b[k]

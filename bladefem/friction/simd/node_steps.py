@@ -8,6 +8,7 @@ eight.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import factorial
 
 from bladefem.friction.simd.codegen import LANES_PER_VECTOR, Code, Lanes, kernel
@@ -185,67 +186,45 @@ def node_steps(code: Code, i, width, table, flexibility, before, old, load0, loa
         code.store(now[row] + x, f, (row, width), i)
 
 
-def _subtract(
-    code, nodes, columns, i, width, size, begin, middle, end, shift, forces, stride, place, target
-) -> None:
-    """As `subtract_block`, of so many nodes."""
-    places = [(row, lane) for row in range(3) for lane in range(nodes)]
-    given = [code.spread(code.one(forces, (stride, row), place, lane)) for row, lane in places]
-    back = code.place(shift, (size, -1))
-    for first, last, moved in ((begin, middle, shift), (middle, end, back)):
-        with code.loop(first, last, LANES_PER_VECTOR) as k:
-            total = code.load(target, k, moved)
-            for (row, lane), force in zip(places, given, strict=True):
-                column = code.place((width, row), i, lane)
-                total = total - code.load(columns, (column, size), k) * force
-            code.store(total, target, k, moved)
-
-
-@kernel
-def subtract_block(
-    code: Code,
-    columns,
-    i,
-    width,
-    size,
-    begin,
-    middle,
-    end,
-    shift,
-    forces,
-    stride,
-    place,
-    target,
-):
-    """The displacements target (size,) become less those by the forces of the block of nodes from
+def _subtracting(nodes: int) -> Callable:
+    """What writes the displacements target (size,) less those by the forces of so many nodes from
     place i on.
 
-    Args:
+    The kernel's arguments:
         columns: (3 width, size) displacements by each force on the first blade, blade by blade.
         begin, middle, end: those of them that are meant; up to the middle one the target has them
             ``shift`` places further on, from there on that less ``size``.
         forces: in rows of ``stride``, from a place there on.
     """
-    where = columns, i, width, size, begin, middle, end, shift
-    _subtract(code, LANES_PER_VECTOR, *where, forces, stride, place, target)
+
+    def write(
+        code: Code,
+        columns,
+        i,
+        width,
+        size,
+        begin,
+        middle,
+        end,
+        shift,
+        forces,
+        stride,
+        place,
+        target,
+    ):
+        places = [(row, lane) for row in range(3) for lane in range(nodes)]
+        given = [code.spread(code.one(forces, (stride, row), place, lane)) for row, lane in places]
+        back = code.place(shift, (size, -1))
+        for first, last, moved in ((begin, middle, shift), (middle, end, back)):
+            with code.loop(first, last, LANES_PER_VECTOR) as k:
+                total = code.load(target, k, moved)
+                for (row, lane), force in zip(places, given, strict=True):
+                    column = code.place((width, row), i, lane)
+                    total = total - code.load(columns, (column, size), k) * force
+                code.store(total, target, k, moved)
+
+    return write
 
 
-@kernel
-def subtract_node(
-    code: Code,
-    columns,
-    i,
-    width,
-    size,
-    begin,
-    middle,
-    end,
-    shift,
-    forces,
-    stride,
-    place,
-    target,
-):
-    """The same of one node."""
-    where = columns, i, width, size, begin, middle, end, shift
-    _subtract(code, 1, *where, forces, stride, place, target)
+subtract_block = kernel(_subtracting(LANES_PER_VECTOR))
+subtract_node = kernel(_subtracting(1))

@@ -112,12 +112,8 @@ def resonance_curve(
     curve = _Curve(family, band, mode, accuracy, march, fixed)
     settings, points = rough_curve(family, settings, band, mode, accuracy)
     notes: list[str] = []
-    swept, left = _Sweep(settings, 1.0), MISSED_STEPS
-    if has_final_harmonics(settings):
-        # a rough sweep leads to a lower part of a flat top, whose judges take seconds for nothing
-        points = _swept(curve, settings, points, swept, notes, USUAL_LIMITS)
-        swept = _Sweep(settings, accuracy)
-    used, top = settings, peak_of(points)
+    points, swept = _first_sweep(curve, settings, points, notes)
+    used, top, left = settings, peak_of(points), MISSED_STEPS
     for number in range(MAX_SWEEPS):
         begun = settings if number == 0 else None
         (used, peak, errors), asked = _chosen_for_curve(curve, used, begun, points, top)
@@ -146,6 +142,20 @@ def resonance_curve(
     # flanks are judged once: those of a peak that is left for a higher one say nothing
     found = significant | checked_flanks(family, used, points, top, peak, errors)
     return CheckedCurve(used, points, found, tuple(notes), _parts(errors))
+
+
+def _first_sweep(
+    curve: _Curve, settings: Settings, rough: list[Solution], notes: list[str]
+) -> tuple[list[Solution], _Sweep]:
+    """The points that the choice begins with, and how they were swept: those of the rough sweep,
+    but where harmonics are final. That leads to a lower part of a flat top, whose judges take
+    seconds for nothing.
+    """
+    begun = _Sweep(settings, 1.0)
+    if not has_final_harmonics(settings):
+        return rough, begun
+    points = _swept(curve, settings, rough, begun, notes, USUAL_LIMITS)
+    return points, _Sweep(settings, curve.accuracy)
 
 
 def _chosen_for_curve(

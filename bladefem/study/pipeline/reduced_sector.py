@@ -180,8 +180,6 @@ def _reduced_diameters(
     def keep_vectors(pairs: Eigenpairs) -> None:
         blocks[pairs.nodal_diameter] = pairs.X[:, :modes].copy(order="F")
 
-    seen = keep_vectors if spanned else None
-
     wanted = sorted(set(diameters))
     size = bodies.ranks_of_sector
     interior = _interior_of_ranks(bodies, ports, len(wanted))
@@ -197,7 +195,7 @@ def _reduced_diameters(
             solver=solver,
             kept=some_bodies.kept.pop(KEPT_MODES, None),
             spin=rotation_of(some_bodies),
-            seen=seen,
+            seen=keep_vectors if spanned else None,
             interior=interior,
         )
         return dict(bodies.progress(steps, "nodal diameters", len(some)))
