@@ -97,6 +97,12 @@ def march_operations(model: ReducedModel, periods: int) -> float:
     return 2.0 * periods * INSTANTS_PER_PERIOD * (4 * M**2 + 4 * M * m + 5 * m**2)
 
 
+def _operations_of_bodies(model: ReducedModel) -> float:
+    """Of a step."""
+    m, M = _system(model).contact.shape
+    return 8.0 * M * (M + m)
+
+
 def never_enough(motion: np.ndarray) -> bool:
     """No motion is enough."""
     return False
@@ -135,8 +141,7 @@ def march_ring(
     motion = np.empty((periods, S, r))
     friction_work = np.zeros(periods)
     work = np.zeros(1)
-    m, M = _system(model).contact.shape
-    operations = of_bodies = 8.0 * periods * S * M * (M + m)
+    operations = of_bodies = periods * S * _operations_of_bodies(model)
     settled, done, leapt = True, 0, 0
     envelope: list[complex] = []
     at_once = PERIODS_OF_PART if leaps else PERIODS_AT_ONCE
@@ -157,13 +162,12 @@ def march_ring(
             if _leapt(_system(model), start.drive.omega, envelope, part_marched, y, ring):
                 leapt = done
     if resolved and layer is not None and settled:
-        step = 2 * np.pi / start.drive.omega / S
-        resolved = step <= _longest_step(model, reached_springs(model, layer))
+        longest = _longest_step(model, reached_springs(model, layer))
+        resolved = 2 * np.pi / start.drive.omega / S <= longest
     marched = motion[leapt:done].transpose(0, 2, 1)
     end = RingState(start.drive, y, forces_of_nodes(forces, len(start.forces) // r))
-    return RingMarch(
-        marched, friction_work[leapt:done] / r, done, settled, resolved, operations, end
-    )
+    spent = friction_work[leapt:done] / r
+    return RingMarch(marched, spent, done, settled, resolved, operations, end)
 
 
 def _marched(

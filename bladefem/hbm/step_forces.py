@@ -194,29 +194,17 @@ def _by_blocks(c, contacts, w, f, before, load1, limit, work, room):
     Displacements follow each force that changes: nodes that are open, most of them where a damper
     comes off, cost nothing but their displacement.
     """
-    blades, _, width = f.shape
-    step = room.block
     displace(c, contacts, f, w, work)
     # a first sweep says nothing of how fast they settle
     last = 0.0
     for sweep in range(SWEEPS):
-        largest_step = 0.0
-        for b in range(blades):
-            old = of_blade(before, b)
-            table = contacts.table[b]
-            for first in range(0, width, LANES_PER_VECTOR):
-                if _are_open(table[KN], w[b], f[b], load1[b], first):
-                    continue
-                work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
-                node_steps(first, width, table, contacts.own, *old, load1[b], w[b], f[b], step)
-                largest_step = max(largest_step, _largest(step.reshape(step.size)))
-                subtract_moved(contacts.columns, b, first, step, 0, w, work)
-        # by how much the next one would change a force, if it falls again as it did
-        ahead = largest_step * min(largest_step / last, 1.0) if last > 0.0 else largest_step
-        if ahead <= limit:
+        largest = 0.0
+        for b in range(len(f)):
+            largest = max(largest, _sweep(b, contacts, w, f, before, load1, work, room, False))
+        if _settle(largest, last, limit):
             room.apart[0] = sweep >= SWEEPS_TOGETHER
             return True
-        last = largest_step
+        last = largest
     room.apart[0] = True
     return False
 
@@ -227,7 +215,6 @@ def _by_blocks_apart(c, contacts, w, f, before, load1, limit, work, room):
     a blade hardly moves, follow when its nodes are nearly settled.
     """
     blades, _, width = f.shape
-    step = room.block
     displace(c, contacts, f, w, work)
     last = 0.0
     most = SWEEPS * blades
@@ -235,34 +222,53 @@ def _by_blocks_apart(c, contacts, w, f, before, load1, limit, work, room):
     while sweeps < most:
         largest = 0.0
         for b in range(blades):
-            old = of_blade(before, b)
-            table = contacts.table[b]
             clear_vector(room.total.reshape(3 * width))
             first_step = 0.0
             settled = False
             while not settled:
-                largest_step = 0.0
-                for first in range(0, width, LANES_PER_VECTOR):
-                    if _are_open(table[KN], w[b], f[b], load1[b], first):
-                        continue
-                    work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
-                    node_steps(first, width, table, contacts.own, *old, load1[b], w[b], f[b], step)
-                    largest_step = max(largest_step, _largest(step.reshape(step.size)))
-                    subtract_from_own(contacts.columns, b, first, step, 0, w, work)
-                    _add_block(step, first, room.total)
+                step = _sweep(b, contacts, w, f, before, load1, work, room, True)
                 sweeps += 1
-                first_step = max(first_step, largest_step)
+                first_step = max(first_step, step)
                 enough = max(limit, NEARLY_SETTLED * first_step)
-                settled = largest_step <= enough or sweeps >= most
+                settled = step <= enough or sweeps >= most
             largest = max(largest, first_step)
             for first in range(0, width, LANES_PER_VECTOR):
                 subtract_from_others(contacts.columns, b, first, room.total, first, w, work)
-        ahead = largest * min(largest / last, 1.0) if last > 0.0 else largest
-        if ahead <= limit:
+        if _settle(largest, last, limit):
             room.apart[0] = sweeps > SWEEPS_TOGETHER * blades
             return True
         last = largest
     return False
+
+
+# written into its callers: arguments of so many arrays take as long as a block of nodes
+@njit(inline="always", _nrt=False, **INNER_KERNEL)
+def _sweep(b, contacts, w, f, before, load1, work, room, apart):
+    """A Newton step of each node of blade b, eight at a time; the largest change of a force.
+
+    Args:
+        apart: displacements of the blade alone follow, and ``room.total`` takes the changes.
+    """
+    old = of_blade(before, b)
+    table, step = contacts.table[b], room.block
+    largest = 0.0
+    for first in range(0, f.shape[2], LANES_PER_VECTOR):
+        if not _are_open(table[KN], w[b], f[b], load1[b], first):
+            work[0] += NODE_OPERATIONS * LANES_PER_VECTOR
+            node_steps(first, f.shape[2], table, contacts.own, *old, load1[b], w[b], f[b], step)
+            largest = max(largest, _largest(step.reshape(step.size)))
+            if apart:
+                subtract_from_own(contacts.columns, b, first, step, 0, w, work)
+                _add_block(step, first, room.total)
+            else:
+                subtract_moved(contacts.columns, b, first, step, 0, w, work)
+    return largest
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def _settle(step, last, limit):
+    """The next sweep would change no force by more than a limit, if that falls again as it did."""
+    return (step * min(step / last, 1.0) if last > 0.0 else step) <= limit
 
 
 @njit(_nrt=False, **INNER_KERNEL)
