@@ -32,9 +32,9 @@ SINGLE_PRECISION_REDUCTION = 1e-3
 RENEWING_PRODUCTS = 80
 # passes of conjugate residuals after the first one
 MOST_RESTARTS = 6
-# directions of one solve from which a second level of an earlier derivative is given up: forming
-# one costs about as many, and with 30 of them steps of a patch between rigid faces end nowhere
-RENEWING_DIRECTIONS = 12
+# directions of one solve from which a second level of an earlier derivative is given up: steps of a
+# patch between rigid faces lose 4 of 24 points with up to 20, 7 with 22, 19 with 26
+RENEWING_DIRECTIONS = 20
 
 
 @dataclass
