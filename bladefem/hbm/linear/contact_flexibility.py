@@ -31,24 +31,30 @@ def by_harmonic(A):
     return A, none, none, none, np.empty((0, 0, 0), np.complex128)
 
 
-@njit(**KERNEL, fastmath={"contract", "reassoc"})
+@njit(**KERNEL)
 def apply_matrices(A, x, out):
     """out (m, K) += A (H+1, m, m) times x (m, K), both as real coefficients."""
-    m = x.shape[0]
-    along = np.ascontiguousarray(x.T)
-    for h in range(A.shape[0]):
+    _add_products(A, 0, np.ascontiguousarray(x.T), out)
+
+
+# the order of the sums is free, so that they are vectorised: in order each product waits for the
+# one before
+@njit(fastmath={"reassoc", "contract"}, _nrt=False, **INNER_KERNEL)
+def _add_products(A, first, along, out):
+    """As `apply_matrices` from a first harmonic on, for the transpose of x (K, m)."""
+    m = A.shape[1]
+    for h in range(first, A.shape[0]):
         c = max(2 * h - 1, 0)
         s = 2 * h
         turn = 1.0 if h else 0.0
         by_cos = along[c]
         by_sin = along[s]
         for i in range(m):
-            row = A[h, i]
             cos = 0.0
             sin = 0.0
             for j in range(m):
-                re = row[j].real
-                im = turn * row[j].imag
+                re = A[h, i, j].real
+                im = turn * A[h, i, j].imag
                 cos += re * by_cos[j] + im * by_sin[j]
                 sin += re * by_sin[j] - im * by_cos[j]
             out[i, c] += cos
@@ -75,21 +81,7 @@ def apply_flexibility(flex, x, out):
 def _apply_modal_matrix(T, q):
     """T (H+1, M, M) times q (M, K) but for the mean, which becomes 0."""
     out = np.zeros(q.shape)
-    M = q.shape[0]
-    along = np.ascontiguousarray(q.T)
-    for h in range(1, T.shape[0]):
-        by_cos = along[2 * h - 1]
-        by_sin = along[2 * h]
-        for i in range(M):
-            cos = 0.0
-            sin = 0.0
-            for j in range(M):
-                re = T[h, i, j].real
-                im = T[h, i, j].imag
-                cos += re * by_cos[j] + im * by_sin[j]
-                sin += re * by_sin[j] - im * by_cos[j]
-            out[i, 2 * h - 1] = cos
-            out[i, 2 * h] = sin
+    _add_products(T, 1, np.ascontiguousarray(q.T), out)
     return out
 
 
