@@ -26,6 +26,7 @@ from .solver.arclength import (
 )
 from .solver.fallback import Attempt, solve_balance
 from .solver.newton import DEFAULT_OPTIONS, Newton, Options
+from .solver.path_compiled import PATH_FOLLOWING, compiled_path
 from .solver.residual import Balance, State, evaluate_balance
 
 # points of a path
@@ -127,8 +128,8 @@ def _refuse_creeping(task: Task, recent: deque[Spot]) -> None:
     if len(recent) < CREEPING_POINTS:
         return
     first, last = recent[0], recent[-1]
-    size = max(task.size, float(np.linalg.norm(last.state.w)))
-    moved = path_distance(first.state.w, last.state.w) / size
+    size = max(task.size, float(np.linalg.norm(last.w)))
+    moved = path_distance(first.w, last.w) / size
     length = np.hypot(moved, (last.x - first.x) / task.width)
     if length < CREEPING_POINTS * SMALLEST_ARC_STEP:
         raise NotSolvedError(
@@ -153,7 +154,7 @@ def _begun_again(
         balance = task.balance(x)
         fallbacks = task.options.fallbacks and share == RESTART_DISTANCES[-1]
         options = replace(task.options, fallbacks=fallbacks)
-        end = solve_balance(balance, spot.state.w, options)[-1].end
+        end = solve_balance(balance, spot.w, options)[-1].end
         if not end.converged:
             continue
         try:
@@ -195,7 +196,14 @@ def _prepare_path(
 
     width = path_coordinate(name, bounds[1]) - path_coordinate(name, bounds[0])
     x = path_coordinate(name, value)
-    task = Task(balance, name, width, float(np.linalg.norm(near.w)) or 1.0, options)
+    task = Task(
+        balance,
+        name,
+        width,
+        float(np.linalg.norm(near.w)) or 1.0,
+        options,
+        compiled=compiled_path(model, near.harmonics, near.samples) if name == "omega" else None,
+    )
     first = replace(balance(x), walk=near.walk)
     return task, x, first, evaluate_balance(first, near.w)
 
@@ -206,10 +214,14 @@ def _path_point(
     fold: bool = False,
     branch: bool = False,
 ) -> PathPoint:
-    end = Newton(spot.state, spot.iterations, True, "residual within tolerance")
-    solution = as_solution(
-        spot.balance, Attempt("path following", end), spot.iterations, end.reason
-    )
-    return PathPoint(
-        parameter_value(task.name, spot.x), solution, spot.sign > 0, fold, spot.leapt, branch
-    )
+    value = parameter_value(task.name, spot.x)
+    return PathPoint(value, _solution_at(spot), spot.sign > 0, fold, spot.leapt, branch)
+
+
+def _solution_at(spot: Spot) -> Solution:
+    """The record of a point of a path."""
+    if isinstance(spot.found, Solution):
+        return spot.found
+    balance, state = spot.found
+    end = Newton(state, spot.iterations, True, "residual within tolerance")
+    return as_solution(balance, Attempt(PATH_FOLLOWING, end), spot.iterations, end.reason)

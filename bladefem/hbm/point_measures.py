@@ -81,12 +81,12 @@ def measure_point(omega, bodies, springs, linear, w, normals, F, preload, residu
             out[0] = max(out[0], abs(residual[i, k]))
             out[1] = max(out[1], springs[i] * abs(residual[i, k]))
     out[2] = carried_load(bodies.B, bodies.g, load)
-    modal = _blade_motion(bodies, linear, load, w, springs, probe)
+    modal = motion_under_load(bodies, linear, load, w, springs, probe)
     _period_works(omega, bodies, modal, load, w, d, normals, out[3:])
 
 
 @njit(**INNER_KERNEL)
-def _blade_motion(bodies, linear, load, w, springs, probe):
+def motion_under_load(bodies, linear, load, w, springs, probe):
     """Modal amplitudes (H+1, M) under the excitation and the contact load (m, K); fills probe (H+1,
     p).
     """
@@ -120,14 +120,14 @@ def _blade_motion(bodies, linear, load, w, springs, probe):
         for k in range(M):
             forces[k] = push[h, k]
             for i in range(m):
-                forces[k] -= contact[s, i, k].conjugate() * _complex_amplitude(load, i, h)
+                forces[k] -= contact[s, i, k].conjugate() * complex_amplitude(load, i, h)
         copy_vector(modal_motion(D, full, h, forces), modal[h])
         for a in range(probe.shape[1]):
             probe[h, a] = straight[h, a]
             for k in range(M):
                 probe[h, a] += probes[min(h, probes.shape[0] - 1), a, k] * modal[h, k]
             for i in range(m):
-                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * _complex_amplitude(
+                probe[h, a] -= across[min(h, across.shape[0] - 1), a, i] * complex_amplitude(
                     load, i, h
                 )
     for a in range(probe.shape[1]):
@@ -137,7 +137,7 @@ def _blade_motion(bodies, linear, load, w, springs, probe):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _complex_amplitude(x, i, h):
+def complex_amplitude(x, i, h):
     return complex(x[i, 2 * h - 1], -x[i, 2 * h]) if h else complex(x[i, 0], 0.0)
 
 
@@ -163,8 +163,8 @@ def _period_works(omega, bodies, modal, load, w, d, normals, out):
             for k in range(modal.shape[1]):
                 out[1] += np.pi * h * h * omega * (modal[h, k].conjugate() * moved[k]).real
         for i in range(load.shape[0]):
-            force = _complex_amplitude(load, i, h)
+            force = complex_amplitude(load, i, h)
             out[0] += np.pi * h * (direct[h, i].conjugate() * force).imag
-            friction = np.pi * h * (force * _complex_amplitude(w, i, h).conjugate()).imag
+            friction = np.pi * h * (force * complex_amplitude(w, i, h).conjugate()).imag
             out[2] += friction
             out[3] += friction if i % d >= normals else 0.0

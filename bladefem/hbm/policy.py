@@ -78,6 +78,11 @@ def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
     return dofs <= COMPILED_POINT_DOFS and uses_compiled_newton(model, dofs * (2 * harmonics + 1))
 
 
+def uses_compiled_path(model: ReducedModel, harmonics: int) -> bool:
+    """True if a step of a path is one compiled call: points are, and a dense LU is fast."""
+    return uses_compiled_point(model, harmonics) and model.unknowns(harmonics) <= DENSE_UNKNOWNS
+
+
 def uses_compiled_newton(model: ReducedModel, unknowns: int) -> bool:
     """True if Newton's loop is compiled: 1-D Coulomb elements with few enough unknowns."""
     return (

@@ -20,6 +20,7 @@ from .parameter_derivatives import (
     residual_rate_of_bodies,
 )
 from .solution import Solution, at_probes, blade_motion
+from .solver.frequency_slope import frequency_slope
 from .solver.residual import (
     Balance,
     Inverse,
@@ -57,9 +58,23 @@ def sensitivities(
         raise InputError(
             f"solution at {solution.frequency:.6g} Hz is not converged: expected a solved point"
         )
+    names = list(names)
+    if names == ["omega"]:
+        found = frequency_slope(model, solution)
+        if found is not None:
+            return {"omega": _sensitivity(solution, *found)}
     balance, state = solved_balance(model, solution)
     inverse = linearise_balance(balance, state)
     return {name: _one_sensitivity(balance, state, inverse, solution, name) for name in names}
+
+
+def _sensitivity(solution: Solution, dw: np.ndarray, probe: np.ndarray) -> Sensitivity:
+    """The record of derivatives of displacements (n, d, K) and probes (H+1, probes)."""
+    size = np.linalg.norm(solution.probe[1:], axis=0)
+    slope = np.sum((solution.probe[1:].conj() * probe[1:]).real, axis=0) / np.maximum(
+        size, np.finfo(float).tiny
+    )
+    return Sensitivity(dw, probe, slope)
 
 
 def _one_sensitivity(
@@ -93,9 +108,4 @@ def _one_sensitivity(
         rigid = linear.rigid @ (linear.B.T @ (linear.springs * gap.real))
     flexible = linear.modal_part(0, model.blades(len(force) - 1).omega.shape[1])
     moved = blade_motion(model, linear.omega, force, flexible, excited=False)
-    probe = probe + at_probes(moved, rigid)
-    size = np.linalg.norm(solution.probe[1:], axis=0)
-    slope = np.sum((solution.probe[1:].conj() * probe[1:]).real, axis=0) / np.maximum(
-        size, np.finfo(float).tiny
-    )
-    return Sensitivity(dw, probe, slope)
+    return _sensitivity(solution, dw, probe + at_probes(moved, rigid))

@@ -22,8 +22,10 @@ from ...errors import NotSolvedError
 from ...util.newton import iterate_newton
 from ..parameter_derivatives import residual_rate
 from ..parameters import parameter_value
+from ..solution import Solution
 from .newton import Options, newton
 from .newton_krylov import Memory
+from .path_compiled import CompiledPath, correct_step
 from .residual import Balance, State, determinant_sign, evaluate_balance, linearise_balance
 from .walking import walk_fault
 
@@ -42,6 +44,8 @@ CORNER_ARC_LENGTHS = (1e-4, 1e-3, 5e-3)
 MAX_CORNER_ARC_LENGTH = 1e-3
 # distance from the way back, in steps, from which a direction leads on
 MIN_ONWARD_DISTANCE = 0.3
+# reason of a step that is not taken
+JUMPS = "it jumps"
 # cosine between successive tangents below which a step is halved
 SMALLEST_COSINE = 0.7
 # distance from prediction to solution, in steps, above which it is halved
@@ -68,6 +72,8 @@ class Task:
     memory: Memory = field(default_factory=Memory)
     # crossings of other paths are looked for, by the sign of a determinant at each point
     crossings: bool = True
+    # a path in the frequency whose steps are compiled
+    compiled: CompiledPath | None = None
 
 
 @dataclass(frozen=True)
@@ -75,8 +81,11 @@ class Spot:
     """A solved point and the direction of the path there."""
 
     x: float
-    balance: Balance
-    state: State
+    # (n, d, K) displacements [m], and (m, z) motions along which the damper walks
+    w: np.ndarray
+    walk: np.ndarray | None
+    # the equations and their state, or the whole record where the step was one compiled call
+    found: tuple[Balance, State] | Solution
     iterations: int
     # (n, d, K) dw/dx
     slope: np.ndarray
@@ -158,7 +167,7 @@ Direction = tuple[np.ndarray, float]
 
 
 def _step_size(task: Task, spot: Spot) -> float:
-    return max(task.size, float(np.linalg.norm(spot.state.w)))
+    return max(task.size, float(np.linalg.norm(spot.w)))
 
 
 def _path_direction(task: Task, spot: Spot) -> Direction:
@@ -179,39 +188,113 @@ def _correct_point(
     """
     size = _step_size(task, spot)
     dw, dx = direction
-    walk = spot.balance.walk
-    guess = _guess_at(task, spot.x + step * task.width * dx, spot.state.w + step * size * dw, walk)
+    guess = spot.x + step * task.width * dx, spot.w + step * size * dw
+    found = _compiled_spot(task, spot, guess, direction, size)
+    if found is None:
+        found = _plain_spot(task, spot, guess, direction, size, JUMP_GUARD * step)
+    if isinstance(found, str):
+        return None, f"corrector: {found}"
+    if _distance(task, guess, (found.x, found.w), size) > JUMP_GUARD * step:
+        return None, JUMPS
+    new_dw, new_dx = found.tangent(task, size)
+    turn = _product(dw, new_dw) + dx * new_dx
+    if abs(turn) < SMALLEST_COSINE and not corner and step > MAX_CORNER_ARC_LENGTH:
+        return None, "the path turns too sharply"
+    return (found if turn > 0 else replace(found, sign=-found.sign)), ""
+
+
+def _distance(
+    task: Task,
+    guess: tuple[float, np.ndarray],
+    end: tuple[float, np.ndarray],
+    size: float,
+) -> float:
+    """Scaled distance between two points, each a parameter and displacements."""
+    away = path_distance(guess[1], end[1]) / size
+    return float(np.hypot(away, (end[0] - guess[0]) / task.width))
+
+
+def _compiled_spot(
+    task: Task,
+    spot: Spot,
+    guess: tuple[float, np.ndarray],
+    direction: Direction,
+    size: float,
+) -> Spot | str | None:
+    """Where one compiled call comes back to the path; why it does not; None where the plain way has
+    to tell.
+    """
+    if task.compiled is None or spot.walk is not None:
+        return None
+    end = correct_step(
+        task.compiled,
+        guess,
+        direction,
+        (size, task.width),
+        MEAN_WEIGHT,
+        task.options.tolerance,
+        MOST_CORRECTIONS,
+        task.crossings,
+    )
+    if end is None or isinstance(end, str):
+        return end
+    point = end.point
+    return Spot(
+        point.omega,
+        point.w,
+        None,
+        point,
+        point.iterations,
+        end.slope,
+        spot.sign,
+        end.orientation,
+    )
+
+
+def _plain_spot(
+    task: Task,
+    spot: Spot,
+    guess: tuple[float, np.ndarray],
+    direction: Direction,
+    size: float,
+    farthest: float,
+) -> Spot | str:
+    """Where Newton comes back to the path, or why it does not.
+
+    Args:
+        farthest: scaled distance from the guess.
+    """
+    begun, start = guess
+    dw, dx = direction
 
     def advance(now: _Guess) -> _Guess:
         inverse = linearise_balance(now.balance, now.state, task.memory)
         back = inverse(now.state.residual)
         along = inverse(residual_rate(now.balance, now.state, task.name))
         w = now.state.w
-        off = _product(dw, w - guess.state.w) / size + dx * (now.x - guess.x) / task.width
+        off = _product(dw, w - start) / size + dx * (now.x - begun) / task.width
         change = (_product(dw, back) / size - off) / (dx / task.width - _product(dw, along) / size)
-        return _guess_at(task, now.x + change, w - back - change * along, walk)
+        return _guess_at(task, now.x + change, w - back - change * along, spot.walk)
 
     run = iterate_newton(
-        guess, lambda now: now.state.error, advance, task.options.tolerance, MOST_CORRECTIONS
+        _guess_at(task, begun, start, spot.walk),
+        lambda now: now.state.error,
+        advance,
+        task.options.tolerance,
+        MOST_CORRECTIONS,
     )
     if not run.converged:
-        return None, f"corrector: {run.reason}"
+        return run.reason
     end = run.state
-    away = path_distance(guess.state.w, end.state.w) / size
-    if np.hypot(away, (end.x - guess.x) / task.width) > JUMP_GUARD * step:
-        return None, "the corrector jumps"
+    if _distance(task, guess, (end.x, end.state.w), size) > farthest:
+        return JUMPS
     fault = walk_fault(end.balance, end.state)
     if fault:
-        return None, fault
+        return fault
     try:
-        found = spot_at(task, end.x, end.balance, end.state, run.iterations, spot.sign)
+        return spot_at(task, end.x, end.balance, end.state, run.iterations, spot.sign)
     except np.linalg.LinAlgError as error:
-        return None, str(error)
-    new_dw, new_dx = found.tangent(task, size)
-    turn = _product(dw, new_dw) + dx * new_dx
-    if abs(turn) < SMALLEST_COSINE and not corner and step > MAX_CORNER_ARC_LENGTH:
-        return None, "the path turns too sharply"
-    return (found if turn > 0 else replace(found, sign=-found.sign)), ""
+        return str(error)
 
 
 @dataclass(frozen=True)
@@ -247,8 +330,8 @@ def _around_corner(
     dw, dx = _path_direction(task, spot)
     for ahead in (1.0, -1.0):
         x = spot.x + ahead * share * task.width * dx
-        balance = replace(task.balance(x), walk=spot.balance.walk)
-        state = evaluate_balance(balance, spot.state.w + ahead * share * size * dw)
+        balance = replace(task.balance(x), walk=spot.walk)
+        state = evaluate_balance(balance, spot.w + ahead * share * size * dw)
         try:
             inverse = linearise_balance(balance, state, task.memory)
             slope = -inverse(residual_rate(balance, state, task.name)) * task.width / size
@@ -260,7 +343,7 @@ def _around_corner(
             found, _ = _correct_point(task, spot, share, direction, corner=True)
             if found is None:
                 continue
-            off_w = (found.state.w - spot.state.w) / size + share * dw
+            off_w = (found.w - spot.w) / size + share * dw
             off_x = (found.x - spot.x) / task.width + share * dx
             if np.hypot(np.sqrt(_product(off_w, off_w)), off_x) > MIN_ONWARD_DISTANCE * share:
                 return found
@@ -275,11 +358,11 @@ def _leap_gap(
     """A solution across a small gap, if it lies where the path was heading."""
     x = spot.x + spot.sign * share * task.width
     balance = task.balance(x)
-    end = newton(balance, spot.state.w, task.options)
-    size = max(task.size, float(np.linalg.norm(spot.state.w)))
-    change = end.state.w - spot.state.w
+    end = newton(balance, spot.w, task.options)
+    size = max(task.size, float(np.linalg.norm(spot.w)))
+    change = end.state.w - spot.w
     # the means of a damper that begins or ceases to walk do not compare
-    if (end.walk is None) != (spot.balance.walk is None):
+    if (end.walk is None) != (spot.walk is None):
         change = change[:, :, 1:]
     if not end.converged or np.linalg.norm(change) > LEAP_DISTANCE * size:
         return None
@@ -302,4 +385,13 @@ def spot_at(
         residual_rate(balance, state, task.name)
     )
     orientation = determinant_sign(balance, state) if task.crossings else 0.0
-    return Spot(x, balance, state, iterations, slope, sign, orientation)
+    return Spot(
+        x,
+        state.w,
+        balance.walk,
+        (balance, state),
+        iterations,
+        slope,
+        sign,
+        orientation,
+    )

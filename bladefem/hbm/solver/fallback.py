@@ -179,7 +179,9 @@ def _more_harmonics(balance: Balance, options: Options) -> Newton:
             end = replace(second, iterations=end.iterations + second.iterations)
         iterations += end.iterations
         if not end.converged:
-            return _failed_attempt(balance, end, iterations, f"with {H} harmonics: {end.reason}")
+            return _failed_attempt(
+                balance, end.state.w, iterations, f"with {H} harmonics: {end.reason}"
+            )
         w = end.state.w
     return replace(end, iterations=iterations)
 
@@ -199,7 +201,7 @@ def _from_high_load(balance: Balance, options: Options) -> Newton:
         if level > np.log(LARGEST_LOAD):
             return _failed_attempt(
                 balance,
-                end,
+                end.state.w,
                 iterations,
                 f"no solution under {LARGEST_LOAD:.0e} times the load: {end.reason}",
             )
@@ -222,7 +224,7 @@ def _from_high_load(balance: Balance, options: Options) -> Newton:
             if step < SMALLEST_STEP:
                 return _failed_attempt(
                     balance,
-                    end,
+                    end.state.w,
                     iterations,
                     f"stopped at {np.exp(level):.3g} times the load: {end.reason}",
                 )
@@ -254,25 +256,26 @@ def _along_excitation(balance: Balance, options: Options) -> Newton:
             break
     else:
         return _failed_attempt(
-            balance, end, iterations, f"no solution for any part of the excitation: {end.reason}"
+            balance,
+            end.state.w,
+            iterations,
+            f"no solution for any part of the excitation: {end.reason}",
         )
     task = Task(part, "force", -x, float(np.linalg.norm(end.state.w)), options)
-    reached = end.state
+    reached = end.state.w
     try:
         spot = spot_at(task, x, replace(part(x), walk=end.walk), end.state, 0, 1.0)
         step = 0.05
         for _ in range(LONGEST_PATH):
             spot, step, _ = advance_path(task, spot, step, 0.2)
             iterations = iterations + spot.iterations
-            reached = spot.state
+            reached = spot.w
             if spot.x >= 0:
-                end = newton(balance, spot.state.w, options)
+                end = newton(balance, spot.w, options)
                 return replace(end, iterations=iterations + end.iterations)
     except (NotSolvedError, np.linalg.LinAlgError) as error:
-        return _failed_attempt(balance, replace(end, state=reached), iterations, str(error))
-    return _failed_attempt(
-        balance, replace(end, state=reached), iterations, f"not there after {LONGEST_PATH} points"
-    )
+        return _failed_attempt(balance, reached, iterations, str(error))
+    return _failed_attempt(balance, reached, iterations, f"not there after {LONGEST_PATH} points")
 
 
 def _from_shooting(
@@ -307,10 +310,10 @@ def _extrapolated_start(path: list[tuple[float, np.ndarray]], target: float) -> 
 
 def _failed_attempt(
     balance: Balance,
-    end: Newton,
+    w: np.ndarray,
     iterations: int,
     reason: str,
 ) -> Newton:
-    """A failed attempt as a state of the true balance."""
-    w = match_harmonics(end.state.w, len(balance.linear.stuck) - 1)
+    """An attempt that failed at displacements (n, d, *) as a state of the true balance."""
+    w = match_harmonics(w, len(balance.linear.stuck) - 1)
     return Newton(evaluate_balance(balance, w), iterations, False, reason)

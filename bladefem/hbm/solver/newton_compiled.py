@@ -155,7 +155,7 @@ def balance_residual(w, linear, preload, F, p, r):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _evaluate_residual(w, d, linear, contact, work):
+def evaluate_residual(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error."""
     load, base, nodes, tab, brackets, preload, offset = contact
     full, F, J, shares, p, r = work
@@ -201,6 +201,12 @@ def dense_jacobian(A, C):
                             re * block[b + sin, column] - im * block[b + cos, column]
                         )
     return out
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def no_factors():
+    """In place of LU factors that were not needed yet."""
+    return np.empty((0, 0)), np.empty(0, np.int64)
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -298,7 +304,7 @@ def moving_nodes(J, springs, d, sticks):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _empty_work(m, d, K):
+def empty_work(m, d, K):
     """Scratch of one run: motion of all directions, forces, their derivative, shares, p,
     residual.
     """
@@ -314,7 +320,7 @@ def _empty_work(m, d, K):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _stop_code(error, tolerance, steps, iterations):
+def stop_code(error, tolerance, steps, iterations):
     """How the run ends with this error, or SEARCHING."""
     if error <= tolerance:
         return CONVERGED
@@ -334,7 +340,7 @@ def _step_accuracy(error, tolerance):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def _linearise_nodes(J, linear, d, sticks):
+def linearise_nodes(J, linear, d, sticks):
     """Moving nodes, dp/dw there, the flexibility among them, and the second level of iterations."""
     K = J.shape[2]
     active, C = moving_nodes(J, linear.springs, d, sticks)
@@ -360,14 +366,14 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K); and how steps
         were solved for: the sum of BY_LU and BY_ITERATIONS, 0 where every contact sticks.
     """
-    work = _empty_work(w.shape[0], d, w.shape[1])
+    work = empty_work(w.shape[0], d, w.shape[1])
     J = work[2]
     r = work[5]
     step = np.empty(w.shape)
     after = np.empty(w.shape)
     trial = w.copy()
-    active, C, few, level = _linearise_nodes(J, linear, d, np.inf)
-    factors = (np.empty((0, 0)), np.empty(0, np.int64))
+    active, C, few, level = linearise_nodes(J, linear, d, np.inf)
+    factors = no_factors()
     code = SEARCHING
     solver = 0
     steps = -1
@@ -375,9 +381,9 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     before = np.inf
     error = np.inf
     while code == SEARCHING:
-        fresh = _evaluate_residual(trial, d, linear, contact, work)
+        fresh = evaluate_residual(trial, d, linear, contact, work)
         if steps >= 0 and not fresh <= tolerance:
-            factors = _newton_step(
+            factors = newton_step(
                 r, LINE_SEARCH_ACCURACY, d, active, C, linear.flex, few, factors, level, after
             )
             if not frobenius_norm(after) <= (1 - 0.25 * share) * before:
@@ -388,14 +394,14 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         error = fresh
         steps = steps + 1
         _take_step(trial, 0.0, step, w)
-        code = _stop_code(error, tolerance, steps, iterations)
+        code = stop_code(error, tolerance, steps, iterations)
         if code != SEARCHING:
             break
-        active, C, few, level = _linearise_nodes(J, linear, d, sticks)
+        active, C, few, level = linearise_nodes(J, linear, d, sticks)
         accuracy = _step_accuracy(error, tolerance)
         # new arrays: slices would have another memory layout, and compile everything twice
-        factors = (np.empty((0, 0)), np.empty(0, np.int64))
-        factors = _newton_step(r, accuracy, d, active, C, linear.flex, few, factors, level, step)
+        factors = no_factors()
+        factors = newton_step(r, accuracy, d, active, C, linear.flex, few, factors, level, step)
         before = frobenius_norm(step)
         if C.shape[0] * C.shape[1] > COMPILED_ITERATION_UNKNOWNS:
             solver |= BY_ITERATIONS
@@ -408,7 +414,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
 
 
 @njit(**INNER_KERNEL)
-def _newton_step(r, accuracy, d, active, C, flex, few, factors, level, step):
+def newton_step(r, accuracy, d, active, C, flex, few, factors, level, step):
     """Fill step (m, K) with the inverse derivative times r (m, K); returns the factors where they
     were needed.
     """

@@ -112,7 +112,7 @@ def _solve_points(
     """The first frequencies, as long as they converge; `known` and `chained` as `_compiled_points`
     takes them.
     """
-    prepared = _prepared_arguments(model, H, samples)
+    prepared = prepared_arguments(model, H, samples)
     if prepared is None:
         return []
     bodies, springs, contact = prepared
@@ -152,13 +152,14 @@ def _solve_points(
     )
     # a damper that walks is left to the plain way
     accepted = takewhile(lambda point: point[-1][2] <= CARRIED_SHARE, parts)
-    return [_point_solution(H, samples, point) for point in accepted]
+    return [point_solution(H, samples, point) for point in accepted]
 
 
-def _point_solution(
+def point_solution(
     H: int,
     samples: int,
     point: tuple[Any, ...],
+    method: str = "newton",
 ) -> Solution:
     """A converged point as `_compiled_points` hands it out."""
     omega, w, f, probe, end, states, measures = point
@@ -173,7 +174,7 @@ def _point_solution(
         probe=probe,
         converged=True,
         reason="residual within tolerance",
-        method="newton",
+        method=method,
         iterations=int(steps),
         residual=error,
         residual_displacement=moved,
@@ -265,7 +266,7 @@ def compiles_points(model: ReducedModel, H: int) -> bool:
     return uses_compiled_point(model, H)
 
 
-def _prepared_arguments(
+def prepared_arguments(
     model: ReducedModel,
     H: int,
     samples: int,
