@@ -38,6 +38,9 @@ ITERATIONS_THEN_LU = "iterations, then dense LU"
 # point, is 90 % of a point with one contact and 22 % at 48 degrees of freedom; beyond 200 it is
 # lost in the dense products, and BLAS on whole arrays is faster.
 COMPILED_POINT_DOFS = 200
+# Unknowns up to which slopes and the steps of a path are one compiled call: 3.5 times as fast with
+# sixty of them, a third faster with 400.
+COMPILED_SLOPE_UNKNOWNS = 1000
 # Unknowns of 1-D elements up to which Newton is compiled: 3.3 times as fast as NumPy with one
 # contact, 1.2 times at some thousand unknowns; beyond 20000 a Jacobian no longer fits into memory.
 COMPILED_NEWTON_UNKNOWNS = 20000
@@ -78,9 +81,20 @@ def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
     return dofs <= COMPILED_POINT_DOFS and uses_compiled_newton(model, dofs * (2 * harmonics + 1))
 
 
-def uses_compiled_path(model: ReducedModel, harmonics: int) -> bool:
-    """True if a step of a path is one compiled call: points are, and a dense LU is fast."""
-    return uses_compiled_point(model, harmonics) and model.unknowns(harmonics) <= DENSE_UNKNOWNS
+def uses_compiled_slope(model: ReducedModel, harmonics: int, samples: int) -> bool:
+    """True if slopes with the frequency, and the steps of a path in it, are one compiled call: few
+    Coulomb elements with one tangent, or with two and sampled forces.
+    """
+    if model.circulatory:
+        # what couples the modes then changes with the frequency
+        return False
+    sampled = samples > 0 or model.elements.tangents == 1
+    return (
+        sampled
+        and model.springs.size <= COMPILED_POINT_DOFS
+        and model.unknowns(harmonics) <= COMPILED_SLOPE_UNKNOWNS
+        and uses_coulomb_kernels(model)
+    )
 
 
 def uses_compiled_newton(model: ReducedModel, unknowns: int) -> bool:

@@ -1,4 +1,4 @@
-"""How a small balance of 1-D elements changes with the frequency, compiled: along a path, and at a
+"""How a small balance changes with the frequency, compiled: along a path, and at a
 solved point.
 
 The same by `bladefem.hbm.parameter_derivatives` takes some forty calls of NumPy, which were two
@@ -18,14 +18,12 @@ from ..model import ReducedModel
 from ..point_measures import complex_amplitude, motion_under_load
 from ..solution import Solution
 from .newton_compiled import (
-    empty_work,
-    evaluate_residual,
     linearise_nodes,
     newton_step,
     no_factors,
 )
-from .point_compiled import prepared_arguments
 from .residual import STICKING_FORCE_SHARE
+from .small_balance import empty_room, evaluate, small_balance
 
 # relative accuracy of derivatives where they are solved for by iterations
 SLOPE_ACCURACY = 1e-9
@@ -36,16 +34,13 @@ def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, n
     s], and (H+1, probes) of the complex amplitudes at the probes [m s]; None if compiled points do
     not apply, or the derivative is singular.
     """
-    prepared = prepared_arguments(model, point.harmonics, point.samples)
-    if prepared is None or point.walk is not None:
+    small = small_balance(model, point.harmonics, point.samples)
+    if small is None or point.walk is not None:
         return None
-    bodies, springs, contact = prepared
     n, d, K = point.w.shape
     w = np.ascontiguousarray(point.w, dtype=float).reshape(n * d, K)
     try:
-        slope, probe = _slope_at(
-            point.omega, w, bodies, _without_excitation(bodies), springs, contact, d
-        )
+        slope, probe = _slope_at(point.omega, w, *small, _without_excitation(small.bodies), d)
     except (ZeroDivisionError, np.linalg.LinAlgError):
         return None
     return slope.reshape(n, d, K), probe
@@ -57,7 +52,7 @@ def _without_excitation(bodies: Bodies) -> Bodies:
 
 
 @njit(**KERNEL)
-def _slope_at(omega, w, bodies, unexcited, springs, contact, d):
+def _slope_at(omega, w, bodies, springs, contact, patterns, unexcited, d):
     """Derivatives with the frequency of the displacements (m, K) and probes (H+1, p) at a solved
     point.
 
@@ -66,14 +61,14 @@ def _slope_at(omega, w, bodies, unexcited, springs, contact, d):
     """
     m, K = w.shape
     modal, linear, free, _ = linear_part(omega, bodies, springs, K // 2)
-    work = empty_work(m, d, K)
-    evaluate_residual(w, d, linear, contact, work)
-    nodes, C, few, level = linearise_nodes(work[2], linear, d, STICKING_FORCE_SHARE)
-    rates, rate = residual_rate(omega, bodies, modal, linear, contact[5], work[1])
+    room = empty_room(m, d, K, patterns)
+    evaluate(w, d, linear, contact, patterns, room)
+    nodes, C, few, level = linearise_nodes(room.J, linear, d, STICKING_FORCE_SHARE)
+    rates, rate = residual_rate(omega, bodies, modal, linear, contact[5], room.F)
     slope = np.empty((m, K))
     newton_step(rate, SLOPE_ACCURACY, d, nodes, C, linear.flex, few, no_factors(), level, slope)
     slope *= -1.0
-    change = _force_change(work[2], slope, d)
+    change = _force_change(room.J, slope, d)
     probe = np.empty(bodies.straight.shape, np.complex128)
     # the mean motion without contact forces does not change with the frequency
     motion_under_load(unexcited, (modal, np.zeros_like(free)), change, slope, springs, probe)

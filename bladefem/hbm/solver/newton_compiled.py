@@ -155,7 +155,7 @@ def balance_residual(w, linear, preload, F, p, r):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def evaluate_residual(w, d, linear, contact, work):
+def _evaluate_residual(w, d, linear, contact, work):
     """Forces and residual at w (m, K); fills work and returns the error."""
     load, base, nodes, tab, brackets, preload, offset = contact
     full, F, J, shares, p, r = work
@@ -304,7 +304,7 @@ def moving_nodes(J, springs, d, sticks):
 
 
 @njit(cache=True, error_model="numpy", inline="always")
-def empty_work(m, d, K):
+def _empty_work(m, d, K):
     """Scratch of one run: motion of all directions, forces, their derivative, shares, p,
     residual.
     """
@@ -366,7 +366,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
         forces (n, 2, K), their derivative, shares (n, 3), residual (m, K), p (m, K); and how steps
         were solved for: the sum of BY_LU and BY_ITERATIONS, 0 where every contact sticks.
     """
-    work = empty_work(w.shape[0], d, w.shape[1])
+    work = _empty_work(w.shape[0], d, w.shape[1])
     J = work[2]
     r = work[5]
     step = np.empty(w.shape)
@@ -381,7 +381,7 @@ def compiled_newton(w, d, linear, contact, sticks, tolerance, iterations, shorte
     before = np.inf
     error = np.inf
     while code == SEARCHING:
-        fresh = evaluate_residual(trial, d, linear, contact, work)
+        fresh = _evaluate_residual(trial, d, linear, contact, work)
         if steps >= 0 and not fresh <= tolerance:
             factors = newton_step(
                 r, LINE_SEARCH_ACCURACY, d, active, C, linear.flex, few, factors, level, after

@@ -1,5 +1,5 @@
-"""A whole step of a path in the frequency in one compiled call, for small models of 1-D elements:
-Newton back to the path on the plane across its direction, the direction beyond, works and states.
+"""A whole step of a path in the frequency in one compiled call, for small models: Newton back to
+the path on the plane across its direction, the direction beyond, works and states.
 
 The plain way of `bladefem.hbm.solver.arclength` is taken where dampers walk, and wherever a step
 does not end well for another reason than its length.
@@ -14,13 +14,11 @@ from numba import njit
 
 from ...util.newton import Outcome, outcome_reason
 from ...util.numba_options import INNER_KERNEL, KERNEL
-from ..linear.array_copy import copy_vector
 from ..linear.condensation_compiled import linear_part
 from ..linear.contact_flexibility import form_matrices
-from ..linear.packed_bodies import Bodies
 from ..model import ReducedModel
 from ..point_measures import MEASURES, count_states, measure_point
-from ..policy import DETERMINANT_UNKNOWNS, uses_compiled_path
+from ..policy import DETERMINANT_UNKNOWNS
 from ..solution import Solution
 from .frequency_slope import residual_rate
 from .newton_compiled import (
@@ -28,16 +26,15 @@ from .newton_compiled import (
     CONVERGED,
     SEARCHING,
     dense_jacobian,
-    empty_work,
-    evaluate_residual,
     linearise_nodes,
     newton_step,
     no_factors,
     stop_code,
 )
-from .point_compiled import point_solution, prepared_arguments
+from .point_compiled import point_solution
 from .residual import STEP_ACCURACY, STICKING_FORCE_SHARE
-from .walking import CARRIED_SHARE
+from .small_balance import SmallBalance, empty_room, evaluate, small_balance
+from .walking import CARRIED_SHARE, rest_fault
 
 # name of the way in a record
 PATH_FOLLOWING = "path following"
@@ -47,11 +44,8 @@ PATH_FOLLOWING = "path following"
 class CompiledPath:
     """What does not change along a path in the circular frequency of a small model."""
 
-    bodies: Bodies
-    # (m,) [N/m]
-    springs: np.ndarray
-    # as `bladefem.hbm.solver.residual.contact_table` has it
-    contact: tuple
+    model: ReducedModel
+    balance: SmallBalance
     # nodes, directions, real coefficients
     shape: tuple[int, int, int]
     samples: int
@@ -70,12 +64,11 @@ class CompiledEnd:
 
 def compiled_path(model: ReducedModel, H: int, samples: int) -> CompiledPath | None:
     """Steps of this model are compiled; None where they are not."""
-    prepared = prepared_arguments(model, H, samples)
-    if prepared is None or not uses_compiled_path(model, H):
+    balance = small_balance(model, H, samples)
+    if balance is None:
         return None
-    n, d = model.springs.shape
-    bodies, springs, contact = prepared
-    return CompiledPath(bodies, springs, contact, (n, d, 2 * H + 1), samples)
+    shape = (*model.springs.shape, 2 * H + 1)
+    return CompiledPath(model, balance, shape, samples)
 
 
 def correct_step(
@@ -106,16 +99,15 @@ def correct_step(
     across[:, 0] *= mean_weight
     w = np.array(guess[1], dtype=float).reshape(n * d, K)
     try:
-        x, code, steps, error, slope, sign, f, probe, counts, measures = _correct_step(
+        x, code, steps, error, slope, sign, f, probe, shares, measures, periodic = _correct_step(
             guess[0],
             w,
             across,
             direction[1],
             *scales,
-            path.bodies,
-            path.springs,
-            path.contact,
+            *path.balance,
             d,
+            d - path.model.elements.tangents,
             tolerance,
             corrections,
             signed,
@@ -127,9 +119,13 @@ def correct_step(
         return None
     if code != CONVERGED:
         return outcome_reason(Outcome(code), error, steps)
-    if measures[2] > CARRIED_SHARE:
-        # a damper may walk
+    if not periodic:
         return None
+    bodies = path.balance.bodies
+    carried = measures[2]
+    fault = rest_fault(path.model, bodies.B, shares, carried) if carried > CARRIED_SHARE else ""
+    if fault:
+        return fault
     point = point_solution(
         K // 2,
         path.samples,
@@ -139,7 +135,7 @@ def correct_step(
             f,
             probe,
             (steps, error, BY_LU),
-            counts.tolist(),
+            count_states(shares).tolist(),
             measures.tolist(),
         ),
         PATH_FOLLOWING,
@@ -182,7 +178,9 @@ def _correct_step(
     bodies,
     springs,
     contact,
+    patterns,
     d,
+    normals,
     tolerance,
     corrections,
     signed,
@@ -191,56 +189,57 @@ def _correct_step(
 
     Args:
         across: (m, K) direction in displacements over `size`, times the weight of each.
+        normals: normal directions in the balance, 0 or 1 a node.
 
     Returns:
-        x, how the loop ended, steps, error, slope (m, K), sign of the determinant, and what
-        `measure_point` and `count_states` give.
+        x, how the loop ended, steps, error, slope (m, K), sign of the determinant, forces,
+        probes, shares (n, 3) of stick, slip and separation, what `measure_point` gives, and
+        whether the forces are periodic.
     """
     m, K = w.shape
     first = w.copy()
     begun = x
-    work = empty_work(m, d, K)
+    room = empty_room(m, d, K, patterns)
     back = np.empty((m, K))
     along = np.empty((m, K))
     moved = np.empty((m, K))
     f = np.empty((m // d, d, K))
     probe = np.empty(bodies.straight.shape, np.complex128)
-    counts = np.zeros(4, np.int64)
     measures = np.zeros(MEASURES)
     sign = 0.0
     steps = 0
     while True:
         modal, linear, free, _ = linear_part(x, bodies, springs, K // 2)
-        error = evaluate_residual(w, d, linear, contact, work)
+        error = evaluate(w, d, linear, contact, patterns, room)
         code = stop_code(error, tolerance, steps, corrections)
         if code != SEARCHING and code != CONVERGED:
             break
-        nodes, C, few, level = linearise_nodes(work[2], linear, d, STICKING_FORCE_SHARE)
-        _, rate = residual_rate(x, bodies, modal, linear, contact[5], work[1])
+        nodes, C, few, level = linearise_nodes(room.J, linear, d, STICKING_FORCE_SHARE)
+        _, rate = residual_rate(x, bodies, modal, linear, contact[5], room.F)
         factors = newton_step(
             rate, STEP_ACCURACY, d, nodes, C, linear.flex, few, no_factors(), level, along
         )
         if code == CONVERGED:
             if signed:
                 sign = _determinant_sign(few, C)
-            _, _, _, shares, _, residual = work
             measure_point(
                 x,
                 bodies,
                 springs,
                 (modal, free),
                 w,
-                d - 1,
-                work[1],
+                normals,
+                room.F,
                 contact[5],
-                residual,
+                room.residual,
                 f,
                 probe,
                 measures,
             )
-            copy_vector(count_states(shares), counts)
             break
-        newton_step(work[5], STEP_ACCURACY, d, nodes, C, linear.flex, few, factors, level, back)
+        newton_step(
+            room.residual, STEP_ACCURACY, d, nodes, C, linear.flex, few, factors, level, back
+        )
         for i in range(m):
             for k in range(K):
                 moved[i, k] = w[i, k] - first[i, k]
@@ -254,4 +253,5 @@ def _correct_step(
                 w[i, k] -= back[i, k] + change * along[i, k]
         steps += 1
     along *= -1.0
-    return x, code, steps, error, along, sign, f, probe, counts, measures
+    periodic = room.cycles.min() >= 0
+    return x, code, steps, error, along, sign, f, probe, room.shares, measures, periodic

@@ -112,7 +112,7 @@ def _solve_points(
     """The first frequencies, as long as they converge; `known` and `chained` as `_compiled_points`
     takes them.
     """
-    prepared = prepared_arguments(model, H, samples)
+    prepared = _prepared_arguments(model, H, samples)
     if prepared is None:
         return []
     bodies, springs, contact = prepared
@@ -266,7 +266,7 @@ def compiles_points(model: ReducedModel, H: int) -> bool:
     return uses_compiled_point(model, H)
 
 
-def prepared_arguments(
+def _prepared_arguments(
     model: ReducedModel,
     H: int,
     samples: int,

@@ -72,20 +72,26 @@ def walking_motions(balance: Balance, shares: np.ndarray) -> np.ndarray | None:
     """(m, z) motions along which every contact slips, from the shares (n, 3) of stick, slip and
     separation; None where there is none.
     """
-    model = balance.model
-    free = tangential_motions(model, balance.linear.B)
+    return _walking_motions(balance.model, balance.linear.B, shares)
+
+
+def _walking_motions(model: ReducedModel, B: np.ndarray, shares: np.ndarray) -> np.ndarray | None:
+    free = tangential_motions(model, B)
     sticks = (shares[:, 1] == 0.0) & (shares[:, 2] == 0.0)
     rows = np.repeat(sticks, model.directions)
-    found = unresisted(free, balance.linear.springs, rows, UNRESISTED_STICK)
+    found = unresisted(free, model.springs.ravel(), rows, UNRESISTED_STICK)
     return found if found.shape[1] else None
 
 
 def may_walk(balance: Balance) -> bool:
     """True if the damper has a motion that only friction resists, by laws that let it walk."""
-    B = balance.linear.B
-    if not B.shape[1] or not forgets_position(balance.model.elements):
+    return _may_walk(balance.model, balance.linear.B)
+
+
+def _may_walk(model: ReducedModel, B: np.ndarray) -> bool:
+    if not B.shape[1] or not forgets_position(model.elements):
         return False
-    return tangential_motions(balance.model, B).shape[1] > 0
+    return tangential_motions(model, B).shape[1] > 0
 
 
 def walk_fault(balance: Balance, state: State) -> str:
@@ -96,15 +102,26 @@ def walk_fault(balance: Balance, state: State) -> str:
         return ""
     if balance.walk is None:
         carried = carried_share(balance, state)
-        free = may_walk(balance) and walking_motions(balance, state.forces.shares) is not None
-        if carried > (CARRIED_SHARE if free else CARRIED_SHARE_IN_STICK):
-            return f"friction leaves {carried:.1e} of the contact forces on a damper that may walk"
-        return ""
+        return rest_fault(balance.model, balance.linear.B, state.forces.shares, carried)
     shares = state.forces.shares
     sticks = (shares[:, 1] == 0.0) & (shares[:, 2] == 0.0)
     moved = abs(balance.walk).reshape(*balance.model.springs.shape, -1).sum(axis=(1, 2))
     if np.any(sticks & (moved > 1e-9 * moved.max())):
         return "a contact sticks while the damper walks"
+    return ""
+
+
+def rest_fault(model: ReducedModel, B: np.ndarray, shares: np.ndarray, carried: float) -> str:
+    """Why a damper does not rest at a solved state, or nothing.
+
+    Args:
+        B: (m, r) motions without stiffness.
+        shares: (n, 3) of stick, slip and separation.
+        carried: as `carried_share` tells it.
+    """
+    free = _may_walk(model, B) and _walking_motions(model, B, shares) is not None
+    if carried > (CARRIED_SHARE if free else CARRIED_SHARE_IN_STICK):
+        return f"friction leaves {carried:.1e} of the contact forces on a damper that may walk"
     return ""
 
 
