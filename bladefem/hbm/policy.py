@@ -41,6 +41,8 @@ COMPILED_POINT_DOFS = 200
 # Unknowns up to which slopes and the steps of a path are one compiled call: 3.5 times as fast with
 # sixty of them, a third faster with 400.
 COMPILED_SLOPE_UNKNOWNS = 1000
+# Unknowns of 2-D elements up to which a point is one compiled call.
+COMPILED_POINT_UNKNOWNS_2D = 300
 # Unknowns of 1-D elements up to which Newton is compiled: 3.3 times as fast as NumPy with one
 # contact, 1.2 times at some thousand unknowns; beyond 20000 a Jacobian no longer fits into memory.
 COMPILED_NEWTON_UNKNOWNS = 20000
@@ -73,26 +75,28 @@ def uses_coulomb_kernels(model: ReducedModel) -> bool:
 
 
 def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
-    """True if a whole point is one compiled call: few 1-D Coulomb elements."""
-    if model.circulatory:
-        # what couples the modes then changes with the frequency
-        return False
+    """True if a whole point is one compiled call: few Coulomb elements."""
     dofs = model.springs.size
-    return dofs <= COMPILED_POINT_DOFS and uses_compiled_newton(model, dofs * (2 * harmonics + 1))
-
-
-def uses_compiled_slope(model: ReducedModel, harmonics: int, samples: int) -> bool:
-    """True if slopes with the frequency, and the steps of a path in it, are one compiled call: few
-    Coulomb elements with one tangent, or with two and sampled forces.
-    """
-    if model.circulatory:
-        # what couples the modes then changes with the frequency
+    unknowns = dofs * (2 * harmonics + 1)
+    if not _compiles_small(model, harmonics):
         return False
-    sampled = samples > 0 or model.elements.tangents == 1
+    return model.elements.tangents == 1 or unknowns <= COMPILED_POINT_UNKNOWNS_2D
+
+
+def uses_compiled_slope(model: ReducedModel, harmonics: int) -> bool:
+    """True if slopes with the frequency, and the steps of a path in it, are one compiled call: few
+    Coulomb elements.
+    """
+    few = model.unknowns(harmonics) <= COMPILED_SLOPE_UNKNOWNS
+    return few and _compiles_small(model, harmonics)
+
+
+def _compiles_small(model: ReducedModel, harmonics: int) -> bool:
+    # what couples the modes of a circulatory model changes with the frequency
     return (
-        sampled
+        not model.circulatory
         and model.springs.size <= COMPILED_POINT_DOFS
-        and model.unknowns(harmonics) <= COMPILED_SLOPE_UNKNOWNS
+        and model.unknowns(harmonics) <= COMPILED_NEWTON_UNKNOWNS
         and uses_coulomb_kernels(model)
     )
 

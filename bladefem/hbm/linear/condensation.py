@@ -19,7 +19,7 @@ from ...errors import NotSolvedError
 from ...friction.fourier import to_real
 from ...util.arrays import ComplexArray, RealArray
 from ..model import ReducedModel
-from ..solver.newton_compiled import Condensed, motion_scale
+from ..solver.balance_residual import Condensed, motion_scale
 from .bodies import gyroscopic_part, modal_flexibility, rigid_modes
 from .circulation import joined_circulation, mean_modal_flexibility, with_circulation
 from .condensation_compiled import linear_part, unsprung_flexibility

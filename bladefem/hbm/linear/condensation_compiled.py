@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from ...util.numba_options import INNER_KERNEL, KERNEL
-from ..solver.newton_compiled import Condensed, motion_scale
+from ..solver.balance_residual import Condensed, motion_scale
 from .array_copy import copy_matrix, copy_vector
 from .contact_flexibility import by_harmonic, form_matrices
 

@@ -17,10 +17,8 @@ from numba import njit
 from ...friction.simd.kernel_2d import disc_batch
 from ...friction.trigonometric_tables import Patterns
 from ...util.numba_options import INNER_KERNEL, KERNEL
-from .newton_compiled import Condensed, balance_residual, frobenius_norm
-
-# marched until the force of an element is periodic, at most
-PERIODS = 4000
+from .balance_residual import Condensed, balance_residual, frobenius_norm
+from .law_evaluation import PERIODS
 
 
 class Evaluation(NamedTuple):

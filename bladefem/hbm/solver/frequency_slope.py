@@ -16,14 +16,12 @@ from ..linear.contact_flexibility import apply_flexibility
 from ..linear.packed_bodies import Bodies
 from ..model import ReducedModel
 from ..point_measures import complex_amplitude, motion_under_load
+from ..policy import uses_compiled_slope
 from ..solution import Solution
-from .newton_compiled import (
-    linearise_nodes,
-    newton_step,
-    no_factors,
-)
+from .law_evaluation import empty_room, evaluate
+from .newton_compiled import linearise_nodes, newton_step, no_factors
 from .residual import STICKING_FORCE_SHARE
-from .small_balance import empty_room, evaluate, small_balance
+from .small_balance import small_balance
 
 # relative accuracy of derivatives where they are solved for by iterations
 SLOPE_ACCURACY = 1e-9
@@ -34,9 +32,9 @@ def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, n
     s], and (H+1, probes) of the complex amplitudes at the probes [m s]; None if compiled points do
     not apply, or the derivative is singular.
     """
-    small = small_balance(model, point.harmonics, point.samples)
-    if small is None or point.walk is not None:
+    if point.walk is not None or not uses_compiled_slope(model, point.harmonics):
         return None
+    small = small_balance(model, point.harmonics, point.samples)
     n, d, K = point.w.shape
     w = np.ascontiguousarray(point.w, dtype=float).reshape(n * d, K)
     try:

@@ -23,6 +23,8 @@ from .balance_2d import search_residual
 from .newton_compiled import (
     BY_ITERATIONS,
     BY_LU,
+    RESIDUAL_DECREASE,
+    STEP_DECREASE,
     compiled_newton,
 )
 from .newton_krylov import Memory
@@ -57,9 +59,6 @@ SHORTEST_STEP_SHARE = 2.0**-8
 # one led to none of some 100 points that the others did not lead to, those springs to 6 of them, in
 # nearly half of the time of all others; a shorter step does as well
 LIKELIEST_KINDS = 2
-# share by which a whole step has to lower what the line search looks at
-STEP_DECREASE = 0.25
-RESIDUAL_DECREASE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -309,11 +308,12 @@ def _run_compiled(
     d = balance.model.directions
     shape = w.shape
     contact = contact_table(balance.model, shape[2] // 2, balance.samples)
-    steps, code, error, f, dfdw, shares, residual, p, solver = compiled_newton(
+    steps, code, error, room, solver = compiled_newton(
         end,
         d,
         balance.linear.condensed,
         contact,
+        None,
         STICKING_FORCE_SHARE,
         options.tolerance,
         options.iterations,
@@ -325,18 +325,20 @@ def _run_compiled(
     if outcome is not Outcome.CONVERGED:
         state = evaluate_balance(balance, end.reshape(shape))
         return Newton(state, steps, False, reason, route)
-    full = np.zeros_like(f)
+    full = np.zeros_like(room.F)
     full[:, 2 - d :] = end.reshape(shape)
     forces = Forces(
-        f[:, 2 - d :],
-        dfdw[:, 2 - d :, :, 2 - d :],
-        shares,
-        dissipated_energy(f, full),
-        np.full(len(f), 2),
+        room.F[:, 2 - d :],
+        room.J[:, 2 - d :, :, 2 - d :],
+        room.shares,
+        dissipated_energy(room.F, full),
+        np.full(len(full), 2),
         True,
         "periodic",
     )
-    state = State(end.reshape(shape), forces, p.reshape(shape), residual.reshape(shape), error)
+    state = State(
+        end.reshape(shape), forces, room.p.reshape(shape), room.residual.reshape(shape), error
+    )
     return Newton(state, steps, True, reason, route)
 
 

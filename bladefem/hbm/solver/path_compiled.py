@@ -18,9 +18,10 @@ from ..linear.condensation_compiled import linear_part
 from ..linear.contact_flexibility import form_matrices
 from ..model import ReducedModel
 from ..point_measures import MEASURES, count_states, measure_point
-from ..policy import DETERMINANT_UNKNOWNS
+from ..policy import DETERMINANT_UNKNOWNS, uses_compiled_slope
 from ..solution import Solution
 from .frequency_slope import residual_rate
+from .law_evaluation import empty_room, evaluate
 from .newton_compiled import (
     BY_LU,
     CONVERGED,
@@ -33,7 +34,7 @@ from .newton_compiled import (
 )
 from .point_compiled import point_solution
 from .residual import STEP_ACCURACY, STICKING_FORCE_SHARE
-from .small_balance import SmallBalance, empty_room, evaluate, small_balance
+from .small_balance import SmallBalance, small_balance
 from .walking import CARRIED_SHARE, rest_fault
 
 # name of the way in a record
@@ -64,11 +65,10 @@ class CompiledEnd:
 
 def compiled_path(model: ReducedModel, H: int, samples: int) -> CompiledPath | None:
     """Steps of this model are compiled; None where they are not."""
-    balance = small_balance(model, H, samples)
-    if balance is None:
+    if not uses_compiled_slope(model, H):
         return None
     shape = (*model.springs.shape, 2 * H + 1)
-    return CompiledPath(model, balance, shape, samples)
+    return CompiledPath(model, small_balance(model, H, samples), shape, samples)
 
 
 def correct_step(
@@ -208,6 +208,7 @@ def _correct_step(
     measures = np.zeros(MEASURES)
     sign = 0.0
     steps = 0
+    accuracy = STEP_ACCURACY
     while True:
         modal, linear, free, _ = linear_part(x, bodies, springs, K // 2)
         error = evaluate(w, d, linear, contact, patterns, room)
@@ -217,8 +218,10 @@ def _correct_step(
         nodes, C, few, level = linearise_nodes(room.J, linear, d, STICKING_FORCE_SHARE)
         _, rate = residual_rate(x, bodies, modal, linear, contact[5], room.F)
         factors = newton_step(
-            rate, STEP_ACCURACY, d, nodes, C, linear.flex, few, no_factors(), level, along
+            rate, accuracy, d, nodes, C, linear.flex, few, no_factors(), level, along
         )
+        # where iterations did not converge once they mostly do not
+        accuracy = 0.0 if factors[1].size else accuracy
         if code == CONVERGED:
             if signed:
                 sign = _determinant_sign(few, C)
@@ -237,9 +240,7 @@ def _correct_step(
                 measures,
             )
             break
-        newton_step(
-            room.residual, STEP_ACCURACY, d, nodes, C, linear.flex, few, factors, level, back
-        )
+        newton_step(room.residual, accuracy, d, nodes, C, linear.flex, few, factors, level, back)
         for i in range(m):
             for k in range(K):
                 moved[i, k] = w[i, k] - first[i, k]

@@ -1,5 +1,4 @@
-"""A whole point of a small model of 1-D elements in one compiled call: flexibilities, Newton, works
-and states.
+"""A whole point of a small model in one compiled call: flexibilities, Newton, works and states.
 
 The same kernels one after the other, with NumPy between them, take fifty calls, which is most of
 the time where there are few contacts. A point that does not end well is left to the fallback chain.
@@ -18,7 +17,6 @@ from ...friction.states import NODE_STATES
 from ...util.numba_options import KERNEL
 from ..linear.array_copy import copy_matrix, copy_vector
 from ..linear.condensation_compiled import linear_part
-from ..linear.packed_bodies import prepared_bodies
 from ..model import ReducedModel
 from ..point_measures import MEASURES, count_states, measure_point
 from ..policy import COMPILED_POINT, uses_compiled_point
@@ -26,8 +24,12 @@ from ..predictor import PREDICTOR_POINTS, append_solution, extrapolate_solution
 from ..solution import Solution, Work
 from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
 from .newton_compiled import CONVERGED, compiled_newton
-from .residual import STICKING_FORCE_SHARE, contact_table
-from .walking import CARRIED_SHARE
+from .residual import STICKING_FORCE_SHARE
+from .small_balance import small_balance
+from .walking import CARRIED_SHARE, can_walk
+
+# steps of Newton with two tangents, after which the fallback chain begins, with the same start
+MOST_STEPS_2D = 12
 
 
 def solve_small(
@@ -112,10 +114,13 @@ def _solve_points(
     """The first frequencies, as long as they converge; `known` and `chained` as `_compiled_points`
     takes them.
     """
-    prepared = _prepared_arguments(model, H, samples)
-    if prepared is None:
+    if not uses_compiled_point(model, H):
         return []
-    bodies, springs, contact = prepared
+    one_tangent = model.elements.tangents == 1
+    small = small_balance(model, H, samples)
+    # where it walks, all steps would be for nothing
+    if not one_tangent and can_walk(model, small.bodies.B):
+        return []
     (n, d), K = model.springs.shape, 2 * H + 1
     at = np.zeros(PREDICTOR_POINTS)
     begin = np.zeros((PREDICTOR_POINTS, n * d, K))
@@ -125,17 +130,16 @@ def _solve_points(
     try:
         w, ends, f, probe, counts, measures = _compiled_points(
             omegas,
-            bodies,
-            springs,
-            contact,
+            *small,
             d,
+            d - model.elements.tangents,
             H,
             begin,
             at,
             len(known),
             chained,
             options.tolerance,
-            options.iterations,
+            options.iterations if one_tangent else min(options.iterations, MOST_STEPS_2D),
         )
     except (ZeroDivisionError, np.linalg.LinAlgError):
         # a resonance without damping: the plain way tells which
@@ -202,7 +206,20 @@ def _empty_points(p, n, d, K):
 
 @njit(**KERNEL)
 def _compiled_points(
-    omegas, bodies, springs, contact, d, H, known, at, count, chained, tolerance, iterations
+    omegas,
+    bodies,
+    springs,
+    contact,
+    patterns,
+    d,
+    normals,
+    H,
+    known,
+    at,
+    count,
+    chained,
+    tolerance,
+    iterations,
 ):
     """Displacements (p, m, K), steps, error and solver (p, 3), and what `measure_point` gives, of
     the first frequencies.
@@ -222,17 +239,18 @@ def _compiled_points(
             extrapolate_solution(omegas[i], known, at, count, w[i])
         else:
             copy_matrix(linear.stuck, w[i])
-        steps, code, error, F, _, shares, residual, _, solver = compiled_newton(
+        steps, code, error, room, solver = compiled_newton(
             w[i],
             d,
             linear,
             contact,
+            patterns,
             STICKING_FORCE_SHARE,
             tolerance,
             iterations,
             SHORTEST_STEP_SHARE,
         )
-        if code != CONVERGED:
+        if code != CONVERGED or room.cycles.min() < 0:
             break
         done = i + 1
         ends[i, 0] = steps
@@ -244,15 +262,15 @@ def _compiled_points(
             springs,
             (modal, free),
             w[i],
-            d - 1,
-            F,
+            normals,
+            room.F,
             contact[5],
-            residual,
+            room.residual,
             f[i],
             probe[i],
             measures[i],
         )
-        copy_vector(count_states(shares), counts[i])
+        copy_vector(count_states(room.shares), counts[i])
         if chained:
             sticks = counts[i, 0] == nodes
             count = 0 if sticks else append_solution(omegas[i], w[i], known, at, count)
@@ -264,14 +282,3 @@ def _compiled_points(
 def compiles_points(model: ReducedModel, H: int) -> bool:
     """True if points of the model are compiled as a whole."""
     return uses_compiled_point(model, H)
-
-
-def _prepared_arguments(
-    model: ReducedModel,
-    H: int,
-    samples: int,
-) -> tuple | None:
-    """What a point needs next to its frequency; None if compiled points do not apply."""
-    if not uses_compiled_point(model, H):
-        return None
-    return prepared_bodies(model, H), model.springs.ravel(), contact_table(model, H, samples)

@@ -40,14 +40,11 @@ from ..linear.contact_flexibility import (
 from ..model import ReducedModel
 from ..policy import DENSE_LU, DETERMINANT_UNKNOWNS, ITERATIONS, linear_solver
 from ..solution import Solution
-from .balance_2d import PERIODS, Evaluation, evaluate_2d, force_rates
+from .balance_2d import Evaluation, evaluate_2d, force_rates
+from .balance_residual import balance_residual
 from .dense_system import dense_system
-from .newton_compiled import (
-    balance_residual,
-    dense_jacobian,
-    moving_nodes,
-    spread_to_all_nodes,
-)
+from .law_evaluation import PERIODS
+from .newton_compiled import dense_jacobian, moving_nodes, spread_to_all_nodes
 from .newton_krylov import Memory, iterative_inverse
 
 # of a step by GMRES, relative

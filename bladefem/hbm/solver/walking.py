@@ -85,10 +85,11 @@ def _walking_motions(model: ReducedModel, B: np.ndarray, shares: np.ndarray) -> 
 
 def may_walk(balance: Balance) -> bool:
     """True if the damper has a motion that only friction resists, by laws that let it walk."""
-    return _may_walk(balance.model, balance.linear.B)
+    return can_walk(balance.model, balance.linear.B)
 
 
-def _may_walk(model: ReducedModel, B: np.ndarray) -> bool:
+def can_walk(model: ReducedModel, B: np.ndarray) -> bool:
+    """The same from the motions without stiffness B (m, r)."""
     if not B.shape[1] or not forgets_position(model.elements):
         return False
     return tangential_motions(model, B).shape[1] > 0
@@ -119,7 +120,7 @@ def rest_fault(model: ReducedModel, B: np.ndarray, shares: np.ndarray, carried: 
         shares: (n, 3) of stick, slip and separation.
         carried: as `carried_share` tells it.
     """
-    free = _may_walk(model, B) and _walking_motions(model, B, shares) is not None
+    free = can_walk(model, B) and _walking_motions(model, B, shares) is not None
     if carried > (CARRIED_SHARE if free else CARRIED_SHARE_IN_STICK):
         return f"friction leaves {carried:.1e} of the contact forces on a damper that may walk"
     return ""
