@@ -163,8 +163,9 @@ def _opened(
 ) -> Opened:
     """The record, with the order of the elimination."""
     K, mass = matrices
-    order = interior_first(K, rim, places // body.dim)
     M = mass if isinstance(mass, Repeated) else _of_one_direction(mass, places, body.dim)
+    # the mass joins the same nodes as the stiffness, and has a ninth of its entries
+    order = interior_first(M if isinstance(M, Repeated) else K, rim, places // body.dim)
     # what building the matrices took is of no more use
     give_back()
     elimination = core.Elimination(K, rim, order, shared, body.plan.on_disk)

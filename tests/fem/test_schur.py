@@ -115,6 +115,22 @@ def test_given_order_gives_the_same_modes(monkeypatch):
     np.testing.assert_allclose(a, b, rtol=1e-11)
 
 
+def test_the_order_is_found_from_the_mass(monkeypatch):
+    """It joins the same nodes as the stiffness, which is not read for that: the order is the
+    same.
+    """
+    seen = []
+    plain = ordering.chosen_rows
+    monkeypatch.setattr(ordering, "MIN_METIS_UNKNOWNS", 0)
+    monkeypatch.setattr(ordering, "chosen_rows", lambda A, rows: seen.append(A) or plain(A, rows))
+    found = opened((5, 3, 2)).opened
+    assert len(seen) == 1 and seen[0] is found.M
+    rim, nodes = found.elimination.rim, found.places // 3
+    expected = ordering.interior_first(found.K, rim, nodes)
+    assert seen[1] is found.K
+    np.testing.assert_array_equal(found.elimination.order, expected)
+
+
 def test_factors_that_were_given_back_are_made_again():
     """A count may take their memory; what comes later finds them."""
     t = opened()
