@@ -1,8 +1,6 @@
 """LU factors for compiled loops, small and large; LAPACK's calls take longer than a tiny matrix.
 
-Inner loops run over slices from 0 on: a loop that begins elsewhere asks of each index whether it is
-counted from the end, and is not vectorised. Both factors and substitutions took two to four times
-as long with it.
+Inner loops run over slices from 0 on, see `bladefem.hbm.linear.row_products`.
 """
 
 from __future__ import annotations
@@ -11,11 +9,10 @@ import numpy as np
 from numba import njit
 
 from ...util.numba_options import INNER_KERNEL, KERNEL
+from ..linear.row_products import ROWS_AT_ONCE, four_products, row_product, subtract_row
 
 # columns of a block
 BLOCK_COLUMNS = 32
-# rows that a substitution reads at once
-ROWS_AT_ONCE = 4
 
 
 @njit(_nrt=False, **KERNEL)
@@ -45,15 +42,8 @@ def _eliminate_columns(M, pivots, low, high):
             factor = M[i, k] / M[k, k]
             M[i, k] = factor
             if factor != 0.0:
-                _subtract_row(M[k, k + 1 : high], factor, M[i, k + 1 : high])
+                subtract_row(M[k, k + 1 : high], factor, M[i, k + 1 : high])
     return True
-
-
-@njit(_nrt=False, fastmath={"contract"}, **INNER_KERNEL)
-def _subtract_row(row, factor, target):
-    """target (n,) loses row (n,) times a factor."""
-    for j in range(target.size):
-        target[j] -= factor * row[j]
 
 
 @njit(_nrt=False, **INNER_KERNEL)
@@ -61,7 +51,7 @@ def _eliminate_rows(M, low, high):
     """Right of the factors of columns low to high, their rows."""
     for k in range(low, high):
         for i in range(k + 1, high):
-            _subtract_row(M[k, high:], M[i, k], M[i, high:])
+            subtract_row(M[k, high:], M[i, k], M[i, high:])
 
 
 @njit(**KERNEL)
@@ -90,9 +80,7 @@ def _subtract_matrix(part, target):
             target[i, j] -= part[i, j]
 
 
-# the order of the sums is free, so that they are vectorised: in order, each product waits for the
-# one before
-@njit(_nrt=False, fastmath={"reassoc", "contract"}, **KERNEL)
+@njit(_nrt=False, fastmath={"contract"}, **KERNEL)
 def back_substitute(M, pivots, x):
     """x becomes M^-1 x."""
     size = M.shape[0]
@@ -114,30 +102,16 @@ def back_substitute(M, pivots, x):
             x[i] /= M[i, i]
 
 
-@njit(_nrt=False, fastmath={"reassoc", "contract"}, **INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _subtract_products(rows, start, y, target):
-    """target (n,) loses the product of y (k,) with k columns of rows (n, size) from a first one on;
-    n up to ROWS_AT_ONCE, which share what they read of y.
+    """target (n,) loses the products of rows (n, size) with y (k,), k of their columns from a first
+    one on; n up to ROWS_AT_ONCE.
     """
-    end = start + y.size
     if target.size < ROWS_AT_ONCE:
         for i in range(target.size):
-            row = rows[i, start:end]
-            total = 0.0
-            for j in range(y.size):
-                total += row[j] * y[j]
-            target[i] -= total
+            target[i] -= row_product(rows[i, start : start + y.size], y)
         return
-    one = rows[0, start:end]
-    two = rows[1, start:end]
-    three = rows[2, start:end]
-    four = rows[3, start:end]
-    first = second = third = fourth = 0.0
-    for j in range(y.size):
-        first += one[j] * y[j]
-        second += two[j] * y[j]
-        third += three[j] * y[j]
-        fourth += four[j] * y[j]
+    first, second, third, fourth = four_products(rows, start, y)
     target[0] -= first
     target[1] -= second
     target[2] -= third
