@@ -142,7 +142,8 @@ def _galerkin_matrix(along, C, Z):
     E = np.eye(q * K)
     # cosines of a harmonic, then its sines
     forces = np.empty((2 * a, q * K))
-    left = np.empty((2 * q, 2 * a))
+    # rows of zeros up to a multiple of four, or BLAS takes a third longer
+    left = np.zeros((-(-2 * q // 4) * 4, 2 * a))
     for h in range(along.shape[0]):
         c = max(2 * h - 1, 0)
         _forces_of_motions(C, Z, c, forces[:a])
