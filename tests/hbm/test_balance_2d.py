@@ -122,8 +122,8 @@ def test_a_compiled_evaluation_is_that_of_numpy(name):
     np.testing.assert_array_equal(state.w, w)
 
 
-@pytest.mark.parametrize("name", ["few contacts", "rigid damper", "prescribed loads"])
-@pytest.mark.parametrize("factor", [1.0, 3.0, -1.0])
+@pytest.mark.parametrize("name", ["few contacts", "rigid damper", "prescribed loads", "walking"])
+@pytest.mark.parametrize("factor", [1.0, 3.0, 20.0, -1.0])
 def test_halvings_of_a_step_are_those_of_the_plain_search(name, factor):
     """A step that is too long is halved as often, one that leads uphill is given up."""
     balance, w = CASES[name]
@@ -140,6 +140,12 @@ def test_halvings_of_a_step_are_those_of_the_plain_search(name, factor):
     if plain is not None:
         np.testing.assert_allclose(found.w, plain.w, rtol=0, atol=ROUNDING * abs(plain.w).max())
         assert abs(found.error - plain.error) <= ROUNDING
+        # a shorter step has the derivative, too, which the search makes in a second call
+        assert factor < 20.0 or abs(state.w - plain.w).max() <= abs(step).max() / 4
+        jacobian = plain.forces.jacobian
+        np.testing.assert_allclose(
+            found.forces.jacobian, jacobian, rtol=0, atol=1e-5 * abs(jacobian).max()
+        )
 
 
 def test_rates_of_a_walk_are_those_of_forces_one_by_one():

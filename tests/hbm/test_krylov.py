@@ -4,6 +4,7 @@ other.
 
 import numpy as np
 import pytest
+from numba import njit
 
 from bladefem.hbm import policy
 from bladefem.hbm.linear import packed_bodies as small_bodies
@@ -19,6 +20,7 @@ from bladefem.hbm.linear.contact_flexibility import (
     sizes,
     transposed_flexibility,
 )
+from bladefem.hbm.linear.row_products import multiply_blocks
 from bladefem.hbm.linear_resonances import stuck_resonances
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.response import response
@@ -26,7 +28,7 @@ from bladefem.hbm.solve import leading_stuck_solutions, solve
 from bladefem.hbm.solver import newton_krylov
 from bladefem.hbm.solver.deflation import _leading_directions, no_level, no_ramp, second_level
 from bladefem.hbm.solver.dense_lu import back_substitute
-from bladefem.hbm.solver.krylov import NOT_FOUND, conjugate_residuals
+from bladefem.hbm.solver.krylov import MOST_DIRECTIONS, NOT_FOUND, conjugate_residuals
 from bladefem.hbm.solver.newton import Options
 from bladefem.hbm.solver.newton_compiled import dense_jacobian
 
@@ -62,6 +64,39 @@ def test_conjugate_residuals_reach_the_accuracy_or_say_no(accuracy):
     assert (
         conjugate_residuals(by_harmonic(A), C, no_ramp(), r, accuracy, no_level(), x) == NOT_FOUND
     )
+
+
+@pytest.mark.parametrize("strength", [1.0, 100.0])
+def test_conjugate_residuals_leave_the_least_of_all_combinations(strength):
+    """Of their directions, found or not: what they leave is what NumPy's least squares leave on the
+    Krylov space of as many vectors; restarts go on from there.
+    """
+    A, C = system(strength)
+    J = dense_jacobian(A, C)
+    r, x = np.random.default_rng(5).normal(size=len(J)), np.empty(len(J))
+    count = conjugate_residuals(by_harmonic(A), C, no_ramp(), r, 1e-6, no_level(), x)
+    V = np.empty((len(J), MOST_DIRECTIONS if count == NOT_FOUND else count))
+    y = r
+    for k in range(V.shape[1]):
+        for _ in range(2):
+            y = y - V[:, :k] @ (V[:, :k].T @ y)
+        V[:, k] = y / np.linalg.norm(y)
+        y = J @ V[:, k]
+    best = V @ np.linalg.lstsq(J @ V, r, rcond=None)[0]
+    assert (count == NOT_FOUND) == (strength > 1)
+    left = np.linalg.norm(r - J @ best) / np.linalg.norm(r)
+    assert left < 0.9
+    assert np.linalg.norm(r - J @ x) / np.linalg.norm(r) == pytest.approx(left, rel=1e-6)
+
+
+@pytest.mark.parametrize("size", [1, 3, 4, 5, 18, 27, 93])
+def test_products_of_blocks_are_those_of_numpy(size):
+    """Also where rows are left over from fours."""
+    rng = np.random.default_rng(size)
+    C, x = rng.normal(size=(3, size, size)), rng.normal(size=(3, size))
+    out = np.full(3 * size, np.nan)
+    njit(lambda *given: multiply_blocks(*given))(C, x.ravel(), out)
+    np.testing.assert_allclose(out, np.einsum("nij,nj->ni", C, x).ravel(), rtol=0, atol=1e-12)
 
 
 def by_modes(nodes=6, d=2, H=4, M=3):
@@ -142,18 +177,19 @@ def test_a_second_level_needs_fewer_directions_for_the_same_step():
 
 
 @pytest.mark.parametrize("walks", [False, True])
-def test_a_second_level_solves_for_the_common_motions(walks):
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_a_second_level_solves_for_the_common_motions(walks, d):
     """Its factors are those of  Z^T (1 + A C) Z  with the vectors of a walk, which NumPy inverts."""
-    A, C = system(3.0)
+    A, C = system(3.0, d=d)
     rng = np.random.default_rng(2)
-    Q, _ = np.linalg.qr(rng.normal(size=(12, 3)))
+    Q, _ = np.linalg.qr(rng.normal(size=(6 * d, 3)))
     J = dense_jacobian(A, C)
     ramp = no_ramp()
     if walks:
         ramp = rng.normal(size=(1, len(J))), rng.normal(size=(1, len(J)))
-        moved = flexibility_product(by_harmonic(A), ramp[0][0].reshape(12, 9)).ravel()
+        moved = flexibility_product(by_harmonic(A), ramp[0][0].reshape(6 * d, 9)).ravel()
         J = J + np.outer(moved, ramp[1][0])
-    Z, factors, pivots = second_level(by_harmonic(A), C, ramp, Q, np.arange(6), 2)
+    Z, factors, pivots = second_level(by_harmonic(A), C, ramp, Q, np.arange(6), d)
     spread = np.kron(Z, np.eye(9))
     x = rng.normal(size=27)
     y = x.copy()

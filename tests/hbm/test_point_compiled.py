@@ -172,6 +172,21 @@ def test_blocks_of_columns_give_the_same_factors(size):
     assert not factorise_large(other, two)
 
 
+@pytest.mark.parametrize("size", [*range(1, 10), 33, 66])
+def test_lu_factors_solve_as_numpy_does(size):
+    """Also where rows are left over that are not read with three others, and with every column
+    exchanged.
+    """
+    rng = np.random.default_rng(size)
+    M = rng.normal(size=(size, size)) + np.roll(10.0 * np.eye(size), 1, axis=0)
+    x = rng.normal(size=size)
+    for factorise in (factorise_small, factorise_large):
+        factors, pivots, y = M.copy(), np.empty(size, np.int64), x.copy()
+        assert factorise(factors, pivots)
+        back_substitute(factors, pivots, y)
+        np.testing.assert_allclose(y, np.linalg.solve(M, x), rtol=0, atol=1e-13)
+
+
 @pytest.mark.parametrize("points", [1, 16])
 def test_a_sweep_at_once_is_the_sweep_point_by_point(points, monkeypatch):
     """Blocks of a sweep in one call, with modes that add the springs and without; from slip into

@@ -4,5 +4,5 @@
   ``mean_motion`` harmonic 0, ``common_basis`` one flexibility for all harmonics, ``circulation``
   unsymmetric stiffness
 - compiled: ``packed_bodies`` the arrays that it takes, ``condensation_compiled``,
-  ``contact_flexibility``, ``array_copy``
+  ``contact_flexibility``, ``array_copy``, ``row_products``
 """

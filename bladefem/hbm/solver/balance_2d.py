@@ -140,9 +140,41 @@ def _evaluate(w, walk, linear, contact, patterns):
     return Evaluation(w, F, J, shares, cycles, works, p, r, error, _all_periodic(F, cycles))
 
 
+@njit(**INNER_KERNEL)
+def _residual_size(w, walk, linear, contact, patterns):
+    """Size of the residual at w (m, K) [m], without the derivative, which takes two thirds of an
+    `Evaluation`.
+    """
+    load, _, nodes, tab, _, preload, offset = contact
+    n = nodes.shape[0]
+    full = _law_motion(w, offset, n)
+    ramp = _ramp_of(_walk_steps(w, walk, linear.springs), walk, n)
+    F = np.empty(full.shape)
+    none = np.empty((n, 0, 0, 0))
+    cycles = np.empty(n, np.int64)
+    disc_batch(full, ramp, load, nodes, tab, patterns, PERIODS, F, none, np.empty((n, 3)), cycles)
+    p = np.empty(w.shape)
+    r = np.empty(w.shape)
+    balance_residual(w, linear, preload, F, p, r)
+    return frobenius_norm(r)
+
+
+@njit(**INNER_KERNEL)
+def _after_step(w, share, step):
+    """(m, K) a share of the step from w (m, K)."""
+    trial = np.empty(step.shape)
+    for i in range(step.shape[0]):
+        for k in range(step.shape[1]):
+            trial[i, k] = w[i, k] - share * step[i, k]
+    return trial
+
+
 @njit(**KERNEL)
 def search_residual(w, step, before, decrease, shortest, walk, linear, contact, patterns):
     """The first halving of a step (m, K) from w (m, K) that lowers the residual enough.
+
+    The derivative is made after the whole step, which two in five accept, and where forces alone
+    say that a shorter one is accepted.
 
     Args:
         before: size of the residual at w [m]; the whole step is accepted where it is infinite.
@@ -154,20 +186,22 @@ def search_residual(w, step, before, decrease, shortest, walk, linear, contact, 
         patterns: of the derivative, in its precision.
 
     Returns:
-        whether one was found, and the last `Evaluation`.
+        whether one was found, and the last `Evaluation` made.
     """
     share = 1.0
     while True:
-        trial = np.empty(step.shape)
-        for i in range(step.shape[0]):
-            for k in range(step.shape[1]):
-                trial[i, k] = w[i, k] - share * step[i, k]
+        trial = _after_step(w, share, step)
         found = _evaluate(trial, walk, linear, contact, patterns)
         if frobenius_norm(found.residual) <= (1.0 - decrease * share) * before:
             return True, found
-        share /= 2.0
-        if share < shortest:
-            return False, found
+        while True:
+            share /= 2.0
+            if share < shortest:
+                return False, found
+            trial = _after_step(w, share, step)
+            left = _residual_size(trial, walk, linear, contact, patterns)
+            if left <= (1.0 - decrease * share) * before:
+                break
 
 
 def evaluate_2d(

@@ -20,6 +20,7 @@ from scipy import linalg
 from ...util.numba_options import INNER_KERNEL, KERNEL
 from ..linear.array_copy import copy_vector
 from ..linear.contact_flexibility import seen_by
+from ..linear.row_products import subtract_row
 from ..linear.woodbury import bodies_of
 from ..model import ReducedModel
 from ..policy import DEFLATION_UNKNOWNS
@@ -141,7 +142,8 @@ def _galerkin_matrix(along, C, Z):
     E = np.eye(q * K)
     # cosines of a harmonic, then its sines
     forces = np.empty((2 * a, q * K))
-    left = np.empty((2 * q, 2 * a))
+    # rows of zeros up to a multiple of four, or BLAS takes a third longer
+    left = np.zeros((-(-2 * q // 4) * 4, 2 * a))
     for h in range(along.shape[0]):
         c = max(2 * h - 1, 0)
         _forces_of_motions(C, Z, c, forces[:a])
@@ -163,7 +165,7 @@ def _galerkin_matrix(along, C, Z):
     return E
 
 
-@njit(**INNER_KERNEL, fastmath={"contract", "reassoc"})
+@njit(_nrt=False, **INNER_KERNEL)
 def _forces_of_motions(C, Z, k, out):
     """out (a, qK) becomes coefficient k of the forces C (nodes, dK, dK) by each coefficient of the
     motions Z (a, q).
@@ -174,13 +176,30 @@ def _forces_of_motions(C, Z, k, out):
     for node in range(C.shape[0]):
         for b in range(d):
             rates = C[node, b * K + k]
-            force = out[node * d + b]
-            force[:] = 0.0
             for j in range(q):
-                for e in range(d):
-                    moved = Z[node * d + e, j]
-                    for l in range(K):
-                        force[j * K + l] += moved * rates[e * K + l]
+                force = out[node * d + b, j * K : (j + 1) * K]
+                if d == 3:
+                    _combine_rates(rates, Z[3 * node : 3 * node + 3, j], force)
+                else:
+                    force[:] = 0.0
+                    for e in range(d):
+                        subtract_row(rates[e * K : (e + 1) * K], -Z[node * d + e, j], force)
+
+
+@njit(_nrt=False, fastmath={"contract", "reassoc"}, **INNER_KERNEL)
+def _combine_rates(rates, motion, force):
+    """force (K,) by the motion (3,) of a node, from its rates (3K,): in one pass, which takes half
+    of the time of three.
+    """
+    K = force.size
+    normal = motion[0]
+    first = motion[1]
+    second = motion[2]
+    by_normal = rates[:K]
+    by_first = rates[K : 2 * K]
+    by_second = rates[2 * K :]
+    for l in range(K):
+        force[l] = normal * by_normal[l] + first * by_first[l] + second * by_second[l]
 
 
 @njit(**INNER_KERNEL)

@@ -1,4 +1,7 @@
-"""LU factors for compiled loops, small and large; LAPACK's calls take longer than a tiny matrix."""
+"""LU factors for compiled loops, small and large; LAPACK's calls take longer than a tiny matrix.
+
+Inner loops run over slices from 0 on, see `bladefem.hbm.linear.row_products`.
+"""
 
 from __future__ import annotations
 
@@ -6,18 +9,19 @@ import numpy as np
 from numba import njit
 
 from ...util.numba_options import INNER_KERNEL, KERNEL
+from ..linear.row_products import ROWS_AT_ONCE, four_products, row_product, subtract_row
 
 # columns of a block
 BLOCK_COLUMNS = 32
 
 
-@njit(**KERNEL)
+@njit(_nrt=False, **KERNEL)
 def factorise_small(M, pivots):
     """LU factors in place with partial pivoting; False where a pivot is zero."""
     return _eliminate_columns(M, pivots, 0, M.shape[0])
 
 
-@njit(**INNER_KERNEL)
+@njit(_nrt=False, **INNER_KERNEL)
 def _eliminate_columns(M, pivots, low, high):
     """Columns low to high of such factors, rows exchanged as a whole; False where a pivot is
     zero.
@@ -38,9 +42,16 @@ def _eliminate_columns(M, pivots, low, high):
             factor = M[i, k] / M[k, k]
             M[i, k] = factor
             if factor != 0.0:
-                for j in range(k + 1, high):
-                    M[i, j] -= factor * M[k, j]
+                subtract_row(M[k, k + 1 : high], factor, M[i, k + 1 : high])
     return True
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def _eliminate_rows(M, low, high):
+    """Right of the factors of columns low to high, their rows."""
+    for k in range(low, high):
+        for i in range(k + 1, high):
+            subtract_row(M[k, high:], M[i, k], M[i, high:])
 
 
 @njit(**KERNEL)
@@ -53,12 +64,8 @@ def factorise_large(M, pivots):
         high = min(low + BLOCK_COLUMNS, size)
         if not _eliminate_columns(M, pivots, low, high):
             return False
-        for k in range(low, high if high < size else low):
-            for i in range(k + 1, high):
-                factor = M[i, k]
-                for j in range(high, size):
-                    M[i, j] -= factor * M[k, j]
         if high < size:
+            _eliminate_rows(M, low, high)
             left = np.ascontiguousarray(M[high:, low:high])
             right = np.ascontiguousarray(M[low:high, high:])
             _subtract_matrix(np.dot(left, right), M[high:, high:])
@@ -73,22 +80,39 @@ def _subtract_matrix(part, target):
             target[i, j] -= part[i, j]
 
 
-# the order of the sums is free, so that they are vectorised: in order, each product waits for the
-# one before
-@njit(fastmath={"reassoc", "contract"}, **KERNEL)
+@njit(_nrt=False, fastmath={"contract"}, **KERNEL)
 def back_substitute(M, pivots, x):
     """x becomes M^-1 x."""
     size = M.shape[0]
     for k in range(size):
         if pivots[k] != k:
             x[k], x[pivots[k]] = x[pivots[k]], x[k]
-    for i in range(size):
-        total = 0.0
-        for j in range(i):
-            total += M[i, j] * x[j]
-        x[i] -= total
-    for i in range(size - 1, -1, -1):
-        total = 0.0
-        for j in range(i + 1, size):
-            total += M[i, j] * x[j]
-        x[i] = (x[i] - total) / M[i, i]
+    for low in range(0, size, ROWS_AT_ONCE):
+        high = min(low + ROWS_AT_ONCE, size)
+        _subtract_products(M[low:high], 0, x[:low], x[low:high])
+        for i in range(low, high):
+            for j in range(low, i):
+                x[i] -= M[i, j] * x[j]
+    for high in range(size, 0, -ROWS_AT_ONCE):
+        low = max(high - ROWS_AT_ONCE, 0)
+        _subtract_products(M[low:high], high, x[high:], x[low:high])
+        for i in range(high - 1, low - 1, -1):
+            for j in range(i + 1, high):
+                x[i] -= M[i, j] * x[j]
+            x[i] /= M[i, i]
+
+
+@njit(_nrt=False, **INNER_KERNEL)
+def _subtract_products(rows, start, y, target):
+    """target (n,) loses the products of rows (n, size) with y (k,), k of their columns from a first
+    one on; n up to ROWS_AT_ONCE.
+    """
+    if target.size < ROWS_AT_ONCE:
+        for i in range(target.size):
+            target[i] -= row_product(rows[i, start : start + y.size], y)
+        return
+    first, second, third, fourth = four_products(rows, start, y)
+    target[0] -= first
+    target[1] -= second
+    target[2] -= third
+    target[3] -= fourth
