@@ -29,7 +29,10 @@ from .model import Damping, ReducedModel
 from .response import response
 from .ring_march import march_ring, state_of_solution
 from .sector_modes import sector_modes
-from .solve import solve
+from .sensitivity import sensitivities
+from .solution import Solution
+from .solve import as_solution, solve
+from .solver.fallback import Attempt
 from .solver.newton import newton
 from .solver.newton_krylov import iterative_inverse
 from .solver.residual import Balance, evaluate_balance, linearise_balance, start_in_stick
@@ -58,14 +61,19 @@ def compile_in_parallel() -> int:
 
 
 def compile_later() -> None:
-    """What the main job does not call: 1-D elements, and marches with a layer that stiffens."""
+    """What the main job does not call: 1-D elements, points of small models whose dampers cannot
+    walk, and marches with a layer that stiffens.
+    """
     compile_1d()
+    list(response(_plane_model(), [1.0, 1.1], 2, 64))
     plane = replace(_plane_model(), decay=np.ones(1))
     march_ring(plane, state_of_solution(plane, solve(plane, 1.0, 2, 64)), 1)
 
 
 def compile_1d() -> None:
-    """Kernels of 1-D elements: sampled and with transitions located, compiled points and Newton."""
+    """Kernels of 1-D elements: sampled and with transitions located, compiled points and Newton,
+    and steps of a path.
+    """
     line = _line_model()
     for samples in (64, 0):
         balance = Balance(line, condense(line, 1.0, 2), samples)
@@ -74,30 +82,32 @@ def compile_1d() -> None:
     point = solve(line, 1.0, 2, 64)
     truncation_indicator(line, [point], 5)
     list(response(line, [1.0, 1.1], 2, 64))
+    sensitivities(line, point, ["omega"])
 
 
 def compile_2d() -> None:
     """Kernels of 2-D elements with the derivative in single precision, as Newton takes it; then all
-    that solves, measures and judges a point, and what a damper that walks adds. By then
-    `compile_linear` has left the linear part on disk.
+    that solves, measures and judges a point, what a damper that walks adds, and what judges
+    resonances in time. By then `compile_linear` has left the linear part on disk.
     """
     evaluate(_plane_model().elements, np.full((1, 3, 5), 0.1), 64, precision="single")
     for force in (0.5, 1.0, 2.0):
         plane = replace(_plane_model(), excitation={1: np.full(1, force)})
-        points = list(response(plane, [1.0, 1.1], 2, 64))
-    truncation_indicator(plane, points, 5)
-    stability_verdict(plane, points[-1])
+        point = _plain_point(plane)
+    truncation_indicator(plane, [point], 5)
+    stability_verdict(plane, point)
     free = _free_model()
     balance = Balance(free, condense(free, 1.0, 2), 64)
-    balance = replace(balance, walk=tangential_motions(free, balance.linear.B))
+    balance = replace(balance, walk=tangential_motions(free))
     w = start_in_stick(balance)
     linearise_balance(balance, evaluate_balance(balance, w, "single"))
+    march_ring(plane, state_of_solution(plane, point), 1)
 
 
 def compile_linear() -> None:
     """The linear part and iterations for many unknowns; then the kernels of 2-D elements with the
     derivative in double precision, as sensitivities take it: by then `compile_2d` has left what
-    both share on disk; last what judges resonances in time.
+    both share on disk; last the steps of a path.
     """
     plane = _plane_model()
     # its flexibility without springs is a kernel of its own
@@ -108,11 +118,19 @@ def compile_linear() -> None:
     )
     inverse(np.ones((3, 5)), 1e-6)
     evaluate(plane.elements, np.full((1, 3, 5), 0.1), 64)
-    point = solve(plane, 1.0, 2, 64)
-    march_ring(plane, state_of_solution(plane, point), 1)
+    point = _plain_point(plane)
     # the closer look of a verdict: `compile_2d` has the first one, in single precision
     contacts, nodes = linearised_contacts(plane, point, sector_modes(plane), 64)
     flow_map(contacts, nodes, 2 * np.pi / 64, 1)
+    # slopes by the same kernel
+    sensitivities(plane, point, ["omega"])
+
+
+def _plain_point(model: ReducedModel) -> Solution:
+    """A point by the way that models take which are not small."""
+    balance = Balance(model, condense(model, 1.0, 2), 64)
+    end = newton(balance, start_in_stick(balance), merit="residual")
+    return as_solution(balance, Attempt("newton", end), end.iterations, end.reason)
 
 
 def _line_model() -> ReducedModel:

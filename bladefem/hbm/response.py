@@ -81,13 +81,14 @@ def _at_once(
 
     Both end where the other way is better, or where Newton needs more than a good start.
     """
-    # whatever the harmonics: the check of many frequencies would be for nothing, point after point
-    if not compiles_points(model, 1):
+    sticks = options.frugal and (not last or all_stick(last[-1]))
+    # points that all stick have few harmonics; else the check of many frequencies would be for
+    # nothing, point after point
+    if not compiles_points(model, 1 if sticks else H):
         return []
     for omega in omegas:
         check_point(model, omega, H, samples)
-    sticks = not last or all_stick(last[-1])
-    found = leading_stuck_solutions(model, omegas, H) if options.frugal and sticks else []
+    found = leading_stuck_solutions(model, omegas, H) if sticks else []
     return found or solve_along(model, np.array(omegas), H, samples, last, options)
 
 

@@ -20,7 +20,7 @@ from .parameter_derivatives import (
     residual_rate_of_bodies,
 )
 from .solution import Solution, at_probes, blade_motion
-from .solver.frequency_slope import frequency_slope
+from .solver.path_compiled import frequency_slope
 from .solver.residual import (
     Balance,
     Inverse,

@@ -15,7 +15,7 @@ from bladefem.hbm.linear.bodies import (
     port_motion,
     receptance_block,
 )
-from bladefem.hbm.linear.mean_motion import unheld_mean_motions, with_springs
+from bladefem.hbm.linear.mean_motion import motions_without_stiffness, with_springs
 from bladefem.hbm.solution import Work, blade_motion
 
 
@@ -52,7 +52,7 @@ def plain_condense(model, omega, H):
         G += receptance_block(
             damper, modal_flexibility(damper, orders), damper.contact, damper.contact
         )
-    B, g, _ = unheld_mean_motions(model, springs)
+    B, g, _ = motions_without_stiffness(model)
     both = np.concatenate([G, free[:, :, None]], axis=2)
     solved = np.linalg.solve(G * springs + np.eye(len(springs)), both)
     A = solved[:, :, :-1].copy()

@@ -51,7 +51,7 @@ def walking(nodes=2):
     """
     model = rubbing(nodes)
     balance = Balance(model, condense(model, 1.1, 3), SAMPLES)
-    balance = replace(balance, walk=newton.tangential_motions(model, balance.linear.B))
+    balance = replace(balance, walk=newton.tangential_motions(model))
     assert balance.walk.shape == (2 * nodes, 2)
     w = np.random.default_rng(3).normal(size=(nodes, 2, 7))
     return balance, w

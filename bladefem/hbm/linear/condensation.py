@@ -24,7 +24,7 @@ from .bodies import gyroscopic_part, modal_flexibility, rigid_modes
 from .circulation import joined_circulation, mean_modal_flexibility, with_circulation
 from .condensation_compiled import linear_part, unsprung_flexibility
 from .contact_flexibility import form_matrices
-from .mean_motion import unheld_mean_motions
+from .mean_motion import motions_without_stiffness
 from .packed_bodies import Bodies, prepared_bodies
 
 # distance to a frequency at which a free damper circles, and by how much gyroscopic forces are
@@ -91,12 +91,7 @@ def condense(
     """
     springs = model.springs.ravel()
     bodies = prepared_bodies(model, harmonics)
-    B, g, rigid = model.once("rigid motions", lambda: unheld_mean_motions(model, springs))
-    # the mean displacements have no part in the balance
-    if not model.coupled:
-        B = B[:, :0]
-        g = g[:0]
-        rigid = rigid[:, :0]
+    B, g, rigid = motions_without_stiffness(model)
     if model.circulatory:
         bodies = with_circulation(bodies, model, omega, harmonics)
     bodies = _beside_circling(model, bodies, omega, harmonics)

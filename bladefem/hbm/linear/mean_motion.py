@@ -17,10 +17,18 @@ UNRESISTED_SHARE = 1e-12
 REGULARISATION = 5e-8
 
 
-def unheld_mean_motions(
-    model: ReducedModel, springs: np.ndarray
+def motions_without_stiffness(
+    model: ReducedModel,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """B (m, r), g (r,) and rigid (r0, r) of `Linear`, which do not depend on the frequency."""
+    """B (m, r), g (r,) and rigid (r0, r) of `Linear`, which do not depend on the frequency; none
+    where the mean displacements have no part in the balance.
+    """
+    B, g, rigid = model.once("rigid motions", lambda: _unheld_motions(model))
+    return (B, g, rigid) if model.coupled else (B[:, :0], g[:0], rigid[:, :0])
+
+
+def _unheld_motions(model: ReducedModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    springs = model.springs.ravel()
     if model.damper is None and model.side(0).omega.min(initial=1.0) > 0:
         return np.zeros((len(springs), 0)), np.zeros(0), np.zeros((0, 0))
     blades = model.blades(0)

@@ -18,7 +18,7 @@ from ..model import ReducedModel
 from ..solver.deflation import common_motions
 from .bodies import Stack
 from .common_basis import CommonBasis, common_basis
-from .mean_motion import unheld_mean_motions, with_springs
+from .mean_motion import motions_without_stiffness, with_springs
 from .woodbury import bodies_of, frequency_independent_parts
 
 
@@ -159,15 +159,12 @@ def _mean_parts(
     residual flexibility of harmonic 0 and what the excitation does there.
     """
     springs = model.springs.ravel()
-    B, g, rigid = model.once("rigid motions", lambda: unheld_mean_motions(model, springs))
+    B, g, rigid = motions_without_stiffness(model)
     still = np.flatnonzero(blades.omega[0] == 0)
     mean = _mean_flexibility(body, pushed, (springs, B, g))
     # the mean displacements have no part in the balance
     if not model.coupled:
         mean = tuple(np.zeros_like(part) for part in mean)
-        B = B[:, :0]
-        g = g[:0]
-        rigid = rigid[:, :0]
     return *mean, np.ascontiguousarray(B), g, np.ascontiguousarray(rigid[: len(still)]), still
 
 

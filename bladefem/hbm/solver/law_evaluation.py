@@ -10,15 +10,17 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+from numba import njit, types
+from numba.extending import overload
 
 from ...friction.kernel_1d import jenkins_batch
 from ...friction.kernel_1d_exact import exact_batch
 from ...friction.simd.kernel_2d import disc_batch
 from .balance_residual import balance_residual
 
-# marched until the force of an element is periodic, at most
-PERIODS = 4000
+# marched until the force of an element is periodic, at most; no Python number, for whose value
+# kernels would be compiled once more
+PERIODS = np.int64(4000)
 
 
 class Room(NamedTuple):
@@ -60,31 +62,50 @@ def evaluate(w, d, linear, contact, patterns, room):
     """Fill the room at displacements w (m, K), of which d a node are in the balance; returns the
     error as `balance_residual` does.
     """
-    load, base, nodes, tab, brackets, preload, offset = contact
-    n, a, K = room.full.shape
+    preload, offset = contact[5:]
+    a = room.full.shape[1]
     for i in range(w.shape[0]):
-        for k in range(K):
+        for k in range(w.shape[1]):
             room.full[i // d, a - d + i % d, k] = w[i, k]
         room.full[i // d, a - d + i % d, 0] += offset[i]
-    if patterns is None:
-        if brackets:
-            room.F[:] = 0.0
-            room.J[:] = 0.0
-            exact_batch(room.full, base, nodes, brackets, room.F, room.J, room.shares, room.cycles)
-        else:
-            jenkins_batch(room.full, load, nodes, tab, room.F, room.J, room.shares)
-    else:
-        disc_batch(
-            room.full,
-            np.zeros((n, 2)),
-            load,
-            nodes,
-            tab,
-            patterns,
-            PERIODS,
-            room.F,
-            room.J.reshape((n, a, K, a * K)),
-            room.shares,
-            room.cycles,
-        )
+    _law_forces(contact, patterns, room)
     return balance_residual(w, linear, preload, room.F, room.p, room.residual)
+
+
+def _law_forces(contact, patterns, room):
+    """Fill forces, their derivative, shares and periods of a room from its motion."""
+    raise NotImplementedError("for compiled loops only")
+
+
+# only the law of the type is compiled, where a branch would compile both
+@overload(_law_forces, jit_options={"cache": True, "error_model": "numpy"})
+def _choose_law(contact, patterns, room):
+    return _forces_1d if isinstance(patterns, types.NoneType) else _forces_2d
+
+
+def _forces_1d(contact, patterns, room):
+    load, base, nodes, tab, brackets, _, _ = contact
+    if brackets:
+        room.F[:] = 0.0
+        room.J[:] = 0.0
+        exact_batch(room.full, base, nodes, brackets, room.F, room.J, room.shares, room.cycles)
+    else:
+        jenkins_batch(room.full, load, nodes, tab, room.F, room.J, room.shares)
+
+
+def _forces_2d(contact, patterns, room):
+    load, _, nodes, tab, _, _, _ = contact
+    n, a, K = room.full.shape
+    disc_batch(
+        room.full,
+        np.zeros((n, 2)),
+        load,
+        nodes,
+        tab,
+        patterns,
+        PERIODS,
+        room.F,
+        room.J.reshape((n, a, K, a * K)),
+        room.shares,
+        room.cycles,
+    )

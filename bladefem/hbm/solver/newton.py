@@ -138,7 +138,7 @@ def newton(
             take next, which does not depend on how the equations are scaled (Deuflhard, Newton
             Methods for Nonlinear Problems, 2004, Sect. 3.3), or "residual".
     """
-    if balance.walk is None and may_walk(balance):
+    if balance.walk is None and may_walk(balance.model):
         return _newton_of_free_damper(balance, w, options, merit, walks)
     end = newton_as_given(balance, w, options, merit)
     fault = walk_fault(balance, end.state) if end.converged else ""
@@ -210,7 +210,7 @@ def _likely_starts(balance: Balance, w: np.ndarray) -> Iterator[_Start]:
     if motions is not None:
         variant = replace(walking, walk=motions)
         found.append((rest.error, _Start(variant, without_step(variant, w))))
-    every = replace(walking, walk=tangential_motions(balance.model, balance.linear.B))
+    every = replace(walking, walk=tangential_motions(balance.model))
     going = evaluate_balance(every, w, "single")
     motions = walking_motions(balance, going.forces.shares)
     if motions is not None and np.isfinite(going.error):

@@ -1,5 +1,6 @@
 """A whole step of a path in the frequency in one compiled call, for small models: Newton back to
-the path on the plane across its direction, the direction beyond, works and states.
+the path on the plane across its direction, the direction beyond, works and states. The slope of a
+solved point is a step of no length.
 
 The plain way of `bladefem.hbm.solver.arclength` is taken where dampers walk, and wherever a step
 does not end well for another reason than its length.
@@ -16,11 +17,12 @@ from ...util.newton import Outcome, outcome_reason
 from ...util.numba_options import INNER_KERNEL, KERNEL
 from ..linear.condensation_compiled import linear_part
 from ..linear.contact_flexibility import form_matrices
+from ..linear.packed_bodies import Bodies
 from ..model import ReducedModel
 from ..point_measures import MEASURES, count_states, measure_point
 from ..policy import DETERMINANT_UNKNOWNS, uses_compiled_slope
 from ..solution import Solution
-from .frequency_slope import residual_rate
+from .frequency_rate import probe_rate, residual_rate
 from .law_evaluation import empty_room, evaluate
 from .newton_compiled import (
     BY_LU,
@@ -37,6 +39,8 @@ from .residual import STEP_ACCURACY, STICKING_FORCE_SHARE
 from .small_balance import SmallBalance, small_balance
 from .walking import CARRIED_SHARE, rest_fault
 
+# relative accuracy of the slope of a point where it is solved for by iterations
+SLOPE_ACCURACY = 1e-9
 # name of the way in a record
 PATH_FOLLOWING = "path following"
 
@@ -47,6 +51,8 @@ class CompiledPath:
 
     model: ReducedModel
     balance: SmallBalance
+    # the bodies that nothing but contact forces moves
+    unexcited: Bodies
     # nodes, directions, real coefficients
     shape: tuple[int, int, int]
     samples: int
@@ -67,8 +73,12 @@ def compiled_path(model: ReducedModel, H: int, samples: int) -> CompiledPath | N
     """Steps of this model are compiled; None where they are not."""
     if not uses_compiled_slope(model, H):
         return None
-    shape = (*model.springs.shape, 2 * H + 1)
-    return CompiledPath(model, small_balance(model, H, samples), shape, samples)
+    balance = small_balance(model, H, samples)
+    bodies = balance.bodies
+    unexcited = bodies._replace(
+        push=np.zeros_like(bodies.push), straight=np.zeros_like(bodies.straight)
+    )
+    return CompiledPath(model, balance, unexcited, (*model.springs.shape, 2 * H + 1), samples)
 
 
 def correct_step(
@@ -99,16 +109,18 @@ def correct_step(
     across[:, 0] *= mean_weight
     w = np.array(guess[1], dtype=float).reshape(n * d, K)
     try:
-        x, code, steps, error, slope, sign, f, probe, shares, measures, periodic = _correct_step(
+        end, slope, _, record = _correct_step(
             guess[0],
             w,
             across,
             direction[1],
             *scales,
             *path.balance,
+            path.unexcited,
             d,
             d - path.model.elements.tangents,
             tolerance,
+            STEP_ACCURACY,
             corrections,
             signed,
         )
@@ -117,13 +129,14 @@ def correct_step(
     except ZeroDivisionError:
         # a resonance without damping
         return None
+    x, code, steps, error, sign, periodic = end
+    f, probe, shares, measures = record
     if code != CONVERGED:
         return outcome_reason(Outcome(code), error, steps)
     if not periodic:
         return None
-    bodies = path.balance.bodies
     carried = measures[2]
-    fault = rest_fault(path.model, bodies.B, shares, carried) if carried > CARRIED_SHARE else ""
+    fault = rest_fault(path.model, shares, carried) if carried > CARRIED_SHARE else ""
     if fault:
         return fault
     point = point_solution(
@@ -141,6 +154,39 @@ def correct_step(
         PATH_FOLLOWING,
     )
     return CompiledEnd(point, slope.reshape(path.shape), sign)
+
+
+def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, np.ndarray] | None:
+    """Derivatives of a solved point with the circular frequency: (n, d, K) of the displacements [m
+    s], and (H+1, probes) of the complex amplitudes at the probes [m s]; None if steps are not
+    compiled, where a damper walks, or where the derivative is singular.
+    """
+    path = compiled_path(model, point.harmonics, point.samples) if point.walk is None else None
+    if path is None:
+        return None
+    n, d, K = path.shape
+    w = np.array(point.w, dtype=float).reshape(n * d, K)
+    try:
+        _, slope, probe, _ = _correct_step(
+            point.omega,
+            w,
+            np.zeros(w.shape),
+            1.0,
+            1.0,
+            1.0,
+            *path.balance,
+            path.unexcited,
+            d,
+            d - model.elements.tangents,
+            # whatever the residual
+            np.inf,
+            SLOPE_ACCURACY,
+            0,
+            False,
+        )
+    except (ZeroDivisionError, np.linalg.LinAlgError):
+        return None
+    return (slope.reshape(path.shape), probe) if np.isfinite(slope).all() else None
 
 
 @njit(**INNER_KERNEL)
@@ -179,9 +225,11 @@ def _correct_step(
     springs,
     contact,
     patterns,
+    unexcited,
     d,
     normals,
     tolerance,
+    accuracy,
     corrections,
     signed,
 ):
@@ -189,12 +237,15 @@ def _correct_step(
 
     Args:
         across: (m, K) direction in displacements over `size`, times the weight of each.
+        unexcited: the bodies that nothing but contact forces moves.
         normals: normal directions in the balance, 0 or 1 a node.
+        accuracy: of linear systems that are solved by iterations.
 
     Returns:
-        x, how the loop ended, steps, error, slope (m, K), sign of the determinant, forces,
-        probes, shares (n, 3) of stick, slip and separation, what `measure_point` gives, and
-        whether the forces are periodic.
+        x, how the loop ended, steps, error, sign of the determinant, whether the forces are
+        periodic; derivatives with the frequency of the displacements (m, K) and probes (H+1, p);
+        forces, probes, shares (n, 3) of stick, slip and separation, and what `measure_point`
+        gives. Those of a point that did not converge mean nothing.
     """
     m, K = w.shape
     first = w.copy()
@@ -205,10 +256,10 @@ def _correct_step(
     moved = np.empty((m, K))
     f = np.empty((m // d, d, K))
     probe = np.empty(bodies.straight.shape, np.complex128)
+    rate_of_probe = np.empty(bodies.straight.shape, np.complex128)
     measures = np.zeros(MEASURES)
     sign = 0.0
     steps = 0
-    accuracy = STEP_ACCURACY
     while True:
         modal, linear, free, _ = linear_part(x, bodies, springs, K // 2)
         error = evaluate(w, d, linear, contact, patterns, room)
@@ -216,15 +267,19 @@ def _correct_step(
         if code != SEARCHING and code != CONVERGED:
             break
         nodes, C, few, level = linearise_nodes(room.J, linear, d, STICKING_FORCE_SHARE)
-        _, rate = residual_rate(x, bodies, modal, linear, contact[5], room.F)
+        rates, rate = residual_rate(x, bodies, modal, linear, contact[5], room.F)
         factors = newton_step(
             rate, accuracy, d, nodes, C, linear.flex, few, no_factors(), level, along
         )
         # where iterations did not converge once they mostly do not
         accuracy = 0.0 if factors[1].size else accuracy
         if code == CONVERGED:
+            along *= -1.0
             if signed:
                 sign = _determinant_sign(few, C)
+            rate_of_probe = probe_rate(
+                bodies, unexcited, modal, free, room.J, springs, rates, along, d
+            )
             measure_point(
                 x,
                 bodies,
@@ -253,6 +308,6 @@ def _correct_step(
             for k in range(K):
                 w[i, k] -= back[i, k] + change * along[i, k]
         steps += 1
-    along *= -1.0
     periodic = room.cycles.min() >= 0
-    return x, code, steps, error, along, sign, f, probe, room.shares, measures, periodic
+    end = x, code, steps, error, sign, periodic
+    return end, along, rate_of_probe, (f, probe, room.shares, measures)

@@ -26,7 +26,7 @@ from .newton import SHORTEST_STEP_SHARE, Options, route_of, solvers_of
 from .newton_compiled import CONVERGED, compiled_newton
 from .residual import STICKING_FORCE_SHARE
 from .small_balance import small_balance
-from .walking import CARRIED_SHARE, can_walk
+from .walking import CARRIED_SHARE, may_walk
 
 # steps of Newton with two tangents, after which the fallback chain begins, with the same start
 MOST_STEPS_2D = 12
@@ -114,13 +114,10 @@ def _solve_points(
     """The first frequencies, as long as they converge; `known` and `chained` as `_compiled_points`
     takes them.
     """
-    if not uses_compiled_point(model, H):
+    if not compiles_points(model, H):
         return []
     one_tangent = model.elements.tangents == 1
     small = small_balance(model, H, samples)
-    # where it walks, all steps would be for nothing
-    if not one_tangent and can_walk(model, small.bodies.B):
-        return []
     (n, d), K = model.springs.shape, 2 * H + 1
     at = np.zeros(PREDICTOR_POINTS)
     begin = np.zeros((PREDICTOR_POINTS, n * d, K))
@@ -280,5 +277,7 @@ def _compiled_points(
 
 
 def compiles_points(model: ReducedModel, H: int) -> bool:
-    """True if points of the model are compiled as a whole."""
-    return uses_compiled_point(model, H)
+    """True if points of the model are compiled as a whole; with two tangents not where its damper
+    may walk, since all steps would be for nothing where it does.
+    """
+    return uses_compiled_point(model, H) and (model.elements.tangents == 1 or not may_walk(model))

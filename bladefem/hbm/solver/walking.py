@@ -16,7 +16,7 @@ import numpy as np
 
 from ...friction.law_table import forgets_position
 from ..linear.condensation import with_mean
-from ..linear.mean_motion import with_springs
+from ..linear.mean_motion import motions_without_stiffness, with_springs
 from ..model import ReducedModel
 from .residual import Balance, State, walk_steps
 
@@ -34,14 +34,15 @@ HOLDING_SHARE = 1e-3
 WALK_SAMPLES = 64
 
 
-def tangential_motions(model: ReducedModel, B: np.ndarray) -> np.ndarray:
-    """(m, z) motions without stiffness that no normal contact spring resists, scaled as the columns
-    of B (m, r) are: b^T K b = 1.
+def tangential_motions(model: ReducedModel) -> np.ndarray:
+    """(m, z) motions without stiffness that no normal contact spring resists, scaled to b^T K b =
+    1.
     """
-    return model.once("tangential motions", lambda: _tangential_motions(model, B))
+    return model.once("tangential motions", lambda: _tangential_motions(model))
 
 
-def _tangential_motions(model: ReducedModel, B: np.ndarray) -> np.ndarray:
+def _tangential_motions(model: ReducedModel) -> np.ndarray:
+    B, _, _ = motions_without_stiffness(model)
     n, d = model.springs.shape
     first = d - model.elements.tangents
     normal = np.zeros((n, d), dtype=bool)
@@ -72,27 +73,20 @@ def walking_motions(balance: Balance, shares: np.ndarray) -> np.ndarray | None:
     """(m, z) motions along which every contact slips, from the shares (n, 3) of stick, slip and
     separation; None where there is none.
     """
-    return _walking_motions(balance.model, balance.linear.B, shares)
+    return _walking_motions(balance.model, shares)
 
 
-def _walking_motions(model: ReducedModel, B: np.ndarray, shares: np.ndarray) -> np.ndarray | None:
-    free = tangential_motions(model, B)
+def _walking_motions(model: ReducedModel, shares: np.ndarray) -> np.ndarray | None:
+    free = tangential_motions(model)
     sticks = (shares[:, 1] == 0.0) & (shares[:, 2] == 0.0)
     rows = np.repeat(sticks, model.directions)
     found = unresisted(free, model.springs.ravel(), rows, UNRESISTED_STICK)
     return found if found.shape[1] else None
 
 
-def may_walk(balance: Balance) -> bool:
+def may_walk(model: ReducedModel) -> bool:
     """True if the damper has a motion that only friction resists, by laws that let it walk."""
-    return can_walk(balance.model, balance.linear.B)
-
-
-def can_walk(model: ReducedModel, B: np.ndarray) -> bool:
-    """The same from the motions without stiffness B (m, r)."""
-    if not B.shape[1] or not forgets_position(model.elements):
-        return False
-    return tangential_motions(model, B).shape[1] > 0
+    return forgets_position(model.elements) and tangential_motions(model).shape[1] > 0
 
 
 def walk_fault(balance: Balance, state: State) -> str:
@@ -103,7 +97,7 @@ def walk_fault(balance: Balance, state: State) -> str:
         return ""
     if balance.walk is None:
         carried = carried_share(balance, state)
-        return rest_fault(balance.model, balance.linear.B, state.forces.shares, carried)
+        return rest_fault(balance.model, state.forces.shares, carried)
     shares = state.forces.shares
     sticks = (shares[:, 1] == 0.0) & (shares[:, 2] == 0.0)
     moved = abs(balance.walk).reshape(*balance.model.springs.shape, -1).sum(axis=(1, 2))
@@ -112,15 +106,14 @@ def walk_fault(balance: Balance, state: State) -> str:
     return ""
 
 
-def rest_fault(model: ReducedModel, B: np.ndarray, shares: np.ndarray, carried: float) -> str:
+def rest_fault(model: ReducedModel, shares: np.ndarray, carried: float) -> str:
     """Why a damper does not rest at a solved state, or nothing.
 
     Args:
-        B: (m, r) motions without stiffness.
         shares: (n, 3) of stick, slip and separation.
         carried: as `carried_share` tells it.
     """
-    free = can_walk(model, B) and _walking_motions(model, B, shares) is not None
+    free = may_walk(model) and _walking_motions(model, shares) is not None
     if carried > (CARRIED_SHARE if free else CARRIED_SHARE_IN_STICK):
         return f"friction leaves {carried:.1e} of the contact forces on a damper that may walk"
     return ""

@@ -1,5 +1,4 @@
-"""How a small balance changes with the frequency, compiled: along a path, and at a
-solved point.
+"""Derivatives of a small balance with the frequency, compiled: along a path, and at a solved point.
 
 The same by `bladefem.hbm.parameter_derivatives` takes some forty calls of NumPy, which were two
 thirds of the time of a path and a quarter of that of a sweep with few contacts.
@@ -11,71 +10,32 @@ import numpy as np
 from numba import njit
 
 from ...util.numba_options import INNER_KERNEL, KERNEL
-from ..linear.condensation_compiled import linear_part, modal_motion
+from ..linear.condensation_compiled import modal_motion
 from ..linear.contact_flexibility import apply_flexibility
-from ..linear.packed_bodies import Bodies
-from ..model import ReducedModel
 from ..point_measures import complex_amplitude, motion_under_load
-from ..policy import uses_compiled_slope
-from ..solution import Solution
-from .law_evaluation import empty_room, evaluate
-from .newton_compiled import linearise_nodes, newton_step, no_factors
-from .residual import STICKING_FORCE_SHARE
-from .small_balance import small_balance
-
-# relative accuracy of derivatives where they are solved for by iterations
-SLOPE_ACCURACY = 1e-9
 
 
-def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, np.ndarray] | None:
-    """Derivatives of a solved point with the circular frequency: (n, d, K) of the displacements [m
-    s], and (H+1, probes) of the complex amplitudes at the probes [m s]; None if compiled points do
-    not apply, or the derivative is singular.
-    """
-    if point.walk is not None or not uses_compiled_slope(model, point.harmonics):
-        return None
-    small = small_balance(model, point.harmonics, point.samples)
-    n, d, K = point.w.shape
-    w = np.ascontiguousarray(point.w, dtype=float).reshape(n * d, K)
-    try:
-        slope, probe = _slope_at(point.omega, w, *small, _without_excitation(small.bodies), d)
-    except (ZeroDivisionError, np.linalg.LinAlgError):
-        return None
-    return slope.reshape(n, d, K), probe
-
-
-def _without_excitation(bodies: Bodies) -> Bodies:
-    """The bodies that nothing but contact forces moves."""
-    return bodies._replace(push=np.zeros_like(bodies.push), straight=np.zeros_like(bodies.straight))
-
-
-@njit(**KERNEL)
-def _slope_at(omega, w, bodies, springs, contact, patterns, unexcited, d):
-    """Derivatives with the frequency of the displacements (m, K) and probes (H+1, p) at a solved
-    point.
+@njit(**INNER_KERNEL)
+def probe_rate(bodies, unexcited, modal, free, J, springs, rates, slope, d):
+    """(H+1, p) derivatives of the amplitudes at the probes with the frequency.
 
     Args:
-        unexcited: the bodies without excitation.
+        unexcited: the bodies that nothing but contact forces moves.
+        J: (n, a, K, a, K) derivative of the forces, whose last d directions are those of the
+            balance.
+        rates: (H+1, M) derivatives of the modal amplitudes under constant contact forces.
+        slope: (m, K) derivative of the displacements.
     """
-    m, K = w.shape
-    modal, linear, free, _ = linear_part(omega, bodies, springs, K // 2)
-    room = empty_room(m, d, K, patterns)
-    evaluate(w, d, linear, contact, patterns, room)
-    nodes, C, few, level = linearise_nodes(room.J, linear, d, STICKING_FORCE_SHARE)
-    rates, rate = residual_rate(omega, bodies, modal, linear, contact[5], room.F)
-    slope = np.empty((m, K))
-    newton_step(rate, SLOPE_ACCURACY, d, nodes, C, linear.flex, few, no_factors(), level, slope)
-    slope *= -1.0
-    change = _force_change(room.J, slope, d)
-    probe = np.empty(bodies.straight.shape, np.complex128)
+    change = _force_change(J, slope, d)
+    out = np.empty(bodies.straight.shape, np.complex128)
     # the mean motion without contact forces does not change with the frequency
-    motion_under_load(unexcited, (modal, np.zeros_like(free)), change, slope, springs, probe)
-    for h in range(1, probe.shape[0]):
+    motion_under_load(unexcited, (modal, np.zeros_like(free)), change, slope, springs, out)
+    for h in range(1, out.shape[0]):
         shapes = bodies.probe[min(h, bodies.probe.shape[0] - 1)]
-        for a in range(probe.shape[1]):
+        for a in range(out.shape[1]):
             for k in range(rates.shape[1]):
-                probe[h, a] += shapes[a, k] * rates[h, k]
-    return slope, probe
+                out[h, a] += shapes[a, k] * rates[h, k]
+    return out
 
 
 @njit(**INNER_KERNEL)
