@@ -213,7 +213,7 @@ def test_a_sweep_without_compiled_points_checks_each_frequency_in_its_turn(monke
     monkeypatch.setattr(
         response_module, "check_point", lambda *arguments: checked.append(arguments)
     )
-    found = response(block(), [0.9, 1.0, -1.0], 3, 64)
+    found = response(block(damper=True), [1.1, 1.125, -1.0], 3, 64)
     assert next(found).converged and next(found).converged and not checked
     with pytest.raises(InputError, match=r"omega -1\.0: expected a positive"):
         next(found)

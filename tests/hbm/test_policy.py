@@ -39,9 +39,26 @@ def test_large_compiled_points_iterate():
     assert point.route == "compiled point, iterations"
 
 
-def test_elements_of_two_tangents_take_newton_with_numpy():
-    point = solve(SLIPPING, 0.9, 3, 64)
-    assert point.converged and point.route == "NumPy Newton, dense LU"
+def test_elements_of_two_tangents_are_compiled_in_small_models(monkeypatch):
+    """The same point by NumPy; and by NumPy alone where there are more unknowns, or a damper may
+    walk.
+    """
+    fast = solve(SLIPPING, 0.9, 3, 64)
+    assert fast.converged and fast.route == "compiled point, dense LU"
+    walking = solve(block(damper=True), 1.225, 3, 64)
+    assert walking.walk is not None and walking.route == "NumPy Newton, dense LU"
+    monkeypatch.setattr(policy, "COMPILED_POINT_UNKNOWNS_2D", fast.w.size - 1)
+    plain = solve(SLIPPING, 0.9, 3, 64)
+    assert plain.converged and plain.route == "NumPy Newton, dense LU"
+    assert plain.states == fast.states and plain.iterations == fast.iterations
+    for field in ("w", "f", "probe"):
+        expected = getattr(plain, field)
+        np.testing.assert_allclose(
+            getattr(fast, field), expected, rtol=0, atol=1e-8 * abs(expected).max()
+        )
+    for field in ("input", "damping", "friction", "dissipated"):
+        works = getattr(fast.work, field), getattr(plain.work, field)
+        assert works[0] == pytest.approx(works[1], rel=1e-7), field
 
 
 def test_where_every_contact_sticks_no_system_is_solved():

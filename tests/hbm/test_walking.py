@@ -156,7 +156,7 @@ def test_searches_without_fallbacks_try_the_two_likeliest_kinds(
 ):
     """A third one and springs on the mean took a third of the time of what was not found."""
     tried, held = [], []
-    balance = SimpleNamespace(walk=None)
+    balance = SimpleNamespace(walk=None, model=None)
 
     def failing(start, *_):
         tried.append(start)

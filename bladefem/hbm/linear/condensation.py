@@ -112,7 +112,7 @@ def _beside_circling(model: ReducedModel, bodies: Bodies, omega: float, harmonic
     A damper of any mass circles with twice the speed of the frame. Its flexibility is infinite
     there, while on its contacts it moves as it does next to that frequency.
     """
-    circling = model.once("circling", lambda: _circling_frequencies(model))
+    circling = circling_frequencies(model)
     ratios = omega * np.arange(1, harmonics + 1)[:, None] / circling
     hit = ratios[abs(ratios - 1) < CIRCLING_SHARE]
     if not len(hit):
@@ -123,8 +123,12 @@ def _beside_circling(model: ReducedModel, bodies: Bodies, omega: float, harmonic
     return bodies._replace(coupled=coupled)
 
 
-def _circling_frequencies(model: ReducedModel) -> np.ndarray:
+def circling_frequencies(model: ReducedModel) -> np.ndarray:
     """(k,) circular frequencies of a free damper's rigid motions by gyroscopic forces [rad/s]."""
+    return model.once("circling", lambda: _circling_frequencies(model))
+
+
+def _circling_frequencies(model: ReducedModel) -> np.ndarray:
     if isinstance(model.damper, RigidBody):
         _, coupled = rigid_modes(model.damper, model.rows)
     else:

@@ -15,6 +15,7 @@ from numba import njit
 
 from ...util.newton import Outcome, outcome_reason
 from ...util.numba_options import INNER_KERNEL, KERNEL
+from ..linear.condensation import circling_frequencies
 from ..linear.condensation_compiled import linear_part
 from ..linear.contact_flexibility import form_matrices
 from ..linear.packed_bodies import Bodies
@@ -71,7 +72,8 @@ class CompiledEnd:
 
 def compiled_path(model: ReducedModel, H: int, samples: int) -> CompiledPath | None:
     """Steps of this model are compiled; None where they are not."""
-    if not uses_compiled_slope(model, H):
+    # `condense` takes other bodies next to a frequency at which a damper circles
+    if not uses_compiled_slope(model, H) or len(circling_frequencies(model)):
         return None
     balance = small_balance(model, H, samples)
     bodies = balance.bodies
