@@ -80,7 +80,10 @@ def uses_compiled_point(model: ReducedModel, harmonics: int) -> bool:
     unknowns = dofs * (2 * harmonics + 1)
     if not _compiles_small(model, harmonics):
         return False
-    return model.elements.tangents == 1 or unknowns <= COMPILED_POINT_UNKNOWNS_2D
+    # with stiff layers that are split the step is lowered first, which the loop with two tangents
+    # does not do
+    few = unknowns <= COMPILED_POINT_UNKNOWNS_2D and model.series is None
+    return model.elements.tangents == 1 or few
 
 
 def uses_compiled_slope(model: ReducedModel, harmonics: int) -> bool:
