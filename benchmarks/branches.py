@@ -14,7 +14,7 @@ library sweeps once more with these forces; what it then finds is a motion of an
 history, and is counted apart.
 
 Seeds 0 to 200: none missed; one higher by another loading history (seed 93); no steady march in
-nine; five searches report something left open. CPU time 55 s for the library and 221 s for the
+nine; five searches report something left open. CPU time 37 s for the library and 229 s for the
 march.
 """
 
