@@ -387,3 +387,48 @@ def test_a_choice_for_a_fine_accuracy_begins_with_what_it_mostly_ends_at(monkeyp
     monkeypatch.setattr(resonance_choice, "sticks_safely", lambda model, point: True)
     resonance_choice.choose_at_peak(family, first, peak_with(1, 1.0), 1e-3)
     assert begun[-1].harmonics == 1
+
+
+@pytest.mark.parametrize(
+    ("omega", "height", "another"),
+    [
+        # the curve has fallen to a half there, and the maximum is far lower
+        (103.0, 0.6, True),
+        # it has moved as far, and is as high
+        (103.0, 0.9, False),
+        # it is as low, on the curve itself
+        (100.1, 0.6, False),
+    ],
+)
+def test_a_lower_maximum_far_away_is_another_one(omega, height, another):
+    """The curve of one mode of 0.87 % damping: 1/height^2 rises by 3 within 3 % of the frequency."""
+    slips = SimpleNamespace(states={"stick": 0, "slip": 16, "lift": 0, "open": 0})
+    peak = KnownPeak(1.0, 100.0, slips, bend=2 * 3.0 / 3.0**2)
+    assert peak_errors.fall_beside(peak, 0.03) == pytest.approx(0.5)
+    found = KnownPeak(height, omega, slips)
+    assert peak_errors._is_another_maximum(peak, found) is another
+    # a peak whose bend is not known says nothing of its surroundings
+    assert not peak_errors._is_another_maximum(replace(peak, bend=0.0), found)
+
+
+def test_a_judge_that_is_another_maximum_leaves_the_error_to_a_nearer_one(monkeypatch):
+    """As one that is not solved."""
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    settings = replace(first_for(family.modes), harmonics=3, samples=128, points=4)
+    slips = SimpleNamespace(states={"stick": 0, "slip": 16, "lift": 0, "open": 0})
+    peak = KnownPeak(1.0, 100.0, slips, bend=2 * 3.0 / 3.0**2)
+    judged = []
+
+    def peak_by(family, own, base, judge, accuracy):
+        judged.append(judge.harmonics)
+        if len(judged) == 1:
+            return KnownPeak(0.6, 103.0, slips)
+        return KnownPeak(0.98, 100.0, slips, peak.bend)
+
+    monkeypatch.setattr(peak_errors, "_judging_peak", peak_by)
+    monkeypatch.setattr(peak_errors, "peak_from", lambda *given, **named: peak)
+    monkeypatch.setattr(peak_errors, "truncation_indicator", lambda *given: np.zeros(1))
+    other = replace(settings, harmonics=15)
+    change, found = peak_errors._change_by(family, settings, peak, "harmonics", other, 0.02)
+    assert len(judged) == 2 and found is None
+    assert 0.02 < change.height < 0.2

@@ -69,6 +69,10 @@ MORE_POINTS = 4
 # of 5 % holds the frequency to 0.5 %
 SHIFT_WEIGHT = 5.0
 
+# relative fall, of a peak's curve at the frequency of another maximum and of that one's height,
+# from which on it is another one
+ANOTHER_FALL = 0.25
+
 
 @dataclass(frozen=True)
 class PeakErrors:
@@ -244,6 +248,8 @@ def _change_by(
             found = _judging_peak(family, own, base, judge, accuracy)
         except NotSolvedError:
             continue
+        if _is_another_maximum(base, found):
+            continue
         height = factor * abs(base.height / found.height - 1)
         richer = judge.harmonics > own.harmonics
         if name == "harmonics" and richer and height <= accuracy:
@@ -253,6 +259,19 @@ def _change_by(
         fall = max(fall_beside(base, shift), fall_beside(found, shift))
         return _Change(height, shift, fall), found if pair is pairs[0] else None
     return _Change(), None
+
+
+def _is_another_maximum(peak: Peak, found: Peak) -> bool:
+    """The search for the peak of a richer model has led down to another maximum of its response,
+    which tells nothing of this one.
+
+    Where the first point is not solved the search begins beside it: on the rippled top of a random
+    model (seed 73 of benchmarks/choice_random.py) it ended 3 % higher in frequency and 40 % lower
+    in height, and the choice with an error of 400 %.
+    """
+    fall = fall_beside(peak, abs(peak.vertex / found.vertex - 1))
+    lower = found.height < (1 - ANOTHER_FALL) * peak.height
+    return lower and np.isfinite(fall) and fall > ANOTHER_FALL
 
 
 def _height_beyond_judge(
