@@ -5,7 +5,7 @@ Four ways lead to the same solution, the cheapest that applies is taken:
 
 1. compiled point: linear part, Newton and works of a small model in one compiled call;
 2. compiled Newton: the same kernels one after the other, for more contacts or another start;
-3. NumPy Newton with a dense LU of the Jacobian (2-D elements and other friction laws, few
+3. NumPy Newton with a dense LU of the Jacobian (other 2-D elements and friction laws, few
 unknowns);
 4. NumPy Newton with iterations (conjugate residuals, then GMRES), dense LU where they fail.
 
@@ -39,8 +39,8 @@ ITERATIONS_THEN_LU = "iterations, then dense LU"
 # lost in the dense products, and BLAS on whole arrays is faster.
 COMPILED_POINT_DOFS = 200
 # Unknowns up to which slopes and the steps of a path are one compiled call: 3.5 times as fast with
-# sixty of them, a third faster with 400.
-COMPILED_SLOPE_UNKNOWNS = 1000
+# sixty of them, twice with 400; with 500 a slope takes longer than with NumPy.
+COMPILED_SLOPE_UNKNOWNS = 450
 # Unknowns of 2-D elements up to which a point is one compiled call.
 COMPILED_POINT_UNKNOWNS_2D = 300
 # Unknowns of 1-D elements up to which Newton is compiled: 3.3 times as fast as NumPy with one

@@ -67,7 +67,8 @@ def solve(
     lean = _stuck_throughout(model, omega, H, start) if options.frugal else None
     if lean is not None:
         return lean
-    first = solve_small(model, omega, H, samples, None if start is None else start.w, options)
+    near = None if start is None else start.w
+    first = solve_small(model, omega, H, samples, near, options, from_stick)
     if first is not None:
         return first
     balance = Balance(model, condense(model, omega, H), samples)

@@ -22,6 +22,12 @@ from bladefem.hbm.solver.path_compiled import compiled_path, frequency_slope
 SAME_PLACE = 1e-4
 # of the largest displacement, between a point of a path and that point solved again
 SAME_POINT = 1e-7
+# of points where contacts move
+ROUTES = {
+    "compiled point, dense LU",
+    "compiled point, iterations",
+    "compiled point, iterations then dense LU",
+}
 
 
 def gyroscopic():
@@ -81,6 +87,10 @@ def test_a_path_of_compiled_steps_is_that_of_plain_ones(name, monkeypatch):
         for point in path[1::4]:
             again = solve(model, point.value, H, samples, start=point.solution)
             assert again.converged and point.solution.states == again.states
+            moves = again.states["slip"] + again.states["lift"] > 0
+            if path is fast:
+                route = point.solution.route
+                assert route in ROUTES if moves else route.startswith("compiled point")
             for field in ("w", "f", "probe"):
                 expected = getattr(again, field)
                 found = getattr(point.solution, field)

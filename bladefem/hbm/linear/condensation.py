@@ -96,7 +96,8 @@ def condense(
         bodies = with_circulation(bodies, model, omega, harmonics)
     bodies = _beside_circling(model, bodies, omega, harmonics)
     try:
-        modal, condensed, free, stuck = linear_part(omega, bodies, springs, harmonics)
+        # a whole number would be compiled for anew
+        modal, condensed, free, stuck = linear_part(float(omega), bodies, springs, harmonics)
     except (ZeroDivisionError, np.linalg.LinAlgError):
         raise _exact_resonance(model, omega, harmonics) from None
     if not (np.isfinite(stuck).all() and np.isfinite(free).all()):

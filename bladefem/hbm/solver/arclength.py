@@ -45,7 +45,7 @@ MAX_CORNER_ARC_LENGTH = 1e-3
 # distance from the way back, in steps, from which a direction leads on
 MIN_ONWARD_DISTANCE = 0.3
 # reason of a step that is not taken
-JUMPS = "it jumps"
+JUMPS = "the corrector jumps"
 # cosine between successive tangents below which a step is halved
 SMALLEST_COSINE = 0.7
 # distance from prediction to solution, in steps, above which it is halved
@@ -193,7 +193,7 @@ def _correct_point(
     if found is None:
         found = _plain_spot(task, spot, guess, direction, size, JUMP_GUARD * step)
     if isinstance(found, str):
-        return None, f"corrector: {found}"
+        return None, found if found == JUMPS else f"corrector: {found}"
     if _distance(task, guess, (found.x, found.w), size) > JUMP_GUARD * step:
         return None, JUMPS
     new_dw, new_dx = found.tangent(task, size)

@@ -3,7 +3,7 @@ residual and its size, and the halvings of a line search on the residual.
 
 A trial of a line search then costs what its kernels do; only the one that is accepted reaches
 Python. The law is `bladefem.friction.simd.kernel_2d`, the residual that of
-`bladefem.hbm.solver.newton_compiled`; `bladefem.hbm.solver.residual` evaluates other elements by
+`bladefem.hbm.solver.balance_residual`; `bladefem.hbm.solver.residual` evaluates other elements by
 the same two kernels, one after the other.
 """
 

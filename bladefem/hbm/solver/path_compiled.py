@@ -21,14 +21,17 @@ from ..linear.contact_flexibility import form_matrices
 from ..linear.packed_bodies import Bodies
 from ..model import ReducedModel
 from ..point_measures import MEASURES, count_states, measure_point
-from ..policy import DETERMINANT_UNKNOWNS, uses_compiled_slope
+from ..policy import COMPILED_ITERATION_UNKNOWNS, DETERMINANT_UNKNOWNS, uses_compiled_slope
 from ..solution import Solution
+from .balance_residual import frobenius_norm
 from .frequency_rate import probe_rate, residual_rate
 from .law_evaluation import empty_room, evaluate
 from .newton_compiled import (
+    BY_ITERATIONS,
     BY_LU,
     CONVERGED,
     SEARCHING,
+    SINGULAR,
     dense_jacobian,
     linearise_nodes,
     newton_step,
@@ -112,16 +115,18 @@ def correct_step(
     w = np.array(guess[1], dtype=float).reshape(n * d, K)
     try:
         end, slope, _, record = _correct_step(
-            guess[0],
+            # numbers of another type would be compiled for anew
+            float(guess[0]),
             w,
             across,
-            direction[1],
-            *scales,
+            float(direction[1]),
+            float(scales[0]),
+            float(scales[1]),
             *path.balance,
             path.unexcited,
             d,
             d - path.model.elements.tangents,
-            tolerance,
+            float(tolerance),
             STEP_ACCURACY,
             corrections,
             signed,
@@ -131,7 +136,7 @@ def correct_step(
     except ZeroDivisionError:
         # a resonance without damping
         return None
-    x, code, steps, error, sign, periodic = end
+    x, code, steps, error, solver, sign, periodic = end
     f, probe, shares, measures = record
     if code != CONVERGED:
         return outcome_reason(Outcome(code), error, steps)
@@ -149,7 +154,7 @@ def correct_step(
             w.reshape(path.shape),
             f,
             probe,
-            (steps, error, BY_LU),
+            (steps, error, solver),
             count_states(shares).tolist(),
             measures.tolist(),
         ),
@@ -169,8 +174,8 @@ def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, n
     n, d, K = path.shape
     w = np.array(point.w, dtype=float).reshape(n * d, K)
     try:
-        _, slope, probe, _ = _correct_step(
-            point.omega,
+        end, slope, probe, _ = _correct_step(
+            float(point.omega),
             w,
             np.zeros(w.shape),
             1.0,
@@ -188,7 +193,7 @@ def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, n
         )
     except (ZeroDivisionError, np.linalg.LinAlgError):
         return None
-    return (slope.reshape(path.shape), probe) if np.isfinite(slope).all() else None
+    return (slope.reshape(path.shape), probe) if end[1] == CONVERGED else None
 
 
 @njit(**INNER_KERNEL)
@@ -244,10 +249,11 @@ def _correct_step(
         accuracy: of linear systems that are solved by iterations.
 
     Returns:
-        x, how the loop ended, steps, error, sign of the determinant, whether the forces are
-        periodic; derivatives with the frequency of the displacements (m, K) and probes (H+1, p);
-        forces, probes, shares (n, 3) of stick, slip and separation, and what `measure_point`
-        gives. Those of a point that did not converge mean nothing.
+        x, how the loop ended, steps, error, how steps were solved for as `compiled_newton` tells
+        it, sign of the determinant, whether the forces are periodic; derivatives with the frequency
+        of the displacements (m, K) and probes (H+1, p); forces, probes, shares (n, 3) of stick,
+        slip and separation, and what `measure_point` gives. Those of a point that did not converge
+        mean nothing.
     """
     m, K = w.shape
     first = w.copy()
@@ -261,6 +267,7 @@ def _correct_step(
     rate_of_probe = np.empty(bodies.straight.shape, np.complex128)
     measures = np.zeros(MEASURES)
     sign = 0.0
+    solver = 0
     steps = 0
     while True:
         modal, linear, free, _ = linear_part(x, bodies, springs, K // 2)
@@ -273,8 +280,12 @@ def _correct_step(
         factors = newton_step(
             rate, accuracy, d, nodes, C, linear.flex, few, no_factors(), level, along
         )
-        # where iterations did not converge once they mostly do not
-        accuracy = 0.0 if factors[1].size else accuracy
+        if accuracy and C.shape[0] * C.shape[1] > COMPILED_ITERATION_UNKNOWNS:
+            solver |= BY_ITERATIONS
+            # where iterations did not converge once they mostly do not
+            accuracy = 0.0 if factors[1].size else accuracy
+        if factors[1].size:
+            solver |= BY_LU
         if code == CONVERGED:
             along *= -1.0
             if signed:
@@ -311,5 +322,8 @@ def _correct_step(
                 w[i, k] -= back[i, k] + change * along[i, k]
         steps += 1
     periodic = room.cycles.min() >= 0
-    end = x, code, steps, error, sign, periodic
+    # the derivative may be singular at the very end
+    if code == CONVERGED and not np.isfinite(frobenius_norm(along)):
+        code = SINGULAR
+    end = x, code, steps, error, solver, sign, periodic
     return end, along, rate_of_probe, (f, probe, room.shares, measures)

@@ -39,15 +39,21 @@ def solve_small(
     samples: int,
     start: np.ndarray | None,
     options: Options,
+    from_stick: bool = True,
 ) -> Solution | None:
     """The converged solution from displacements (n, d, *), else from full stick; None if compiled
     points do not apply.
+
+    Args:
+        from_stick: also where the displacements do not lead to it and no fallbacks are wanted.
     """
-    for known in ([] if start is None else [(omega, start)], []):
-        found = _solve_points(model, np.array([omega]), H, samples, known, options)
-        if found or start is None:
-            return found[0] if found else None
-    return None
+    starts = [] if start is None else [[(omega, start)]]
+    if start is None or from_stick or options.fallbacks:
+        starts.append([])
+    found = (
+        _solve_points(model, np.array([omega]), H, samples, known, options) for known in starts
+    )
+    return next((points[0] for points in found if points), None)
 
 
 def solve_started(
@@ -126,7 +132,8 @@ def _solve_points(
         at[i], begin[i, :, :kept] = omega, w[:, :, :kept].reshape(n * d, kept)
     try:
         w, ends, f, probe, counts, measures = _compiled_points(
-            omegas,
+            # numbers of another type would be compiled for anew
+            np.asarray(omegas, dtype=float),
             *small,
             d,
             d - model.elements.tangents,
