@@ -437,5 +437,5 @@ def test_a_judge_that_is_another_maximum_leaves_the_error_to_a_nearer_one(nearer
         assert len(judged) == 2 and found is None
         assert 0.02 < change.height < 0.2
     else:
-        assert len(judged) > 2 and found.height == 0.6
+        assert len(judged) >= 2 and found.height == 0.6
         assert change.height > abs(1 / 0.6 - 1) - 1e-9
