@@ -17,10 +17,11 @@ Seeds at 2 %, on an idle machine, one process a core; of CPU time, that of the r
     both, before      125            0        0          2          0.25    0.64      15
 
 Before: paths, slopes and points with two tangents not compiled, the same day. Seeds 4, 73 and 95
-are most of what all take. Unknown are seeds 33 and 69, whose richer models were not solved. Where a point of the rich model takes over 1 ms a third is reached by 31 of 62, by 26 of 70 before.
-Ratios scatter by 10 %. Seed 73 is told an error of 400 %, with which it is left: its rippled top
-has no maximum for one of the richer models. Seed 192, which was wrong once, is in a test; the other
-seeds to 199 were not measured again. At 0.1 % it was measured last for seeds 0 to 32, by an earlier
+are most of what all take. Unknown are seeds 33 and 69, whose richer models were not solved. Where a
+point of the rich model takes over 1 ms a third is reached by 31 of 62, by 26 of 70 before. Ratios
+scatter by 10 %. Seed 73 is told an error of 400 %, with which it is left: its rippled top has no
+maximum for one of the richer models. Seed 192, which was wrong once, is in a test; the other seeds
+to 199 were not measured again. At 0.1 % it was measured last for seeds 0 to 32, by an earlier
 version: 0.82 in all, none wrong, 8 above 1.1.
 
 To follow curves with lift-off only where the tangents of a sweep leave folds open saved 13 of these
