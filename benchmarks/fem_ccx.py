@@ -81,6 +81,16 @@ OpenBLAS's own choice of kernels:
      44 892  0          curved       14.9           2.3    6.4  0.41    1.10   3.5e-07      7.3e-05
     148 623  5          curved      100.6          11.2    8.9  1.32    0.79   1.1e-07      1.6e-05
 
+With the order of elimination from the mass, on an idle machine: what others leave of the memory's
+speed CalculiX needs more than bladefem does.
+
+     44 892  5          curved       13.9           2.9    4.7  0.44    1.19   1.8e-07      7.6e-05
+     44 892  0          curved       13.8           2.4    5.8  0.44    1.17   3.5e-07      7.3e-05
+     44 892  0 to 12    curved      173.3           7.3   23.7  0.53    1.26   3.6e-07      8.0e-05
+     44 892  5          straight     14.1           2.8    5.0  0.44    1.18   3.4e-07      9.8e-06
+    148 623  5          curved       80.0          12.4    6.4  1.32    0.79   1.1e-07      1.6e-05
+    148 623  5          curved       86.5          12.5    6.9  1.31    0.79   1.1e-07      1.6e-05
+
 Where 16.8 s at 148 773 go: 3.6 s into the Cholesky factorisation, 3.8 s into the count (another
 factorisation, 3.2 s), 3.7 s into 26 sweeps over the factors with SLEPc's one vector. The block
 iteration takes 10 sweeps of six vectors, 3.6 s in place of SLEPc's 5.4 s with all around it.
