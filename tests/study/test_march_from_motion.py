@@ -64,6 +64,20 @@ def marched_amplitudes(gap, omega, harmonics, periods=240, kept=60, loss=0.04):
     return np.array(found[-kept:])
 
 
+def points_of_heights(*heights):
+    """Converged points at 0, 1, 2, ... rad/s, of which no contact lifts off."""
+    return [
+        SimpleNamespace(
+            omega=float(k),
+            frequency=float(k),
+            probe=np.array([[0.0], [height]]),
+            states={"lift": 0},
+            converged=True,
+        )
+        for k, height in enumerate(heights)
+    ]
+
+
 def test_band_of_a_doubled_period_is_that_of_a_plain_march():
     omega = 3.0
     model = rebounding(10.0, 0.1, 0.04)
@@ -182,14 +196,7 @@ def test_a_march_contradicts_a_balance_of_another_amplitude_than_its_highest(
 )
 def test_an_unstable_resonance_gives_way_where_the_blade_keeps_to_less(monkeypatch, kept_to, given):
     """Else it moves most there: 224.9 um that a march brings to 212.8 are not 204 um elsewhere."""
-    points = [
-        SimpleNamespace(
-            omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]), states={"lift": 0}
-        )
-        for k, a in enumerate((0.5, 0.9, 1.2))
-    ]
-    for point in points:
-        point.converged = True
+    points = points_of_heights(0.5, 0.9, 1.2)
     marks = Stability(np.array(["stable", "stable", "unstable"]), np.ones(3))
     reason = "too long" if np.isnan(kept_to) else ""
     band = KeptBand(2.0, kept_to, kept_to, 200, reason)
@@ -554,14 +561,7 @@ def test_a_motion_that_more_contact_points_leave_is_marched_with_them(monkeypatc
     the blade keeps between 0.9 and 1.15 of the amplitude. The verdicts on the curve, the march and
     the point that is given say so.
     """
-    points = [
-        SimpleNamespace(
-            omega=float(k), frequency=float(k), probe=np.array([[0.0], [a]]), states={"lift": 0}
-        )
-        for k, a in enumerate((0.5, 1.2, 0.9))
-    ]
-    for point in points:
-        point.converged = True
+    points = points_of_heights(0.5, 1.2, 0.9)
     marks = Stability(np.full(3, "stable"), np.ones(3), bifurcation=np.full(3, "", dtype="<U15"))
     models = {
         "model_in_time": None,

@@ -9,6 +9,7 @@ does not end well for another reason than its length.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -113,38 +114,23 @@ def correct_step(
     across = np.array(direction[0], dtype=float).reshape(n * d, K)
     across[:, 0] *= mean_weight
     w = np.array(guess[1], dtype=float).reshape(n * d, K)
+    plane = across, direction[1], *scales
+    limits = tolerance, STEP_ACCURACY, corrections
     try:
-        end, slope, _, record = _correct_step(
-            # numbers of another type would be compiled for anew
-            float(guess[0]),
-            w,
-            across,
-            float(direction[1]),
-            float(scales[0]),
-            float(scales[1]),
-            *path.balance,
-            path.unexcited,
-            d,
-            d - path.model.elements.tangents,
-            float(tolerance),
-            STEP_ACCURACY,
-            corrections,
-            signed,
-        )
+        end, slope, _, shares, record = _called(path, guess[0], w, plane, limits, signed)
     except np.linalg.LinAlgError:
         return outcome_reason(Outcome.SINGULAR, np.nan, corrections)
+    # a resonance without damping
     except ZeroDivisionError:
-        # a resonance without damping
         return None
     x, code, steps, error, solver, sign, periodic = end
-    f, probe, shares, measures = record
+    f, probe, measures = record
     if code != CONVERGED:
         return outcome_reason(Outcome(code), error, steps)
     if not periodic:
         return None
     carried = measures[2]
-    fault = rest_fault(path.model, shares, carried) if carried > CARRIED_SHARE else ""
-    if fault:
+    if carried > CARRIED_SHARE and (fault := rest_fault(path.model, shares, carried)):
         return fault
     point = point_solution(
         K // 2,
@@ -173,27 +159,52 @@ def frequency_slope(model: ReducedModel, point: Solution) -> tuple[np.ndarray, n
         return None
     n, d, K = path.shape
     w = np.array(point.w, dtype=float).reshape(n * d, K)
+    plane = np.zeros(w.shape), 1.0, 1.0, 1.0
+    # whatever the residual
+    limits = np.inf, SLOPE_ACCURACY, 0
     try:
-        end, slope, probe, _ = _correct_step(
-            float(point.omega),
-            w,
-            np.zeros(w.shape),
-            1.0,
-            1.0,
-            1.0,
-            *path.balance,
-            path.unexcited,
-            d,
-            d - model.elements.tangents,
-            # whatever the residual
-            np.inf,
-            SLOPE_ACCURACY,
-            0,
-            False,
-        )
+        end, slope, probe, _, _ = _called(path, point.omega, w, plane, limits, signed=False)
     except (ZeroDivisionError, np.linalg.LinAlgError):
         return None
     return (slope.reshape(path.shape), probe) if end[1] == CONVERGED else None
+
+
+def _called(
+    path: CompiledPath,
+    x: float,
+    w: np.ndarray,
+    plane: tuple[np.ndarray, float, float, float],
+    limits: tuple[float, float, int],
+    signed: bool,
+) -> tuple[Any, ...]:
+    """`_correct_step` from x and w (m, K), which is changed.
+
+    Args:
+        plane: direction in displacements (m, K) and frequency, scales of both.
+        limits: tolerance, accuracy of linear systems, steps.
+
+    Raises:
+        ZeroDivisionError: a resonance without damping.
+        numpy.linalg.LinAlgError: a singular matrix.
+    """
+    d = path.shape[1]
+    across, *numbers = plane
+    tolerance, accuracy, corrections = limits
+    # whole numbers would be compiled for anew
+    return _correct_step(
+        float(x),
+        w,
+        across,
+        *(float(number) for number in numbers),
+        *path.balance,
+        path.unexcited,
+        d,
+        d - path.model.elements.tangents,
+        float(tolerance),
+        float(accuracy),
+        corrections,
+        signed,
+    )
 
 
 @njit(**INNER_KERNEL)
@@ -211,13 +222,43 @@ def _determinant_sign(few, C):
 
 
 @njit(**INNER_KERNEL)
-def _product(one, other):
-    """Sum of the products of two arrays (m, K)."""
-    total = 0.0
-    for i in range(one.shape[0]):
-        for k in range(one.shape[1]):
-            total += one[i, k] * other[i, k]
-    return total
+def _change_in_plane(w, first, back, along, across, size, dx, ahead, width):
+    """Change of the frequency by which Newton's step ends in the plane through a guess.
+
+    Args:
+        w, first: (m, K) displacements now and at the guess.
+        back, along: (m, K) inverse derivative times the residual and its rate with the frequency.
+        ahead: distance from the guess in the frequency, over `width`.
+    """
+    off = dx * ahead
+    by_residual = 0.0
+    by_rate = 0.0
+    for i in range(w.shape[0]):
+        for k in range(w.shape[1]):
+            weight = across[i, k] / size
+            off += weight * (w[i, k] - first[i, k])
+            by_residual += weight * back[i, k]
+            by_rate += weight * along[i, k]
+    return (by_residual - off) / (dx / width - by_rate)
+
+
+@njit(**INNER_KERNEL)
+def _move(w, back, change, along):
+    """Take a step from w (m, K), which is changed."""
+    for i in range(w.shape[0]):
+        for k in range(w.shape[1]):
+            w[i, k] -= back[i, k] + change * along[i, k]
+
+
+@njit(**INNER_KERNEL)
+def _measure(x, bodies, springs, modal, free, w, normals, room, preload, record):
+    """Fill forces (n, d, K), probes (H+1, p) and measures of a solved point."""
+    f, probe, measures = record
+    linear = modal, free
+    residual = room.residual
+    measure_point(
+        x, bodies, springs, linear, w, normals, room.F, preload, residual, f, probe, measures
+    )
 
 
 @njit(**KERNEL)
@@ -251,9 +292,9 @@ def _correct_step(
     Returns:
         x, how the loop ended, steps, error, how steps were solved for as `compiled_newton` tells
         it, sign of the determinant, whether the forces are periodic; derivatives with the frequency
-        of the displacements (m, K) and probes (H+1, p); forces, probes, shares (n, 3) of stick,
-        slip and separation, and what `measure_point` gives. Those of a point that did not converge
-        mean nothing.
+        of the displacements (m, K) and probes (H+1, p); shares (n, 3) of stick, slip and
+        separation; forces, probes and works as `measure_point` gives them. Those of a point that
+        did not converge mean nothing.
     """
     m, K = w.shape
     first = w.copy()
@@ -261,11 +302,9 @@ def _correct_step(
     room = empty_room(m, d, K, patterns)
     back = np.empty((m, K))
     along = np.empty((m, K))
-    moved = np.empty((m, K))
-    f = np.empty((m // d, d, K))
     probe = np.empty(bodies.straight.shape, np.complex128)
     rate_of_probe = np.empty(bodies.straight.shape, np.complex128)
-    measures = np.zeros(MEASURES)
+    record = np.empty((m // d, d, K)), probe, np.zeros(MEASURES)
     sign = 0.0
     solver = 0
     steps = 0
@@ -293,37 +332,18 @@ def _correct_step(
             rate_of_probe = probe_rate(
                 bodies, unexcited, modal, free, room.J, springs, rates, along, d
             )
-            measure_point(
-                x,
-                bodies,
-                springs,
-                (modal, free),
-                w,
-                normals,
-                room.F,
-                contact[5],
-                room.residual,
-                f,
-                probe,
-                measures,
-            )
+            _measure(x, bodies, springs, modal, free, w, normals, room, contact[5], record)
             break
         newton_step(room.residual, accuracy, d, nodes, C, linear.flex, few, factors, level, back)
-        for i in range(m):
-            for k in range(K):
-                moved[i, k] = w[i, k] - first[i, k]
-        off = _product(across, moved) / size + dx * (x - begun) / width
-        change = (_product(across, back) / size - off) / (
-            dx / width - _product(across, along) / size
+        change = _change_in_plane(
+            w, first, back, along, across, size, dx, (x - begun) / width, width
         )
         x += change
-        for i in range(m):
-            for k in range(K):
-                w[i, k] -= back[i, k] + change * along[i, k]
+        _move(w, back, change, along)
         steps += 1
     periodic = room.cycles.min() >= 0
     # the derivative may be singular at the very end
     if code == CONVERGED and not np.isfinite(frobenius_norm(along)):
         code = SINGULAR
     end = x, code, steps, error, solver, sign, periodic
-    return end, along, rate_of_probe, (f, probe, room.shares, measures)
+    return end, along, rate_of_probe, room.shares, record
