@@ -15,7 +15,7 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show
+from bladefem.scene.units import LIMIT_TOLERANCE, show, show_most
 
 from .draw import (
     boundary_centres,
@@ -116,9 +116,9 @@ def _check_range(
     limit: float,
     meaning: str,
 ) -> None:
-    if not value <= limit:
+    if not value <= limit * (1 + LIMIT_TOLERANCE):
         raise InputError(
-            f"{name} = {show(value, 'm')}: expected at most {show(limit, 'm')} ({meaning})"
+            f"{name} = {show(value, 'm')}: expected at most {show_most(limit, 'm')} ({meaning})"
         )
 
 

@@ -12,7 +12,7 @@ from math import cos, pi, sin, tan
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show
+from bladefem.scene.units import show, show_most
 
 from .parameters import Disc, Root, Shank
 
@@ -128,7 +128,7 @@ def _check_room(root: Root, shank: Shank, disc: Disc) -> None:
 
 def _refuse(name: str, value: float, limit: float, meaning: str) -> None:
     raise InputError(
-        f"root.{name} = {show(value, 'm')} is too large: expected at most {show(limit, 'm')} "
+        f"root.{name} = {show(value, 'm')} is too large: expected at most {show_most(limit, 'm')} "
         f"({meaning})"
     )
 

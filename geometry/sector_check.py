@@ -9,7 +9,7 @@ from math import pi, radians, sin
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show
+from bladefem.scene.units import LIMIT_TOLERANCE, show, show_least, show_most
 
 from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
@@ -72,11 +72,12 @@ def _at_most(
     limit: float,
     meaning: str,
     unit: str = "m",
+    digits: int = 6,
 ) -> None:
-    if not value <= limit:
+    if not value <= limit * (1 + LIMIT_TOLERANCE):
         raise InputError(
-            f"{name} = {show(value, unit)} is too large: expected at most {show(limit, unit)} "
-            f"({meaning})"
+            f"{name} = {show(value, unit)} is too large: expected at most "
+            f"{show_most(limit, unit, digits)} ({meaning})"
         )
 
 
@@ -137,8 +138,8 @@ def check_platform(
     if platform.thickness < THINNEST_PLATE * widest:
         raise InputError(
             f"platform.thickness = {show(platform.thickness, 'm')} is too small: expected at least "
-            f"{show(THINNEST_PLATE * widest, 'm')}, a {1 / THINNEST_PLATE:.0f}th of the platform's "
-            "length and of its pitch"
+            f"{show_least(THINNEST_PLATE * widest, 'm')}, a {1 / THINNEST_PLATE:.0f}th of "
+            "the platform's length and of its pitch"
         )
     room = np.abs(section.seats[:, 1, 1]).min() - shank.width / 2
     needed = platform.seat_width * sin(max(wedge.angles) + section.theta)
@@ -148,6 +149,8 @@ def check_platform(
         max(0.98 * room / needed, 0) * platform.seat_width,
         f"the platform's overhang next to the shank with {_count(disc)}; or choose fewer of "
         "these, or a smaller shank.width or damper.angle",
+        # the overhang changes with the seat: further digits would be refused in their turn
+        digits=3,
     )
     _no_strip("damper.length", wedge.length, "platform.length", platform.length)
 
@@ -196,7 +199,10 @@ def check_aerofoil(
     smaller = "aerofoil.chord_root or aerofoil.fillet" if blade.fillet else "aerofoil.chord_root"
     rules = (
         ("axially", f"{smaller} or a larger platform.length"),
-        ("circumferentially", f"{smaller} or aerofoil.stagger, or fewer disc.sectors"),
+        (
+            "circumferentially",
+            f"{smaller} or aerofoil.stagger or platform.gap, or fewer disc.sectors",
+        ),
     )
     for room, (what, cure) in zip(platform_room(blade, platform, section), rules, strict=True):
         if room < 0:

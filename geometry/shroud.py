@@ -8,7 +8,7 @@ from math import cos, pi, tan
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show
+from bladefem.scene.units import show, show_least, show_most
 from bladefem.util.arrays import RealArray
 
 from .parameters import Aerofoil, Disc, Shroud
@@ -74,7 +74,7 @@ def shroud_block(
     width = room if shroud.width is None else shroud.width
     if width > room:
         raise InputError(
-            f"shroud.width = {show(width, 'm')}: expected at most {show(room, 'm')}, what "
+            f"shroud.width = {show(width, 'm')}: expected at most {show_most(room, 'm')}, what "
             "shroud.gap leaves between neighbours"
         )
     if at_tip:
@@ -121,8 +121,8 @@ def _check_cover(
                 "disc.sectors, a smaller aerofoil.chord_tip or less stagger and twist"
             )
         raise InputError(
-            f"shroud.{name} = {show(given, 'm')}: expected at least {show(needed, 'm')} to cover "
-            "the tip section"
+            f"shroud.{name} = {show(given, 'm')}: expected at least {show_least(needed, 'm')} to "
+            "cover the tip section"
         )
 
 
@@ -142,13 +142,15 @@ def _check_snubber(
     limit = 2 * (np.abs(edges).min() - margin)
     if length > limit:
         raise InputError(
-            f"shroud.length = {show(length, 'm')}: expected at most {show(max(limit, 0.0), 'm')}, "
-            "between the edges of the aerofoil; or shroud.at = 1 for a tip shroud"
+            f"shroud.length = {show(length, 'm')}: expected at most "
+            f"{show_most(max(limit, 0.0), 'm')}, between the edges of the aerofoil; or "
+            "shroud.at = 1 for a tip shroud"
         )
     inside = np.abs(rings[:, 1]) <= length / 2 + margin
     needed = 2 * (np.abs(rings[inside, 0]).max(initial=0.0) + margin)
     if width < needed:
         raise InputError(
-            f"shroud.width = {show(width, 'm')}: expected at least {show(needed, 'm')}, so that a "
-            "snubber stands out of both sides of the aerofoil; or a smaller shroud.length"
+            f"shroud.width = {show(width, 'm')}: expected at least "
+            f"{show_least(needed, 'm')}, so that a snubber stands out of both sides of the "
+            "aerofoil; or a smaller shroud.length"
         )

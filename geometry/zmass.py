@@ -9,7 +9,7 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show
+from bladefem.scene.units import show, show_most
 
 from .draw import (
     boundary_centres,
@@ -105,7 +105,7 @@ def check_z_mass(z: ZMass) -> None:
     limit = 0.95 * min(z.height / 2, z.width)
     if not z.bar <= limit:
         raise InputError(
-            f"z_mass.bar = {show(z.bar, 'm')}: expected at most {show(limit, 'm')} (95 % of "
+            f"z_mass.bar = {show(z.bar, 'm')}: expected at most {show_most(limit, 'm')} (95 % of "
             "z_mass.width and of half of z_mass.height)"
         )
 

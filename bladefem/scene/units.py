@@ -9,6 +9,7 @@ in Hz and a speed in rad/s cannot be mistaken for each other.
 from __future__ import annotations
 
 import re
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from fractions import Fraction
 from math import isfinite, pi
 from numbers import Real
@@ -17,6 +18,8 @@ from ..errors import InputError
 
 # from rad/s to revolutions a minute
 RPM = 60 / (2 * pi)
+# relative: a value that passes a limit by so much is at it
+LIMIT_TOLERANCE = 1e-12
 # unit: (factor to SI, exponents of kg, m, s, rad, K)
 _UNITS = {
     "m": (1.0, (0, 1, 0, 0, 0)),
@@ -177,6 +180,35 @@ def show(value: float, unit: str = "1", digits: int = 6) -> str:
     """
     number, written = _scale_unit(value, unit or "1")
     return f"{number:.{digits}g} {written}".rstrip()
+
+
+def show_most(limit: float, unit: str = "1", digits: int = 6) -> str:
+    """An upper limit like :func:`show`, rounded so that the number shown keeps to it: a value that
+    a message expects at most is then taken.
+
+    >>> show(0.00242680731, "m"), show_most(0.00242680731, "m"), show_most(0.14, "m")
+    ('2.42681 mm', '2.4268 mm', '140 mm')
+    """
+    return _show_within(limit, unit, digits, ROUND_FLOOR)
+
+
+def show_least(limit: float, unit: str = "1", digits: int = 6) -> str:
+    """A lower limit like :func:`show`, rounded so that the number shown keeps to it.
+
+    >>> show(0.0012344321, "m"), show_least(0.0012344321, "m"), show_least(0.14, "m")
+    ('1.23443 mm', '1.23444 mm', '140 mm')
+    """
+    return _show_within(limit, unit, digits, ROUND_CEILING)
+
+
+def _show_within(limit: float, unit: str, digits: int, rounding: str) -> str:
+    """The nearest number of some digits where it keeps to a limit to rounding, else the next."""
+    number, written = _scale_unit(limit, unit or "1")
+    nearest = float(f"{number:.{digits}g}")
+    # round-off of a limit such as 0.1 + 0.2 is no reason for another digit
+    if abs(nearest - number) > LIMIT_TOLERANCE * abs(number):
+        nearest = float(Context(prec=digits, rounding=rounding).create_decimal_from_float(number))
+    return f"{nearest:.{digits}g} {written}".rstrip()
 
 
 def newtons(force: float, digits: int = 6) -> str:

@@ -155,6 +155,9 @@ def _draw_star(axes: Any, table: pd.DataFrame, colour: str, exact: pd.Series | N
         textcoords="offset points",
         fontsize=8.5,
         va="top",
+        # lines of other loads would strike it through
+        bbox={"fc": "white", "ec": "none", "pad": 1.0, "alpha": 0.9},
+        zorder=6,
     )
 
 

@@ -334,6 +334,11 @@ def test_fillet_is_a_grid_of_elements_over_its_arc(asked, over):
         ({"disc": {"sectors": 60}}, "platform|shank"),
         ({"aerofoil": {"fillet": 0.009}}, "aerofoil.fillet|overhangs"),
         ({"aerofoil": {"chord_root": 0.056}}, "chord_root = 56 mm: .* axially by 498 um"),
+        # where the gap is too wide, the gap is among what to change
+        (
+            {"platform": {"gap": 0.019}, "shank": {"width": 0.01}},
+            "circumferentially .* or platform.gap, or fewer disc.sectors",
+        ),
         ({"wedge": {"angle": 81 * DEG}}, "damper.angle = 81 deg is too large.* 80 deg"),
     ],
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shlex
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from bladefem.study.modes.campbell import MAX_SPEEDS, read_speeds
 from bladefem.view.style import canvas
 
 WEDGE = Path(__file__).with_name("wedge.toml")
+SHIPPED = WEDGE.parents[2] / "scenes" / "wedge.toml"
 
 
 def refused(call, *arguments) -> str:
@@ -120,6 +122,25 @@ LATE = [
 @pytest.mark.parametrize(("override", "said"), LATE, ids=lambda v: str(v)[:40])
 def test_late_failures_are_refused_early(override, said):
     assert said in refused(load_scene, WEDGE, [override])
+
+
+def test_the_limits_that_messages_name_are_taken():
+    """The numbers are copied out of the messages, first of the proportions, then of the drawing;
+    they were rounded up, and refused once more.
+    """
+    limits = []
+    for _ in range(3):
+        given = [f"platform.seat_width={limits[-1]}"] if limits else []
+        said = refused(_draw, SHIPPED, ["disc.sectors=100", *given])
+        if not said.startswith("platform.seat_width"):
+            break
+        limits.append(re.search(r"expected at most (\S+ mm)", said)[1])
+    assert limits == ["2.4268 mm", "2.37 mm"]
+
+
+def _draw(file, overrides):
+    scene = load_scene(file, overrides)
+    kind_named(scene.kind).check(scene)
 
 
 COMMANDS = [

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from bladefem.errors import InputError
-from bladefem.scene.units import newton_range, newtons, parse, plain_number, show, show_exactly
+from bladefem.scene.units import (
+    newton_range,
+    newtons,
+    parse,
+    plain_number,
+    show,
+    show_exactly,
+    show_least,
+    show_most,
+)
 
 # The right column is worked out by hand, not by the table of units.
 VALUES = [
@@ -144,3 +153,19 @@ def test_two_forces_share_a_unit():
 def test_cells_write_out_what_people_do():
     assert plain_number(49999.0, 4) == "50000"
     assert plain_number(4.2e7, 2) == "4.2e+07" and plain_number(1e-9, 4) == "1e-09"
+
+
+@pytest.mark.parametrize("unit", ["m", "Pa", "rad", "N/m^3"])
+def test_limits_shown_keep_to_the_limit(unit):
+    """A user copies the number out of the message: it must not be refused once more."""
+    limits = 10 ** np.random.default_rng(3).uniform(-7, 12, 400)
+    assert any(parse(show(x, unit), unit) > x for x in limits)
+    for limit in limits:
+        most, least = parse(show_most(limit, unit), unit), parse(show_least(limit, unit), unit)
+        assert limit * (1 - 1e-5) <= most <= limit * (1 + 1e-12)
+        assert limit * (1 - 1e-12) <= least <= limit * (1 + 1e-5)
+
+
+def test_limits_that_are_round_numbers_stay_as_they_are():
+    assert show_most(0.1 + 0.2, "m") == show_least(0.1 + 0.2, "m") == "300 mm"
+    assert show_most(0.0, "m") == show_least(0.0, "m") == show(0.0, "m")

@@ -383,6 +383,8 @@ def test_response_charts(folder):
     figure = draw_optimum(synthetic.summary(), folder / "optimum.png")
     text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
     assert "optimum 200 N" in text and "92.6 % below" in text
+    # no line of a load strikes the frequency through
+    assert figure.axes[1].texts[0].get_bbox_patch().get_facecolor()[:3] == (1.0, 1.0, 1.0)
     searched = pd.DataFrame(
         {
             "load": [170.0],

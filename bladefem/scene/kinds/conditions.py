@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from ..units import show
+from ..units import LIMIT_TOLERANCE, show, show_most
 
 # faces and node sets that a force can act on, of every blade that is drawn here
 BLADE_FACES = (
@@ -49,8 +49,8 @@ def at_most(
     limit: float,
     what: str,
 ) -> Iterator[str]:
-    if value > limit * (1 + 1e-12):
-        yield f"{name} = {show(value, 'm')}: expected at most {show(limit, 'm')}, {what}"
+    if value > limit * (1 + LIMIT_TOLERANCE):
+        yield f"{name} = {show(value, 'm')}: expected at most {show_most(limit, 'm')}, {what}"
 
 
 def one_of(

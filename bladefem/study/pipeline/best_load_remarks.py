@@ -100,5 +100,6 @@ def stress_message(found: DampedStress, over_balance: float = 1.0) -> str:
         return text
     return warning(
         f"{text}: too large to rely on, at a sharp edge or on too coarse a mesh",
-        "give a fillet (aerofoil.fillet) or a finer mesh (mesh.size)",
+        "give a finer mesh (mesh.size, mesh.scale), or a fillet (aerofoil.fillet) where the place "
+        "is a sharp edge",
     )
