@@ -51,5 +51,11 @@ def suggestion(word: str, known: Iterable[str]) -> str:
 
 
 def close_word(word: str, known: Iterable[str]) -> str:
-    """The known word that is nearest to one, "" when none is close."""
-    return next(iter(difflib.get_close_matches(word, list(known), n=1, cutoff=0.6)), "")
+    """The known word that is nearest to one, however its letters are cased; "" when none is close.
+
+    >>> close_word("ROOT", ["root", "tip"]), close_word("Root", ["root", "ROOT_2"])
+    ('root', 'root')
+    """
+    words = list(known)
+    same = [other for other in words if other.lower() == word.lower()]
+    return next(iter([*same, *difflib.get_close_matches(word, words, n=1, cutoff=0.6)]), "")

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import dataclass, replace
 from itertools import permutations
 from pathlib import Path
@@ -57,13 +58,16 @@ UNCUT_SECTOR_NEEDS = (
 )
 # names that a task needs, and what they are for
 NEEDED_NAMES = {
-    "clamp": "face or node set that is held",
-    "cyclic_low": "cut face of a sector, with cyclic_high on the other side",
-    "tip_mid": "node set or face that the excitation acts on (excitation.at)",
-    "seat_left": "platform face that the damper of the blade before presses on",
-    "seat_right": "platform face that this blade's damper presses on",
-    "damper": "body of the damper, with faces damper_left and damper_right",
+    "clamp": "face or node set that is held; support.clamp = '' where nothing is",
+    "cyclic_low": "cut face of a sector of a wheel, with cyclic_high on the other side; a single "
+    "blade has none",
+    "tip_mid": "node set or face that the excitation acts on (excitation.at), for responses",
+    "seat_left": "platform face that the damper of the blade before presses on, for a damper",
+    "seat_right": "platform face that this blade's damper presses on, for a damper",
+    "damper": "body of the damper, with faces damper_left and damper_right, for a damper",
 }
+# words of a set's name that stand for a name in a file of a single blade
+USUAL_WORDS = {"clamp": {"root", "bore", "hub", "fixed"}, "tip_mid": {"tip"}}
 # the other names that a set of the file may be meant for
 FURTHER_NAMES = ("cyclic_high", "damper_left", "damper_right")
 
@@ -153,6 +157,8 @@ def look_at(file: str | Path) -> Look:
         cut = _cut_faces(raw, outside, faces, size, by_outline=True)
     bore = () if cut is None else _bore_faces(raw, outside, faces, cut)
     alike = {} if drawing else _alike_names(raw)
+    if not drawing and cut is None:
+        alike |= _usual_names(raw, alike)
     return Look(
         Path(file),
         raw,
@@ -221,7 +227,7 @@ def starting_scene(look: Look, folder: Path | None = None) -> str:
         f"axis = {[float(v) for v in axis]}".ljust(32) + "# of the engine",
     ]
     if names:
-        lines += ["names = [", *(f'    "{name}",' for name in names), "]"]
+        lines += ["names = [".ljust(32) + "# guessed", *(f'    "{name}",' for name in names), "]"]
     if not drawing and any(
         NODES[w] == CORNERS[FAMILY[w]] for w in look.cells if DIMENSION[FAMILY[w]] == 3
     ):
@@ -502,6 +508,26 @@ def _alike_names(raw: RawMesh) -> dict[str, str]:
     for wanted in (*NEEDED_NAMES, *FURTHER_NAMES):
         among = solids if wanted == "damper" else {*raw.groups, *raw.node_sets, *raw.surfaces}
         fitting = [name for name in among if _letters(wanted) in _letters(name)]
+        if wanted not in there and len(fitting) == 1:
+            found[wanted] = fitting[0]
+    return found
+
+
+def _usual_names(raw: RawMesh, alike: dict[str, str]) -> dict[str, str]:
+    """Names that a task needs and neither a set nor a guess has, with the one set of faces or nodes
+    that has a word for it in its name: "clamp" with "BLADE_ROOT". Of a sector the bore is the
+    better guess.
+    """
+    there = _names_of(raw) | set(alike)
+    flat = {
+        name
+        for name, parts in raw.groups.items()
+        if all(DIMENSION[_cell_family(raw, block)] == 2 for block, _ in parts)
+    }
+    among = flat | {*raw.node_sets, *raw.surfaces} - set(raw.groups)
+    found = {}
+    for wanted, words in USUAL_WORDS.items():
+        fitting = [name for name in among if words & set(re.findall("[a-z]+", name.lower()))]
         if wanted not in there and len(fitting) == 1:
             found[wanted] = fitting[0]
     return found

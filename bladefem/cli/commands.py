@@ -341,7 +341,9 @@ def prepared(
 
     scene = on_root(comm, prepare)
     rank = 0 if comm is None else comm.rank
-    return scene, folder, partial(with_progress, shown=progress_wanted(options.quiet, rank))
+    shown = progress_wanted(options.quiet, rank)
+    logged = not options.quiet and rank == 0
+    return scene, folder, partial(with_progress, shown=shown, logged=logged)
 
 
 def _given_fields(options: argparse.Namespace) -> set[str]:

@@ -93,6 +93,9 @@ def describe_look(found: Look) -> str:
     lines.append(plain_table(faces, ["face", "facets", "area", "centre", "shape"]))
     if len(found.faces) > MAX_LISTED_FACES:
         lines.append(f"and {len(found.faces) - MAX_LISTED_FACES} smaller faces")
+    if found.alike:
+        guessed = ", ".join(f"{new} = {old}" for new, old in found.alike.items())
+        lines += ["", f"by their names: {guessed} (guessed)"]
     if found.missing:
         lines += ["", "not in the file:", *(f"  {sentence}" for sentence in found.missing)]
     return "\n".join(lines)

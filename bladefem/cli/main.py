@@ -224,7 +224,7 @@ def _scene_arguments(name: str, sub: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="run folder (default: runs/<name of the scene>)",
     )
-    sub.add_argument("-q", "--quiet", action="store_true", help="no progress bars and no summary")
+    sub.add_argument("-q", "--quiet", action="store_true", help="no progress and no summary")
 
 
 def _chart_arguments(sub: argparse.ArgumentParser) -> None:

@@ -1,4 +1,5 @@
-"""Progress bars: on a terminal only, one for all ranks, and only for what takes over two seconds.
+"""Progress of what takes long, one for all ranks: a bar on a terminal, for what takes over two
+seconds; elsewhere, as in the log of a batch job, a line a minute.
 
 Long loops take a :data:`Progress` that wraps what they go through; :func:`without_progress` shows
 nothing and is the default.
@@ -8,10 +9,13 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sized
+from time import monotonic
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+# seconds between the lines of a log
+LINE_INTERVAL = 60.0
 # of a terminal that does not know its own
 DEFAULT_TERMINAL_SIZE = {"ncols": 80, "nrows": 24}
 # progress(items, label, total): see watch
@@ -41,19 +45,22 @@ def with_progress(
     label: str = "",
     total: int | None = None,
     shown: bool = True,
+    logged: bool = False,
     **options: Any,
 ) -> Iterator[T]:
-    """The items, with a bar of the remaining time once two seconds have passed.
+    """The items, with a bar of the remaining time once two seconds have passed, or with a line on
+    the error stream each :data:`LINE_INTERVAL`.
 
     Args:
         items: a list or a generator.
         label: what is being done.
         total: number of items, when ``items`` cannot say it.
-        shown: answer of :func:`progress_wanted`.
+        shown: answer of :func:`progress_wanted`: a bar.
+        logged: lines, where no bar is shown.
         options: passed on to tqdm.
     """
     if not shown:
-        yield from items
+        yield from _with_lines(items, label, total) if logged else items
         return
     from tqdm import tqdm
 
@@ -61,6 +68,21 @@ def with_progress(
     yield from tqdm(
         items, desc=label, total=total, **({"delay": 2.0, "leave": False} | size | options)
     )
+
+
+def _with_lines(items: Iterable[T], label: str, total: int | None) -> Iterator[T]:
+    """The items; "bladefem: reduction: 12 of 40 after 95 s" once in a while."""
+    if total is None and isinstance(items, Sized):
+        total = len(items)
+    started = said = monotonic()
+    for done, item in enumerate(items):
+        now = monotonic()
+        if now - said >= LINE_INTERVAL:
+            said = now
+            share = f"{done} of {total}" if total is not None else f"{done} done"
+            line = f"bladefem: {label}: {share} after {now - started:.0f} s"
+            print(line, file=sys.stderr, flush=True)
+        yield item
 
 
 def _without_size() -> bool:

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import termios
 
+from bladefem.util import progress
 from bladefem.util.progress import progress_wanted, with_progress
 
 
@@ -68,3 +69,20 @@ def test_a_terminal_without_size_has_bars_too():
     assert "loads:   0%|" in text and "0/3" in text
     os.close(ours)
     os.close(theirs)
+
+
+def test_a_log_gets_a_line_once_in_a_while(monkeypatch, capsys):
+    """The clock is the test's own: 25 s an item, a line a minute."""
+    seconds = iter(range(0, 1000, 25))
+    monkeypatch.setattr(progress, "monotonic", lambda: next(seconds))
+    seen = list(with_progress(range(7), "reduction", shown=False, logged=True))
+    assert seen == list(range(7))
+    assert capsys.readouterr().err.splitlines() == [
+        "bladefem: reduction: 2 of 7 after 75 s",
+        "bladefem: reduction: 5 of 7 after 150 s",
+    ]
+    seconds = iter(range(0, 1000, 70))
+    list(with_progress((i for i in range(2)), "points", shown=False, logged=True))
+    assert "bladefem: points: 1 done after 140 s" in capsys.readouterr().err
+    list(with_progress(range(9), "points", shown=False))
+    assert capsys.readouterr().err == ""

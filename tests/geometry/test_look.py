@@ -11,9 +11,11 @@ from scipy.spatial import cKDTree
 from structured import box
 
 import bladefem
+from bladefem.cli.look import describe_look
 from bladefem.cli.main import main
 from bladefem.errors import InputError
 from bladefem.scene.toml import load_scene
+from bladefem.study.pipeline.validate_mesh import check_blade
 from geometry.imported import read_mesh
 from geometry.look import look_at, starting_scene
 from geometry.numbered_faces import face_corners, numbered_faces
@@ -72,6 +74,54 @@ def test_sets_with_alike_names_are_taken(tmp_path):
     assert [name.split(" ")[0] for name in names[2:]] == ["cyclic_low", "cyclic_high"]
     missing = [sentence.split(":")[0] for sentence in look.missing]
     assert missing == ["tip_mid", "seat_right", "damper"]
+
+
+def test_usual_names_of_a_single_blade_are_taken(tmp_path):
+    """The scene that is written has modes as it is; a body called so is no clamp, and two sets are
+    none.
+    """
+    bar = box((4, 1, 2), (0.1, 0.01, 0.015), "tetra10", origin=(0.0, 0.02, 0.05))
+    ends = [np.flatnonzero(np.isclose(bar.points[:, 0], x)) for x in (0.0, 0.1)]
+
+    def deck_of(name, sets):
+        m = decks.Model(bar.points, [("tetra10", bar.bodies["blade"])], sets, {})
+        (tmp_path / name).write_text("\n".join(decks.flat_deck(m, {})))
+        return tmp_path / name
+
+    deck = deck_of("a.inp", {"BLADE_ROOT": ends[0], "Tip": ends[1]})
+    look = look_at(deck)
+    assert look.alike == {"clamp": "BLADE_ROOT", "tip_mid": "Tip"}
+    assert [sentence.split(":")[0] for sentence in look.missing][0] == "cyclic_low"
+    assert "clamp = BLADE_ROOT, tip_mid = Tip (guessed)" in describe_look(look)
+    scene = tmp_path / "a.toml"
+    scene.write_text(starting_scene(look))
+    read = load_scene(scene)
+    mesh = bladefem.build_mesh(read)
+    held = np.unique(mesh.faces["clamp"])
+    np.testing.assert_allclose(mesh.points[held, 0], 0.0, atol=1e-12)
+    assert len(held) == len(ends[0])
+    two = look_at(deck_of("b.inp", {"ROOT_1": ends[0], "ROOT_2": ends[1], "RootCause": ends[1]}))
+    assert "clamp" not in two.alike
+
+
+def test_a_clamp_by_another_name_is_suggested(tmp_path):
+    """Names of a file are known in lower case."""
+    bar = box((4, 1, 2), (0.1, 0.01, 0.015), "tetra10", origin=(0.0, 0.02, 0.05))
+    sets = {"GROUND": np.flatnonzero(np.isclose(bar.points[:, 0], 0.0))}
+    m = decks.Model(bar.points, [("tetra10", bar.bodies["blade"])], sets, {})
+    (tmp_path / "a.inp").write_text("\n".join(decks.flat_deck(m, {})))
+    scene = tmp_path / "a.toml"
+    scene.write_text(starting_scene(look_at(tmp_path / "a.inp")))
+    for override, said in (
+        (
+            [],
+            r'known are ground, nall; or name one, such as imported.names = \["clamp = face_1"\]$',
+        ),
+        (["support.clamp=GROUND"], "did you mean 'ground'"),
+    ):
+        read = load_scene(scene, override)
+        with pytest.raises(InputError, match=said):
+            check_blade(read, bladefem.build_mesh(read))
 
 
 def test_sets_named_like_numbered_faces_are_not_mixed_up_with_them(tmp_path):

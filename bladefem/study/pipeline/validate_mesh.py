@@ -10,7 +10,7 @@ from ...contact.face_profile import seat_gap
 from ...data import Patch
 from ...errors import InputError, suggestion
 from ...hbm.model import Damping
-from ...scene.tables import Scene
+from ...scene.tables import Scene, Support
 from ...scene.validate import refuse_bladeless
 from .damper_contact import contact_patches
 from .ports import named_nodes
@@ -90,9 +90,15 @@ def check_blade(scene: Scene, mesh: Mesh) -> None:
     """Modes and responses need a blade, and a blade needs its clamp."""
     refuse_bladeless(scene.kind)
     clamp = scene.support.clamp
-    names = [*mesh.faces, *mesh.nodes]
+    names = {*mesh.faces, *mesh.nodes}
     if clamp and clamp not in names:
         raise InputError(
             f"support.clamp = '{clamp}': the mesh has no such face or node set, expected one that "
-            f"holds the blade{suggestion(clamp, names)}"
+            f"holds the blade{suggestion(clamp, names)}{_how_to_name(scene)}"
         )
+
+
+def _how_to_name(scene: Scene) -> str:
+    """How a set of a file becomes the clamp, where the scene says nothing of it."""
+    left_out = scene.kind == "imported" and scene.support.clamp == Support().clamp
+    return '; or name one, such as imported.names = ["clamp = face_1"]' if left_out else ""
