@@ -58,6 +58,7 @@ PAGE_COLUMNS: dict[str, dict[str, tuple[str, ...]]] = {
             "interval",
             "lower_amplitude",
             "reduction",
+            "equivalent_damping",
             "alternating_stress",
             "stress_error",
             "mode_stress",

@@ -10,11 +10,12 @@ import pandas as pd
 from geometry.quality import quality_rows
 
 from ..hbm.stability import UNIQUE
+from ..scene.aerodynamics import has_flow
 from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
 from ..study.pipeline.contact_cycle import ContactCycle
-from ..study.pipeline.design_table import design_table
+from ..study.pipeline.design_table import design_table, equivalent_damping
 from ..study.pipeline.run_records import SolvedRun
 from .best_load import best_load_table
 from .fatigue import utilisation_table
@@ -94,6 +95,12 @@ def _summary(result: SolvedRun) -> pd.DataFrame:
     place = table.columns.get_loc("reduction") + 1
     mode_alone = result.strength.alternating * table["peak_amplitude"].to_numpy()
     table.insert(place, "mode_stress", mode_alone)
+    # of a blade with a flow the damping without damper is not the scene's
+    if not has_flow(result.scene):
+        frequency, height = table["peak_frequency"].to_numpy(), table["peak_amplitude"].to_numpy()
+        free = (float(frequency[0]), float(height[0]))
+        own = result.scene.operation.damping
+        table.insert(place, "equivalent_damping", equivalent_damping(own, frequency, height, free))
     if result.damped:
         table.insert(place, "stress_error", _stress_errors(result, len(table)))
         table.insert(place, "alternating_stress", _alternating(result, len(table)))

@@ -14,6 +14,7 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
 from ..scene.units import newtons
+from ..study.pipeline.design_table import equivalent_damping
 from ..util.counted import counted
 from ..view.optimum import at_band_end
 from ..view.response import FOLLOWED, MARCHED
@@ -108,6 +109,7 @@ def _optimum_numbers(
             f"{best['peak_frequency']:.5g} Hz",
             linear_limits_text(of_same_damper(summary, best)),
         ),
+        *damping_there(summary, best),
     ]
     if np.isfinite(best.get("friction_damping", np.nan)):
         numbers.append(
@@ -120,6 +122,27 @@ def _optimum_numbers(
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
     return numbers
+
+
+def damping_there(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]:
+    """The damping ratio of a linear blade that resonates as the damped one does."""
+    free = summary[summary["load"] == 0]
+    if "equivalent_damping" not in summary or free.empty:
+        return []
+    frequency, amplitude, own = (
+        float(free[name].iloc[0])
+        for name in ("peak_frequency", "peak_amplitude", "equivalent_damping")
+    )
+    there = (best["peak_frequency"], best["peak_amplitude"], (frequency, amplitude))
+    ratio = float(equivalent_damping(own, *there))
+    return [
+        (
+            "equivalent damping ratio there",
+            f"{100 * ratio:.3g} %",
+            f"Q = {1 / (2 * ratio):.3g}: a linear blade so damped would resonate as high; "
+            f"{100 * own:.3g} % without damper",
+        )
+    ]
 
 
 def best_of_studied(finite: pd.DataFrame) -> str:

@@ -143,6 +143,7 @@ COLUMNS = {
     "dissipated_energy": Column("friction work per cycle", "J", "mJ", 1e3, 4),
     "dissipated": Column("friction work per cycle", "J", "mJ", 1e3, 4),
     "friction_damping": Column("friction damping", "1", "%", 100.0, 3),
+    "equivalent_damping": Column("equivalent damping ratio", "1", "%", 100.0, 3),
     "reduction": Column("free over damped", "1", digits=4),
     "motions": Column("motions there"),
     "reached": Column("reached by"),

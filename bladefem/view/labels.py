@@ -10,6 +10,7 @@ from matplotlib.transforms import Bbox
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+# offsets [points] and which end is held
 LABEL_PLACES = (
     (6, 7, "left"),
     (6, -13, "left"),
@@ -17,7 +18,6 @@ LABEL_PLACES = (
     (-6, -13, "right"),
     (9, 11, "left"),
     (9, -17, "left"),
-    # offsets [points] and which end is held
     (-9, 11, "right"),
     (-9, -17, "right"),
     (11, -3, "left"),

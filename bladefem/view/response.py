@@ -16,15 +16,18 @@ import pandas as pd
 from scipy.interpolate import PchipInterpolator
 
 from ..scene.units import newtons
+from .labels import names_apart
 from .lower_motion import explain_lower, mark_lower, with_lower_motion
 from .style import FAILED_COLOUR, MICRO, canvas, log_axis
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# methods of a row that gives the resonance in place of the balances of its curve
 # of a drawn curve between two solved points
 SMOOTH_STEPS = 8
+# brightness of letters over that of their curve
+LETTER_SHADE = 0.75
+# methods of a row that gives the resonance in place of the balances of its curve
 MARCHED = "march in time"
 FOLLOWED = "followed to the stiff layer"
 # what the legend says of them
@@ -79,6 +82,7 @@ def draw_responses(
         ax.margins(x=0.01)
         if logarithmic:
             log_axis(ax, "y")
+        _name_loads(ax, points, colours)
         ax.legend(
             title="normal load per seat",
             alignment="left",
@@ -86,6 +90,31 @@ def draw_responses(
             bbox_to_anchor=(1.0, 0.5),
         )
         return ax.figure
+
+
+def _name_loads(ax: Axes, points: pd.DataFrame, colours: dict[float, Any]) -> None:
+    """Each load at the highest of its motions that are not unstable, where there is room: of a
+    dozen colours, neighbours are alike.
+    """
+    shown = points[points["converged"].astype(bool)]
+    if "stability" in shown:
+        shown = shown[shown["stability"] != "unstable"]
+    finite = shown[(shown["load"] > 0) & np.isfinite(shown["load"])]
+    if finite.empty:
+        return
+    highest = finite.loc[finite.groupby("load")["amplitude"].idxmax()]
+    # the lowest, which matters most, has the first choice of a place
+    for row in highest.sort_values("amplitude").itertuples():
+        ax.annotate(
+            newtons(row.load, 4),
+            (row.frequency, MICRO * row.amplitude),
+            textcoords="offset points",
+            xytext=(6, 7),
+            fontsize=7.5,
+            # the lightest colours are hard to read as letters
+            color=LETTER_SHADE * np.asarray(matplotlib.colors.to_rgb(colours[row.load])),
+        )
+    names_apart(ax)
 
 
 def _draw_unstable(ax: Axes, unstable: pd.DataFrame) -> None:

@@ -145,5 +145,13 @@ def test_command_writes_the_map_and_finds_it_again(tmp_path, capsys):
     by_mode = pd.read_csv(tmp_path / "backbone_resonances.csv").set_index("load [N]")
     of_run = pd.read_csv(tmp_path / "summary.csv").set_index("load [N]")
     assert by_mode["balance_error"][20] == pytest.approx(of_run["error"][20], rel=1e-6)
+    # the damping of the mode where the force of the scene drives it, by the decay of the free
+    # vibration; full stick, which dissipates nothing, shows what the changed shape does: 6.5 %
+    decay = pd.read_csv(tmp_path / "backbone.csv").query("`load [N]` == 20 and converged")
+    drive = decay["drive"].to_numpy()
+    ratio = (decay["friction_damping"] + decay["own_damping"]).to_numpy()
+    first = int(np.argmax(drive > 1))
+    there = np.interp(1.0, drive[first - 1 : first + 1], ratio[first - 1 : first + 1])
+    assert of_run["equivalent_damping"][20] == pytest.approx(there, rel=0.1)
     assert main(arguments) == 0
     assert "backbone_20N: found in the folder" in (tmp_path / "report_backbone.html").read_text()

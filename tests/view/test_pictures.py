@@ -380,6 +380,11 @@ def test_response_charts(folder):
     figure = draw_responses(synthetic.points(), folder / "response.png")
     labels = [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
     assert "not converged (3)" in labels and "200 N" in labels
+    # each curve has its load beside its highest point, none on another
+    names = figure.axes[0].texts
+    assert {"200 N", "800 N"} <= {name.get_text() for name in names}
+    boxes = [name.get_window_extent() for name in names]
+    assert not any(box.count_overlaps(boxes[:i]) for i, box in enumerate(boxes))
     figure = draw_optimum(synthetic.summary(), folder / "optimum.png")
     text = " ".join(t.get_text() for t in figure.axes[0].get_legend().get_texts())
     assert "optimum 200 N" in text and "92.6 % below" in text

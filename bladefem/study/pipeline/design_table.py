@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ...hbm.history_interval import POINT
+from ...util.arrays import RealArray
 from .curve import Curve
 from .linear_limits import Limit
 
@@ -32,6 +34,26 @@ def design_table(curves: list[Curve], limits: Sequence[Limit]) -> dict[str, np.n
         table["mass"] = np.array([np.nan if mass is None else mass for mass in masses])
     table["reduction"] = free["peak_amplitude"] / table["peak_amplitude"]
     return table
+
+
+def equivalent_damping(
+    own: float, frequency: npt.ArrayLike, amplitude: npt.ArrayLike, free: tuple[float, float]
+) -> RealArray:
+    """(rows,) damping ratios of linear blades that resonate as high, at the same frequencies, under
+    the same force.
+
+    A mode of mass m under the force F resonates with the amplitude F / (2 zeta m omega^2), so that
+    the ratio is the blade's own times the ratio of amplitudes and the square of that of
+    frequencies. That the damper changes the shape of the mode is left out.
+
+    Args:
+        own: damping ratio of the blade without damper.
+        frequency: (rows,) of the resonances.
+        amplitude: (rows,) of the resonances, in the unit of the one without damper.
+        free: frequency and amplitude without damper.
+    """
+    shift = free[0] / np.asarray(frequency, dtype=float)
+    return np.asarray(own * free[1] / np.asarray(amplitude, dtype=float) * shift**2)
 
 
 def _row(c: Curve) -> dict[str, Any]:
