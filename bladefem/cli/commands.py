@@ -33,6 +33,7 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
 
     from ..io.stage_cache import on_root
     from ..scene.assumed import assumed_physics
+    from ..scene.excited_wave import excited_wave
     from ..scene.toml import given_keys, read_tables, resolved_rows, scene_of
     from ..scene.warnings import implausible_values
     from ..study.pipeline.preflight import refuse_run
@@ -46,7 +47,9 @@ def check(options: argparse.Namespace, comm: Communicator | None) -> None:
         given = given_keys(written)
         notes = [*assumed_physics(scene, given), *implausible_values(scene), *check_file(scene)]
         rows = tables.resolved_scene(resolved_rows(scene, given))
-        return "\n".join([rows, *(f"note: {note}" for note in notes)])
+        wave = excited_wave(scene)
+        implied = [f"excitation: {wave}"] if wave else []
+        return "\n".join([rows, *implied, *(f"note: {note}" for note in notes)])
 
     text = on_root(comm, table)
     if comm is None or comm.rank == 0:

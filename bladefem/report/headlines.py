@@ -139,9 +139,9 @@ def _flatness_text(low: float | None, high: float | None) -> str:
         # where the amplitude crosses the accuracy: three digits of a load that nobody sets
         return _between_text(float(f"{low:.3g}"), float(f"{high:.3g}"))
     if low is not None:
-        return f"above {newtons(low, 4)}; how far up was not found"
+        return f"within the accuracy down to {newtons(low, 4)}; how far up was not found"
     if high is not None:
-        return f"below {newtons(high, 4)}; how far down was not found"
+        return f"within the accuracy up to {newtons(high, 4)}; how far down was not found"
     return "how flat the optimum is was not found"
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
+# what Open MPI and MPICH tell each rank of its number
+RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")
 # of a cell of prose, and of any other, in scripts of cells
 PROSE = "# %% [markdown]"
 CELL = "# %%"
@@ -15,7 +18,8 @@ USAGE = (
 
 
 def help_and_exit(script: str) -> None:
-    """Where the command line asks for help, print the first cell of prose and end with code 0.
+    """Where the command line asks for help, print the first cell of prose and end with code 0; of
+    several ranks one prints.
 
     Args:
         script: path of the script, its ``__file__``.
@@ -25,6 +29,8 @@ def help_and_exit(script: str) -> None:
     """
     if not {"-h", "--help"} & set(sys.argv[1:]):
         return
+    if any(os.environ.get(name, "0") != "0" for name in RANK_VARIABLES):
+        raise SystemExit
     lines = Path(script).read_text(encoding="utf-8").splitlines()
     first = lines.index(PROSE) + 1
     end = next(i for i in range(first, len(lines)) if lines[i].startswith(CELL))

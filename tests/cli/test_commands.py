@@ -909,6 +909,24 @@ def test_check_refuses_what_a_drawing_does_not_have(change, said, capsys):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ([], "engine order 9 excites nodal diameter 9 of 36 blades, at 2550 rpm with 382.5 Hz"),
+        (["excitation.engine_order=40"], "engine order 40 excites nodal diameter 4 of 36 blades"),
+        (["excitation.engine_order=27"], "nodal diameter 9 of 36 blades, at 2550 rpm with 1147.5 "),
+        (
+            ["excitation.engine_order=72", "operation.speed=0 rpm", "study.own_load=false"],
+            "nodal diameter 0 of 36 blades\n",
+        ),
+    ],
+)
+def test_check_says_which_wave_is_excited(changes, said, capsys):
+    overrides = [word for change in changes for word in ("--set", change)]
+    assert main(["check", WEDGE, *overrides]) == 0
+    assert "excitation: engine order" in (text := capsys.readouterr().out) and said in text
+
+
 def test_check_notes_what_responses_of_a_file_need(capsys):
     assert main(["check", OWN_BLADE]) == 0
     assert "note:" not in capsys.readouterr().out

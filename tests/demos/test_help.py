@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from bladefem.util.script_help import help_and_exit
+
 ROOT = Path(__file__).resolve().parents[2]
 DEMOS = sorted((ROOT / "demos").glob("*.py"))
 
@@ -26,3 +28,12 @@ def test_help_prints_the_introduction_and_ends(demo, option, monkeypatch, capsys
     assert printed[-1].startswith("It takes no arguments.")
     assert not any(line.startswith(("import", "# %%")) for line in printed)
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(("rank", "prints"), [("0", True), ("1", False)])
+def test_help_is_printed_by_one_of_several_ranks(rank, prints, monkeypatch, capsys):
+    monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
+    monkeypatch.setattr(sys, "argv", ["x.py", "--help"])
+    with pytest.raises(SystemExit):
+        
+    assert ("takes no arguments" in capsys.readouterr().out) == prints

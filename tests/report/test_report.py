@@ -187,7 +187,8 @@ def test_answer_says_which_mass_would_press_best():
     ("low", "high", "said"),
     [
         (150.0, 190.0, "between 150 and 190 N"),
-        (150.0, np.nan, "above 150 N; how far up was not found"),
+        (150.0, np.nan, "within the accuracy down to 150 N; how far up was not found"),
+        (np.nan, 190.0, "within the accuracy up to 190 N; how far down was not found"),
         (np.nan, np.nan, "how flat the optimum is was not found"),
     ],
 )
