@@ -35,5 +35,5 @@ def test_help_is_printed_by_one_of_several_ranks(rank, prints, monkeypatch, caps
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
     monkeypatch.setattr(sys, "argv", ["x.py", "--help"])
     with pytest.raises(SystemExit):
-        
+        help_and_exit(str(ROOT / "demos" / "sector_modes.py"))
     assert ("takes no arguments" in capsys.readouterr().out) == prints
