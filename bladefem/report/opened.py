@@ -229,6 +229,53 @@ class RunFolder:
         nodal_diameter: int | None = None,
     ) -> object:
         """One mode on the sector, of the excited nodal diameter when none is named."""
+        part, single = self._modes_of(data, "plot", mode, nodal_diameter)
+        shapes = ModeSet(
+            part["frequency"].to_numpy(),
+            part["shape"].to_numpy(),
+            single,
+            part["residual"].to_numpy(),
+        )
+        return modes.draw_mode(self.mesh, shapes, mode - 1, file)
+
+    def mode_shape(self, mode: int = 1, nodal_diameter: int | None = None) -> pd.DataFrame:
+        """The shape of one mode as a table, a row a node, for a spreadsheet or another program.
+
+        Args:
+            mode: number from 1.
+            nodal_diameter: the excited one when left out.
+
+        Returns:
+            columns x, y, z [m], the places of the points of ``mesh.vtu``, and "ux real",
+            "ux imaginary", ... over the largest displacement of a node in the sector or body (1);
+            real where that node moves most. ``attrs`` has frequency [Hz] and nodal_diameter.
+
+        Raises:
+            InputError: the run has no such mode.
+        """
+        part, single = self._modes_of(self.modes.data, "mode_shape", mode, nodal_diameter)
+        one = part.isel(mode=mode - 1)
+        shape = one["shape"].to_numpy()
+        length = np.linalg.norm(shape, axis=1)
+        # the displacement of a node is an ellipse; its longest direction is in the larger part
+        largest = shape[length.argmax()]
+        turned = shape * np.exp(-1j * np.angle(np.sum(largest**2)) / 2) / length.max()
+        table = pd.DataFrame(one["position"].to_numpy(), columns=["x [m]", "y [m]", "z [m]"])
+        for k, axis in enumerate("xyz"):
+            table[f"u{axis} real"] = turned[:, k].real
+            table[f"u{axis} imaginary"] = turned[:, k].imag
+        table.attrs = {"frequency": float(one["frequency"]), "nodal_diameter": single}
+        return table
+
+    def _modes_of(
+        self, data: xr.Dataset, asked: str, mode: int, nodal_diameter: int | None
+    ) -> tuple[xr.Dataset, int | None]:
+        """The modes of one nodal diameter, the excited one when none is named, with its number;
+        None for a body without a wheel.
+
+        Raises:
+            InputError: no such mode or nodal diameter; begins with what was asked for.
+        """
         known = data["nodal_diameter"].to_numpy()
         wanted = nodal_diameter
         if wanted is None:
@@ -239,18 +286,11 @@ class RunFolder:
             # the modes of a body without cyclic faces are stored under -1
             listed = [str(n) for n in known if n >= 0]
             wheel = f"one of {', '.join(listed)}" if listed else "it to be left out: no wheel"
-            raise InputError(f"plot: nodal_diameter = {wanted} is not there, expected {wheel}")
+            raise InputError(f"{asked}: nodal_diameter = {wanted} is not there, expected {wheel}")
         part = data.sel(nodal_diameter=wanted)
         if not 1 <= mode <= part.sizes["mode"]:
-            raise InputError(f"plot: mode = {mode}, expected 1 to {part.sizes['mode']}")
-        single = None if wanted < 0 else int(wanted)
-        shapes = ModeSet(
-            part["frequency"].to_numpy(),
-            part["shape"].to_numpy(),
-            single,
-            part["residual"].to_numpy(),
-        )
-        return modes.draw_mode(self.mesh, shapes, mode - 1, file)
+            raise InputError(f"{asked}: mode = {mode}, expected 1 to {part.sizes['mode']}")
+        return part, None if wanted < 0 else int(wanted)
 
 
 SHOWN_COLUMNS = (

@@ -240,6 +240,36 @@ def test_a_mode_that_is_not_there_is_named(run, asked, said):
         run._draw_modes(data, **{"nodal_diameter": 9, **asked})
 
 
+def test_a_mode_shape_is_a_table_for_other_programs(run, monkeypatch):
+    """Two nodes: one on an ellipse three times as long as wide and turned by 0.7 rad in phase, one
+    that moves half as far along y.
+    """
+    shape = np.zeros((1, 2, 2, 3), complex)
+    shape[0, 1] = np.exp(0.7j) * np.array([[6.0, 2.0j, 0.0], [0.0, 3.0, 0.0]])
+    over = ("nodal_diameter", "mode")
+    data = xr.Dataset(
+        {
+            "frequency": (over, [[100.0, 250.0]]),
+            "residual": (over, [[0.0, 0.0]]),
+            "shape": ((*over, "node", "direction"), shape),
+            "position": (("node", "direction"), [[0.2, 0.0, 0.0], [0.3, 0.1, 0.0]]),
+        },
+        {"nodal_diameter": [9], "mode": [1, 2]},
+    )
+    monkeypatch.setattr(type(run), "group", lambda self, name: data)
+    # of its own, as results that were read once are kept
+    run = type(run)(run.folder, run.scene)
+    table = run.mode_shape(2, nodal_diameter=9)
+    size = np.sqrt(40)
+    np.testing.assert_allclose(table["ux real"], [6 / size, 0], atol=1e-12)
+    np.testing.assert_allclose(table["uy imaginary"], [2 / size, 0], atol=1e-12)
+    np.testing.assert_allclose(table["uy real"], [0, 3 / size], atol=1e-12)
+    assert list(table["x [m]"]) == [0.2, 0.3]
+    assert table.attrs == {"frequency": 250.0, "nodal_diameter": 9}
+    with pytest.raises(InputError, match=r"^mode_shape: mode = 3, expected 1 to 2$"):
+        run.mode_shape(3, nodal_diameter=9)
+
+
 def test_a_single_blade_has_no_nodal_diameters(run):
     coordinates = {"nodal_diameter": [-1], "mode": [1]}
     data = xr.Dataset({"frequency": (("nodal_diameter", "mode"), [[1.0]])}, coordinates)
