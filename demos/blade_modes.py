@@ -41,11 +41,20 @@ bodies = bladefem.Bodies(scene, mesh, comm)
 found = modes(constrain(bodies.still_blade), 6)
 
 # %% [markdown]
-# The families are named by comparing the motion of the aerofoil with pure bending and twisting (MAC).
+# The families are named by comparing the motion of the aerofoil with pure bending and twisting (MAC, modal assurance
+# criterion: 1 where both are alike). A mode is called coupled where another mode resembles the same pure motion more. The
+# aerofoil's share is its part of the squared displacements, integrated over the body.
 
 # %%
 if comm.rank == 0:
-    print(family_table(found, mesh).to_string(index=False))
+    names = {
+        "frequency": "frequency [Hz]",
+        "mac": "MAC",
+        "aerofoil_share": "aerofoil's share",
+    }
+    print(
+        family_table(found, mesh).rename(columns=names).to_string(index=False, float_format="%.5g")
+    )
     if not coarse:
         from bladefem.view.modes import draw_mode_sheet, save_modes_vtu
 

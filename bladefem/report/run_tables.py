@@ -95,15 +95,15 @@ def _summary(result: SolvedRun) -> pd.DataFrame:
     place = table.columns.get_loc("reduction") + 1
     mode_alone = result.strength.alternating * table["peak_amplitude"].to_numpy()
     table.insert(place, "mode_stress", mode_alone)
+    if result.damped:
+        table.insert(place, "stress_error", _stress_errors(result, len(table)))
+        table.insert(place, "alternating_stress", _alternating(result, len(table)))
     # of a blade with a flow the damping without damper is not the scene's
     if not has_flow(result.scene):
         frequency, height = table["peak_frequency"].to_numpy(), table["peak_amplitude"].to_numpy()
         free = (float(frequency[0]), float(height[0]))
         own = result.scene.operation.damping
         table.insert(place, "equivalent_damping", equivalent_damping(own, frequency, height, free))
-    if result.damped:
-        table.insert(place, "stress_error", _stress_errors(result, len(table)))
-        table.insert(place, "alternating_stress", _alternating(result, len(table)))
     return table
 
 
