@@ -159,6 +159,7 @@ def look_at(file: str | Path) -> Look:
     alike = {} if drawing else _alike_names(raw)
     if not drawing and cut is None:
         alike |= _usual_names(raw, alike)
+    tip = _tip_face(raw, outside, faces, cut)
     return Look(
         Path(file),
         raw,
@@ -173,9 +174,7 @@ def look_at(file: str | Path) -> Look:
         cut,
         bore,
         alike,
-        _missing_in_drawing(cut, _tip_face(raw, outside, faces, cut))
-        if drawing
-        else _missing_names(raw, alike, cut, bore),
+        _missing_in_drawing(cut, tip) if drawing else _missing_names(raw, alike, cut, bore, tip),
     )
 
 
@@ -549,10 +548,12 @@ def _missing_names(
     alike: dict[str, str],
     cut: CutFaces | None,
     bore: tuple[str, ...],
+    tip: str | None,
 ) -> tuple[str, ...]:
     """What a run needs and neither a set of the file nor a guess provides."""
     there = _names_of(raw) | set(alike)
     if cut is not None:
         there |= {"cyclic_low", "clamp"} if bore else {"cyclic_low"}
     needed = [name for name in NEEDED_NAMES if name not in there]
-    return tuple(f"{name}: {NEEDED_NAMES[name]}" for name in needed)
+    hints = {} if tip is None else {"tip_mid": f"; 'tip_mid = {tip}' is the face farthest out"}
+    return tuple(f"{name}: {NEEDED_NAMES[name]}{hints.get(name, '')}" for name in needed)

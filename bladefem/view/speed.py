@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 # relative distance of two waves that are drawn as two lines
 APART = 2e-3
+# of the highest frequency drawn: below it there is no room for a number under a mark
+LOWEST_LABEL = 0.06
 # not as many as colours, so that a pair comes again late
 MARKERS = "osD^vPX*<>h"
 
@@ -340,15 +342,16 @@ def draw_excitations(
         n = int(folded(np.array(order), sectors))
         f = order * speed / (2 * np.pi)
         ax.plot(n, f, "P", color="black", ms=7, zorder=4, label=None if i else "engine order")
+        # below its mark, as beside it the next order's mark may lie; not across the axis
+        low = f < LOWEST_LABEL * table["frequency"].max()
         ax.annotate(
             f"{order}",
             (n, f),
-            # below its mark: beside it the next order's mark may lie
-            (0, -7),
+            (0, 6 if low else -7),
             textcoords="offset points",
             fontsize=7,
             ha="center",
-            va="top",
+            va="bottom" if low else "top",
             zorder=6,
             # an outline, not a box: that washes out the modes below it
             path_effects=[withStroke(linewidth=1.5, foreground="white")],

@@ -50,6 +50,11 @@ def test_cut_faces_and_unit_are_guessed(deck):
     assert (look.cut.low, look.cut.high) == (("face_3",), ("face_4",))
     assert look.bore == ("face_6",) and look.scale == 1e-3
     assert not any(sentence.startswith(("clamp", "cyclic")) for sentence in look.missing)
+    # of the face whose centre is farthest from the axis
+    radius = {face.name: np.hypot(*face.centre[:2]) for face in look.faces}
+    farthest = max(radius, key=radius.get)
+    (tip,) = (sentence for sentence in look.missing if sentence.startswith("tip_mid"))
+    assert tip.endswith(f"'tip_mid = {farthest}' is the face farthest out")
 
 
 def test_the_scene_runs_as_it_is_written(deck):

@@ -76,6 +76,19 @@ def test_interference_rings_what_is_too_close(folder):
     assert ink(folder / "diameters.png") > 0.02
 
 
+def test_numbers_of_low_engine_orders_do_not_cross_the_axis():
+    """Orders 1 to 8 at a hundredth of the highest frequency and more."""
+    table = synthetic.wheel_frequencies()
+    step = table["frequency"].max() / 100
+    figure = draw_interference(table, 24, 2 * np.pi * step, orders=range(1, 9))
+    figure.draw_without_rendering()
+    (ax,) = figure.axes
+    numbers = [text for text in ax.texts if text.get_text().isdigit()]
+    assert len(numbers) == 8
+    floor = ax.get_window_extent().y0
+    assert all(text.get_window_extent().y0 > floor for text in numbers)
+
+
 def test_folding_is_that_of_the_tables():
     orders = np.arange(60)
     for sectors in (7, 12):
