@@ -6,6 +6,7 @@ import dataclasses
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping
+from math import isfinite
 from types import NoneType
 from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
@@ -25,6 +26,8 @@ _AMBIGUOUS_COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\s\d.,+-][^,]*?)\s*")
 
 
 # "36,80 N, 90 N": two values or three
+# a number and a word, no power of ten
+_WITH_LETTERS = re.compile(r"\s*[-+]?[\d.]+\s*[a-df-zA-DF-Z]\S*\s*")
 _MIXED_COMMAS = re.compile(r"\d,\d.*,\s|,\s.*\d,\d")
 
 
@@ -121,11 +124,22 @@ def _parse_float(value: object, field: Field) -> float:
 
 def _parse_int(value: object, field: Field) -> int:
     if isinstance(value, str) and not any(letter.isdigit() for letter in value):
-        raise InputError(f"{field.name} = {shortened(repr(value))}: expected a whole number")
+        raise InputError(f"{field.name} = {shortened(repr(value))}: expected {_whole(field)}")
+    if isinstance(value, str) and _WITH_LETTERS.fullmatch(value):
+        # a count has no unit, and % is none that a message should offer
+        raise InputError(f"{field.name} = {shortened(value)}: expected {_whole(field)}")
     number = parse(value, "1", field.name)
     if number != int(number):
-        raise InputError(f"{field.name} = {value}: expected a whole number")
+        raise InputError(f"{field.name} = {value}: expected {_whole(field)}")
     return _in_range(int(number), field, value)
+
+
+def _whole(field: Field) -> str:
+    """ "a whole number from 6 to 200", as far as the field has a range."""
+    low, high = (field.meta.get(end) for end in ("low", "high"))
+    if low is None or high is None or not (isfinite(low) and isfinite(high)):
+        return "a whole number"
+    return f"{low:g} or {high:g}" if high == low + 1 else f"a whole number from {low:g} to {high:g}"
 
 
 def _parse_bool(value: object, field: Field) -> bool:
@@ -177,7 +191,8 @@ def _parse_tuple(
             "are not, expected a space after each comma between values, and decimals with a point"
         )
     if not items:
-        raise InputError(f"{field.name} = {shortened(value)}: expected at least one value")
+        shown = shortened(value) if value else repr(value)
+        raise InputError(f"{field.name} = {shown}: expected at least one value")
     if len(items) > MOST_VALUES:
         raise InputError(f"{field.name}: {len(items)} values given, expected at most {MOST_VALUES}")
     return tuple(_SCALARS[kinds[0]](item, field) for item in items)
