@@ -73,12 +73,24 @@ def flow_map(
     bodies, order = _bodies(contacts, dt, dt > _longest_step(contacts, nodes))
     precision = np.dtype(np.float32 if single else np.float64)
     carried = _in_precision(bodies, precision), _in_precision(nodes, precision)
-    found = _carry(*carried, steps).astype(float)
+    found = _carry(*carried, _acting_nodes(nodes), steps).astype(float)
     M = len(contacts.stiffness)
     state = np.concatenate([order, np.arange(2 * M, len(found))])
     mapped = np.empty_like(found)
     mapped[np.ix_(state, state)] = found
     return mapped
+
+
+def acting_share(nodes: NodeSteps) -> float:
+    """Share of a period for which nodes have a force, on average; 0 where there are no nodes."""
+    acts = _acting_nodes(nodes)
+    return float(acts.mean()) if acts.size else 0.0
+
+
+def _acting_nodes(nodes: NodeSteps) -> np.ndarray:
+    """(S, n) whether a node has a force after each step."""
+    parts = nodes.before, nodes.after_motion, nodes.before_motion
+    return np.logical_or.reduce([part.any(axis=(2, 3)) for part in parts])
 
 
 def _in_precision(parts: Any, precision: np.dtype) -> Any:
@@ -152,51 +164,85 @@ def _bodies(contacts: OpenContacts, dt: float, mean: bool) -> tuple[_Bodies, np.
 
 
 @njit(**KERNEL)
-def _carry(bodies, nodes, steps):
-    """(2M+m, 2M+m) map, states in the order of the groups.
+def _carry(bodies, nodes, acts, steps):
+    """(2M+m, 2M+m) map, states in the order of the groups; zero for forces that are none.
 
     The state between two steps is kept without the forces after the first one, which act in
     ``carried`` together with those before the second. The two differ where a node changes its state
-    inside a step.
+    inside a step. An open node has no force, and its motion is not asked for: what is kept of
+    forces F and displacements W are the rows of the nodes that act.
+
+    Args:
+        acts: (S, n) whether a node has a force after each step.
     """
     S, _n, d, _ = nodes.before.shape
-    rows, M = bodies.reading.shape
-    m = bodies.carried.shape[1]
-    size = 2 * M + m
-    precision = bodies.reading.dtype
-    node_of = _nodes_of_forces(bodies.force, d, m)
-    X, F = _unit_disturbances(bodies, nodes.share[0], node_of)
-    Q = np.empty((M, size), precision)
-    free = np.empty((rows, size), precision)
-    W = np.empty((rows, size), precision)
-    flexible = np.empty((rows, m), precision)
-    rhs = np.empty((m, size), precision)
-    next_X = np.empty((2 * M, size), precision)
-    pushed = np.empty((2 * M, size), precision)
-    inverse = np.empty((m, m), precision)
-    _flexibility(bodies, nodes.share[0], node_of, flexible)
+    node_of = _nodes_of_forces(bodies.force, d, bodies.carried.shape[1])
+    acting = _forces_of(bodies.force, d, acts[0])
+    begun = acting
+    rows = _rows_of(d, acts[0], acts[1 % S])
+    X, F = _unit_disturbances(bodies, nodes.share[0], node_of, acting)
+    next_X = np.empty_like(X)
+    Q = np.empty((bodies.reading.shape[1], X.shape[1]), X.dtype)
+    flexible = _flexibility(bodies, nodes.share[0], node_of, rows, acting)
+    inverse = np.empty((0, 0), X.dtype)
     _displacements(bodies.starts, X, Q)
-    np.dot(bodies.reading, Q, out=free)
-    np.dot(flexible, F, out=W)
-    _subtract_from(free, W)
+    W = _moved(bodies.reading, rows, Q)
+    _take_product(flexible, F, W)
     for k in range(1, steps + 1):
         j = k % S
         last = k - 1
         _free_step(bodies, X, next_X)
         X, next_X = next_X, X
-        np.dot(bodies.carried, F, out=pushed)
-        _add_matrix(pushed, X)
-        _changed_forces(bodies, nodes.share[last], nodes.share[j], node_of, F, X)
+        _add_carried(bodies.carried, acting, F, X)
+        shares = nodes.share[last], nodes.share[j]
+        _changed_forces(bodies, shares, node_of, acting, F, X)
         _displacements(bodies.starts, X, Q)
-        np.dot(bodies.reading, Q, out=free)
-        _known_forces(bodies.force, nodes, j, free, W, F, rhs)
+        before = acting, rows, F, W
+        acting = _forces_of(bodies.force, d, acts[j])
+        rows = _rows_of(d, acts[j], acts[(j + 1) % S])
+        free = _moved(bodies.reading, rows, Q)
+        rhs = _known_forces(bodies.force, nodes, j, before, acting, rows, free)
+        flexible = _flexibility(bodies, nodes.share[j], node_of, rows, acting)
         if k == 1 or _differ(nodes, j, last):
-            _flexibility(bodies, nodes.share[j], node_of, flexible)
-            copy_matrix(_inverse_of_contact(nodes.after_motion[j], bodies.force, flexible), inverse)
-        np.dot(inverse, rhs, out=F)
-        np.dot(flexible, F, out=W)
-        _subtract_from(free, W)
-    return _whole_state(bodies, nodes.share[steps % S], node_of, X, F)
+            B = nodes.after_motion[j]
+            inverse = _inverse_of_contact(B, bodies.force, rows, acting, flexible)
+        F = _product(inverse, rhs)
+        _take_product(flexible, F, free)
+        W = free
+    return _whole_map(bodies, nodes.share[steps % S], node_of, begun, acting, X, F)
+
+
+@njit(**INNER_KERNEL)
+def _forces_of(force, d, acts):
+    """Numbers of the forces of the nodes that act."""
+    found = np.empty(len(force), np.int64)
+    count = 0
+    for row in range(len(force)):
+        if force[row] >= 0 and acts[row // d]:
+            found[count] = force[row]
+            count += 1
+    return found[:count]
+
+
+@njit(**INNER_KERNEL)
+def _rows_of(d, acts, acts_next):
+    """Numbers of the displacements of the nodes that act after a step or the next one."""
+    found = np.empty(d * len(acts), np.int64)
+    count = 0
+    for row in range(len(found)):
+        if acts[row // d] or acts_next[row // d]:
+            found[count] = row
+            count += 1
+    return found[:count]
+
+
+@njit(**INNER_KERNEL)
+def _places(numbers, size):
+    """(size,) place of each number, -1 where it is none of them."""
+    place = np.full(size, -1)
+    for i in range(len(numbers)):
+        place[numbers[i]] = i
+    return place
 
 
 @njit(**INNER_KERNEL)
@@ -210,33 +256,43 @@ def _nodes_of_forces(force, d, m):
 
 
 @njit(**INNER_KERNEL)
-def _unit_disturbances(bodies, share, node_of):
-    """Each state and each force disturbed by one: states (2M, 2M+m) without the forces after the
-    step, and forces (m, 2M+m).
+def _unit_disturbances(bodies, share, node_of, acting):
+    """Each state and each acting force disturbed by one: states (2M, 2M+k) without the forces after
+    the step, and forces (k, 2M+k).
     """
-    states, m = bodies.ended.shape
-    X = np.zeros((states, states + m), bodies.ended.dtype)
-    F = np.zeros((m, states + m), bodies.ended.dtype)
+    states = bodies.ended.shape[0]
+    size = states + len(acting)
+    X = np.zeros((states, size), bodies.ended.dtype)
+    F = np.zeros((len(acting), size), bodies.ended.dtype)
     for i in range(states):
         X[i, i] = 1.0
-    for c in range(m):
+    for c in range(len(acting)):
         F[c, states + c] = 1.0
+        weight = 2.0 * (1.0 - share[node_of[acting[c]]])
         for i in range(states):
-            X[i, states + c] = -2.0 * (1.0 - share[node_of[c]]) * bodies.ended[i, c]
+            X[i, states + c] = -weight * bodies.ended[i, acting[c]]
     return X, F
 
 
 @njit(**INNER_KERNEL)
-def _whole_state(bodies, share, node_of, X, F):
-    """(2M+m, k) states with the forces after the last step, and these forces."""
+def _whole_map(bodies, share, node_of, begun, acting, X, F):
+    """(2M+m, 2M+m) from the states X (2M, 2M+k) without the forces F (l, 2M+k) after the last step.
+
+    Args:
+        begun: (k,) forces that were disturbed; acting: (l,) forces after the last step.
+    """
     states, m = bodies.ended.shape
-    for c in range(m):
-        weight = 2.0 * (1.0 - share[node_of[c]])
+    for c in range(len(acting)):
+        weight = 2.0 * (1.0 - share[node_of[acting[c]]])
         for i in range(states):
-            _add_row(weight * bodies.ended[i, c], F[c], X[i])
-    full = np.empty((states + m, X.shape[1]), X.dtype)
-    copy_matrix(X, full)
-    copy_matrix(F, full[states:])
+            _add_row(weight * bodies.ended[i, acting[c]], F[c], X[i])
+    full = np.zeros((states + m, states + m), X.dtype)
+    for c in range(X.shape[1]):
+        column = c if c < states else states + begun[c - states]
+        for i in range(states):
+            full[i, column] = X[i, c]
+        for i in range(len(acting)):
+            full[states + acting[i], column] = F[i, c]
     return full
 
 
@@ -270,62 +326,123 @@ def _displacements(starts, X, Q):
 
 
 @njit(**INNER_KERNEL)
-def _changed_forces(bodies, before, after, node_of, F, X):
+def _changed_forces(bodies, shares, node_of, acting, F, X):
     """Add to the states what forces of nodes that change inside a step do more than for half of it.
 
     Args:
-        before, after: (n,) shares of the step before and of this one.
+        shares: (n,) of the step before, and of this one.
     """
-    for c in range(len(node_of)):
-        more_before = 1.0 - 2.0 * before[node_of[c]]
-        more_after = 2.0 * after[node_of[c]] - 1.0
+    before, after = shares
+    for c in range(len(acting)):
+        own = acting[c]
+        more_before = 1.0 - 2.0 * before[node_of[own]]
+        more_after = 2.0 * after[node_of[own]] - 1.0
         if more_before != 0.0 or more_after != 0.0:
             for i in range(X.shape[0]):
-                weight = more_before * bodies.old[i, c] + more_after * bodies.new[i, c]
+                weight = more_before * bodies.old[i, own] + more_after * bodies.new[i, own]
                 _add_row(weight, F[c], X[i])
 
 
 @njit(**INNER_KERNEL)
-def _known_forces(force, nodes, j, free, W, F, rhs):
-    """rhs (m, k) becomes what the forces after a step do not decide themselves."""
+def _known_forces(force, nodes, j, before, acting, rows, free):
+    """(k, 2M+...) what the forces after a step do not decide themselves.
+
+    Args:
+        before: forces that acted, rows, forces and displacements before the step.
+        acting: (k,) forces after it; rows: of the displacements ``free``.
+    """
+    acted, known_rows, F, W = before
     d = nodes.before.shape[2]
-    rhs[:] = 0.0
+    force_before = _places(acted, len(force))
+    row_before = _places(known_rows, len(force))
+    row_now = _places(rows, len(force))
+    place = _places(acting, len(force))
+    rhs = np.zeros((len(acting), free.shape[1]), free.dtype)
     for row in range(len(force)):
         own = force[row]
-        if own < 0:
+        if own < 0 or place[own] < 0:
             continue
+        target = rhs[place[own]]
         i = row // d
         a = row - i * d
         for b in range(d):
             other = i * d + b
-            if force[other] >= 0:
-                _add_row(nodes.before[j, i, a, b], F[force[other]], rhs[own])
-            _add_row(nodes.after_motion[j, i, a, b], free[other], rhs[own])
-            _add_row(nodes.before_motion[j, i, a, b], W[other], rhs[own])
+            if force[other] >= 0 and force_before[force[other]] >= 0:
+                _add_row(nodes.before[j, i, a, b], F[force_before[force[other]]], target)
+            _add_row(nodes.after_motion[j, i, a, b], free[row_now[other]], target)
+            _add_row(nodes.before_motion[j, i, a, b], W[row_before[other]], target)
+    return rhs
 
 
 @njit(**INNER_KERNEL)
-def _flexibility(bodies, share, node_of, flexible):
-    """flexible (n d, m) becomes the displacements at the end of a step for forces after it."""
-    for c in range(len(node_of)):
-        weight = 2.0 * (1.0 - share[node_of[c]])
-        for row in range(flexible.shape[0]):
-            flexible[row, c] = bodies.flexibility[row, c] - weight * bodies.moved[row, c]
+def _flexibility(bodies, share, node_of, rows, acting):
+    """(l, k) displacements of rows at the end of a step for the acting forces after it."""
+    flexible = np.empty((len(rows), len(acting)), bodies.flexibility.dtype)
+    for c in range(len(acting)):
+        own = acting[c]
+        weight = 2.0 * (1.0 - share[node_of[own]])
+        for i in range(len(rows)):
+            row = rows[i]
+            flexible[i, c] = bodies.flexibility[row, own] - weight * bodies.moved[row, own]
+    return flexible
 
 
 @njit(**INNER_KERNEL)
-def _inverse_of_contact(B, force, flexible):
-    """(m, m) inverse of 1 + B times the flexibility, for node blocks B (n, d, d), in double
+def _inverse_of_contact(B, force, rows, acting, flexible):
+    """(k, k) inverse of 1 + B times the flexibility, for node blocks B (n, d, d), found in double
     precision.
     """
     d = B.shape[1]
-    matrix = np.eye(flexible.shape[1])
+    place = _places(acting, len(force))
+    row_now = _places(rows, len(force))
+    matrix = np.eye(len(acting))
     for row in range(len(force)):
-        if force[row] >= 0:
+        if force[row] >= 0 and place[force[row]] >= 0:
             i = row // d
+            target = matrix[place[force[row]]]
             for b in range(d):
-                _add_row(B[i, row - i * d, b], flexible[i * d + b], matrix[force[row]])
-    return np.linalg.inv(matrix)
+                _add_row(B[i, row - i * d, b], flexible[row_now[i * d + b]], target)
+    inverse = np.empty(matrix.shape, flexible.dtype)
+    if len(acting):
+        copy_matrix(np.linalg.inv(matrix), inverse)
+    return inverse
+
+
+@njit(**INNER_KERNEL)
+def _moved(reading, rows, Q):
+    """(l, k) displacements of rows by modal ones Q (M, k)."""
+    chosen = np.empty((len(rows), reading.shape[1]), reading.dtype)
+    for i in range(len(rows)):
+        chosen[i] = reading[rows[i]]
+    return _product(chosen, Q)
+
+
+@njit(**INNER_KERNEL)
+def _add_carried(carried, acting, F, X):
+    """Add to the states X (2M, k) what the acting forces do from one instant to the next."""
+    chosen = np.empty((carried.shape[0], len(acting)), carried.dtype)
+    for c in range(len(acting)):
+        for i in range(carried.shape[0]):
+            chosen[i, c] = carried[i, acting[c]]
+    _add_matrix(_product(chosen, F), X)
+
+
+@njit(**INNER_KERNEL)
+def _take_product(matrix, X, target):
+    """target becomes target - matrix X."""
+    product = _product(matrix, X)
+    for i in range(target.shape[0]):
+        for c in range(target.shape[1]):
+            target[i, c] -= product[i, c]
+
+
+@njit(**INNER_KERNEL)
+def _product(matrix, X):
+    """matrix X; zero where there is nothing to sum."""
+    out = np.zeros((matrix.shape[0], X.shape[1]), X.dtype)
+    if matrix.size and X.size:
+        np.dot(matrix, X, out=out)
+    return out
 
 
 @njit(**INNER_KERNEL)
@@ -351,14 +468,6 @@ def _add_matrix(part, target):
     for i in range(part.shape[0]):
         for j in range(part.shape[1]):
             target[i, j] += part[i, j]
-
-
-@njit(cache=True, error_model="numpy", inline="always")
-def _subtract_from(whole, part):
-    """part (n, k) becomes whole - part."""
-    for i in range(part.shape[0]):
-        for j in range(part.shape[1]):
-            part[i, j] = whole[i, j] - part[i, j]
 
 
 @njit(cache=True, error_model="numpy", inline="always")

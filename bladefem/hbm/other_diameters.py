@@ -89,7 +89,7 @@ def class_growth(
     S = r * -(-max(instants, 16 * (solution.harmonics + 1)) // r)
     ring = _class_ring(bodies, r, angle)
     contacts, nodes = linearised_contacts(model, solution, ring, S, copies=2)
-    if map_operations(contacts, r, S) > most:
+    if map_operations(contacts, nodes, r) > most:
         return Growth()
     part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // r)
     handed = _handed_on(ring, part, angle)

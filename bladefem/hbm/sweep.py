@@ -24,7 +24,7 @@ from .validate_model import check_probe
 BAND_LIMIT = 400
 # unknowns up to which paths are followed wherever contacts lift off; of larger models, where the
 # sweep shows a jump, too
-MAX_PATH_UNKNOWNS = 700
+MAX_PATH_UNKNOWNS = 800
 # a jump: a share of the highest point between neighbours that this share of the band separates
 JUMP_HEIGHT_SHARE = 0.05
 JUMP_WIDTH = 1e-4

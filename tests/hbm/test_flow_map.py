@@ -1,17 +1,19 @@
 """Steps of disturbances: bodies by groups of modes, and springs of closed contacts in the bodies."""
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
-from models import bouncing
+from models import block, bouncing, bouncing_wave
 from scipy import linalg
 
-from bladefem.hbm.closed_contacts import coupled_groups
-from bladefem.hbm.linearised_flow import linear_steps, longest_linear_step
+from bladefem.hbm.closed_contacts import OpenContacts, coupled_groups
+from bladefem.hbm.flow_map import NodeSteps, acting_share, flow_map
+from bladefem.hbm.linearised_flow import group_steps, linear_steps, longest_linear_step
 from bladefem.hbm.sector_modes import SectorModes, sector_modes
 from bladefem.hbm.solve import solve
-from bladefem.hbm.stability import _leading
+from bladefem.hbm.stability import _handed_on, _leading, linearised_contacts
 
 
 def test_groups_of_modes_step_as_all_of_them_together():
@@ -96,3 +98,51 @@ def test_a_stiff_contact_that_slips_is_no_instability_of_its_steps():
     system = sector_modes(model)
     assert abs(_leading(model, point, system, 128, np.inf)) < 10
     assert abs(_leading(model, point, system, 512, np.inf)) == pytest.approx(0.83, rel=0.01)
+
+
+def plain_map(contacts: OpenContacts, nodes: NodeSteps, dt: float, steps: int) -> np.ndarray:
+    """The map of (q, v, f) with the forces of all nodes in every step, of nodes all of whose
+    directions have a force.
+    """
+    M, m = contacts.push.shape
+    every = (np.arange(M),)
+    ((_, (E, before, after)),) = group_steps(contacts.stiffness, contacts.damping, every, dt)
+    S, n, d, _ = nodes.before.shape
+    U, R = contacts.reading, contacts.flexibility
+    X, F = np.eye(2 * M, 2 * M + m), np.eye(m, 2 * M + m, 2 * M)
+    W = U @ X[:M] - R @ F
+    for k in range(1, steps + 1):
+        # what acts in a step: the force before it for a share of it, then the one after it
+        share = np.repeat(nodes.share[k % S], d)
+        start, end = -before @ contacts.push * 2 * share, -after @ contacts.push * 2 * (1 - share)
+        of_force, of_end, of_start = (
+            linalg.block_diag(*part[k % S])
+            for part in (nodes.before, nodes.after_motion, nodes.before_motion)
+        )
+        X = E @ X + start @ F
+        known = of_force @ F + of_start @ W + of_end @ U @ X[:M]
+        F = np.linalg.solve(np.eye(m) + of_end @ (R - U @ end[:M]), known)
+        X += end @ F
+        W = U @ X[:M] - R @ F
+    return np.concatenate([X, F])
+
+
+@pytest.mark.parametrize("made", [bouncing, bouncing_wave, partial(block, n0=0.02, force=0.5)])
+def test_nodes_that_lift_off_are_left_out_while_they_are_open(made):
+    """Against the map with all forces: the same for the forces that a motion has, and the same
+    multipliers.
+    """
+    model = made()
+    point = solve(model, 1.3, 7, 256)
+    assert point.converged and point.states["lift"] == len(point.w)
+    system = sector_modes(model)
+    S = 128
+    contacts, nodes = linearised_contacts(model, point, system, S)
+    steps, dt = S // system.blades, 2 * np.pi / 1.3 / S
+    assert 0.2 < acting_share(nodes) < 0.9
+    found, expected = (carry(contacts, nodes, dt, steps) for carry in (flow_map, plain_map))
+    begun = found.any(axis=0)
+    np.testing.assert_allclose(found[:, begun], expected[:, begun], rtol=1e-9, atol=1e-11)
+    values = [np.sort(abs(linalg.eigvals(_handed_on(system, part)))) for part in (found, expected)]
+    np.testing.assert_allclose(*values, atol=1e-7)
+    np.testing.assert_allclose(values[0][-4:], values[1][-4:], rtol=1e-9)
