@@ -12,12 +12,11 @@ from typing import Any
 from bladefem.errors import InputError
 
 from .extract_arrays import Groups
-from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Wedge
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile
-from .root import root_slots
 from .section import FILLET_ANGLE, TRAILING_EDGE_RATIO
 from .sector_names import foot_curves, shroud_faces, slot_curves
-from .shroud import Block
+from .sector_shape import SectorShape
 
 # element along the leading edge over those of the aerofoil
 LEADING_EDGE_SIZE = 0.6
@@ -207,26 +206,26 @@ def set_sizes(
 def refined_parts(
     gmsh: ModuleType,
     groups: Groups,
-    section: Profile,
+    shape: SectorShape,
     sizes: Sizes,
-    below: tuple[Root, Shank, Disc],
-    block: Block | None,
 ) -> list[Refined]:
-    """Fillet, foot of the shank, slots of the root and shroud, those that the sector has.
-
-    Args:
-        below: root, shank and disc.
-    """
+    """Fillet, foot of the shank, slots of the root and shroud, those that the sector has."""
     fillet = groups.faces.get("fillet", [])
     details = [
         Refined("SurfacesList", fillet, sizes.fillet, FILLET_GROWTH, sizes.base),
-        Refined("CurvesList", foot_curves(gmsh, section), sizes.foot, FOOT_GROWTH, 2 * sizes.base),
+        Refined(
+            "CurvesList",
+            foot_curves(gmsh, shape.profile),
+            sizes.foot,
+            FOOT_GROWTH,
+            2 * sizes.base,
+        ),
     ]
-    root, shank, disc = below
-    if root.lobes:
-        inside = slot_curves(gmsh, root_slots(root, shank, disc), disc)
-        wide = SLOT_SIZE * root.clearance * sizes.coarsening
+    if shape.root.lobes:
+        inside = slot_curves(gmsh, shape.slots, shape.disc)
+        wide = SLOT_SIZE * shape.root.clearance * sizes.coarsening
         details.append(Refined("CurvesList", inside, wide, SLOT_GROWTH, sizes.base))
+    block = shape.block
     if block is not None:
         faces = [t for tags in shroud_faces(gmsh, _all_faces(gmsh), block).values() for t in tags]
         thick = min(sizes.aerofoil, float(block.high[0] - block.low[0]))
