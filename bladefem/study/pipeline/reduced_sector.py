@@ -93,7 +93,7 @@ def reduce_sector(
         readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
         spanned: also what the modes of a wheel span, see `Reduced.span`.
     """
-    from ...fem.ports import port_model
+    from ...fem.ports import PortReduction, port_model
 
     scene = bodies.scene
     mesh = bodies.mesh
@@ -108,16 +108,15 @@ def reduce_sector(
 
         def blade_model(some: Bodies) -> PortModel:
             flex = some.factorised(0)
-            return port_model(
-                flex.con,
+            wanted = PortReduction(
                 ports.matrix,
                 ports.names,
                 modes,
                 kind=kind,
-                flex=flex,
                 solver=solver,
                 spin=rotation_of(some),
             )
+            return port_model(flex.con, wanted, flex)
 
         sector = {0: on_one_rank(bodies, blade_model)}
 
@@ -138,20 +137,14 @@ def reduce_sector(
 def _reduced_damper(bodies: Bodies, ports: Ports) -> tuple[PortModel, float]:
     """The floating damper at its ports, and its mass [kg]."""
     from ...fem.loads import body_mass
-    from ...fem.ports import port_model
+    from ...fem.ports import PortReduction, port_model
 
     flex = bodies.damper
     solver = eigensolver(bodies.scene)
-    model = port_model(
-        flex.con,
-        ports.matrix,
-        ports.names,
-        DAMPER_MODES,
-        flex=flex,
-        solver=solver,
-        spin=rotation_of(bodies),
+    wanted = PortReduction(
+        ports.matrix, ports.names, DAMPER_MODES, solver=solver, spin=rotation_of(bodies)
     )
-    return model, body_mass(flex.con.body)
+    return port_model(flex.con, wanted, flex), body_mass(flex.con.body)
 
 
 def _reduced_diameters(
@@ -168,7 +161,7 @@ def _reduced_diameters(
     from ...fem.compat import MPI
     from ...fem.diameter_space import sector_span
     from ...fem.groups import shared_out
-    from ...fem.ports import port_models
+    from ...fem.ports import PortReduction, port_models
 
     scene = bodies.scene
     solver = eigensolver(scene)
@@ -185,16 +178,19 @@ def _reduced_diameters(
     interior = _interior_of_ranks(bodies, ports, len(wanted))
 
     def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
-        steps = port_models(
-            some_bodies.frame,
+        reduction = PortReduction(
             ports.matrix,
             ports.names,
             modes,
-            some,
             kind=scene.model.reduction,
             solver=solver,
-            kept=some_bodies.kept.pop(KEPT_MODES, None),
             spin=rotation_of(some_bodies),
+        )
+        steps = port_models(
+            some_bodies.frame,
+            reduction,
+            some,
+            kept=some_bodies.kept.pop(KEPT_MODES, None),
             seen=keep_vectors if spanned else None,
             interior=interior,
         )
