@@ -25,11 +25,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeVar
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, spin_axis
 
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
@@ -37,19 +36,17 @@ from ..fem.flexibility import Flexibility
 from ..fem.loads import body_mass, centrifugal
 from ..scene.units import newtons
 from ..util.arrays import RealArray
-from .interface_law import InterfaceLaw, closure_of, compliance_at
-from .patch import initial_gap, port_matrix
-from .seating import (
-    ContactProblem,
+from .condensed_bodies import (
+    CondensedBodies,
     condense_blade,
     condense_body,
     held_motions,
     rigid_and_load,
-    spin_axis,
 )
+from .interface_law import InterfaceLaw, closure_of, compliance_at
+from .patch import initial_gap, port_matrix
+from .seating import ContactProblem
 
-# number of the translation along the engine axis among the rigid motions of a body in space
-AXIAL_TRANSLATION = 2
 # accepted residual of a step, over the largest force
 RESIDUAL_TOLERANCE = 1e-10
 # Newton steps of a load step, and halvings of one
@@ -67,30 +64,8 @@ MIN_LOAD_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
-class FrictionalProblem:
-    """All ports of two bodies, node-major (normal, tangents): n nodes, m ports.
-
-    "For unit rotation" means for a speed of 1 rad/s; multiply by the speed squared.
-    """
-
-    patches: tuple[Patch, ...]
-    # (m, m) blade and damper, elastic [m/N]
-    flexibility: RealArray
-    # (n,) gap before anything moves [m]
-    clearance: RealArray
-    # (m,) damper minus blade by the rotation of the blade, for unit rotation
-    blade_swell: RealArray
-    # (m,) damper minus blade by the damper's deformation under its load, for unit rotation
-    damper_swell: RealArray
-    # (m, d) of unit rigid motions of the damper; rotations per length
-    rigid: RealArray
-    # (d,) centrifugal load on the damper, for unit rotation
-    load: RealArray
-    # of the damper as meshed [kg]
-    mass: float
-
-
-Seated = TypeVar("Seated", ContactProblem, FrictionalProblem)
+class FrictionalProblem(CondensedBodies):
+    """Two bodies at all ports of their patches, node-major (normal, tangents)."""
 
 
 @dataclass(frozen=True)
@@ -155,22 +130,6 @@ def frictional_problem(
     return FrictionalProblem(
         tuple(patches), C + C_damper, gap, -blade_swell, damper_swell, rigid, load, body_mass(body)
     )
-
-
-def hold_axially(problem: Seated) -> Seated:
-    """A contact problem whose damper has a stop along the engine axis, which takes the load along
-    it and lets the damper turn.
-
-    Raises:
-        InputError: the bodies are plane.
-    """
-    if len(problem.load) < 6:
-        raise InputError(
-            'damper.axial = "held": a plane damper does not move along the engine axis, expected '
-            '"free"'
-        )
-    others = np.arange(len(problem.load)) != AXIAL_TRANSLATION
-    return replace(problem, rigid=problem.rigid[:, others], load=problem.load[others])
 
 
 def normal_part(problem: FrictionalProblem) -> ContactProblem:

@@ -7,9 +7,9 @@ import pytest
 from wedge import wedge_mesh
 
 from bladefem.contact.admissible_load import holds_itself, normal_load_bounds
+from bladefem.contact.condensed_bodies import hold_axially
 from bladefem.contact.frictional_seating import (
     frictional_problem,
-    hold_axially,
     seat_with_friction,
 )
 from bladefem.contact.interface_law import InterfaceLaw
