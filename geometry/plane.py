@@ -18,6 +18,7 @@ from .finalise_mesh import Motion, complete_mesh, mesh_model
 from .mesh import Mesh, Sector
 from .parameters import MeshSize, Plane
 from .session import gmsh_session, gmsh_step
+from .size_fields import threshold_field
 
 # on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
 SEAT_ELEMENTS = 40
@@ -164,19 +165,15 @@ def _set_sizes(
     contact: float,
 ) -> None:
     field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
     names = ("seat_left", "seat_right", "damper_left", "damper_right")
-    field.setNumbers(distance, "CurvesList", [c for name in names for c in groups.faces[name]])
-    field.setNumber(distance, "Sampling", 100)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", contact),
-        ("SizeMax", base),
-        ("DistMin", contact),
-        ("DistMax", 5 * base),
-    ):
-        field.setNumber(threshold, name, value)
+    threshold = threshold_field(
+        field,
+        "CurvesList",
+        [c for name in names for c in groups.faces[name]],
+        (contact, base),
+        (contact, 5 * base),
+        samples=100,
+    )
     field.setAsBackgroundMesh(threshold)
     gmsh.option.setNumber("Mesh.MeshSizeMin", contact / 2)
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 from types import ModuleType
-from typing import Any
 
 from bladefem.errors import InputError
 
@@ -17,6 +16,7 @@ from .profile import Profile
 from .section import FILLET_ANGLE, TRAILING_EDGE_RATIO
 from .sector_names import foot_curves, shroud_faces, slot_curves
 from .sector_shape import SectorShape
+from .size_fields import box_field, threshold_field
 
 # element along the leading edge over those of the aerofoil
 LEADING_EDGE_SIZE = 0.6
@@ -172,12 +172,12 @@ def set_sizes(
     y_in = float(abs(profile.seats[:, 0, 1]).max())
     below = sizes.disc, 5 * sizes.base
     boxes = [
-        _box_field(field, sizes.base, *below, [profile.underside, profile.top, -10, 10, -10, 10]),
-        _box_field(field, sizes.aerofoil, *below, [profile.underside, 10, -10, 10, -10, 10]),
+        box_field(field, sizes.base, *below, [profile.underside, profile.top, -10, 10, -10, 10]),
+        box_field(field, sizes.aerofoil, *below, [profile.underside, 10, -10, 10, -10, 10]),
     ]
     for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
         boxes.append(
-            _box_field(
+            box_field(
                 field,
                 sizes.contact,
                 sizes.disc,
@@ -186,11 +186,23 @@ def set_sizes(
             )
         )
     boxes += [
-        _distance_field(field, curves, size, sizes.aerofoil)
+        threshold_field(
+            field,
+            "CurvesList",
+            curves,
+            (size, 10 * sizes.aerofoil),
+            (size / 2, 20 * sizes.aerofoil),
+        )
         for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)
     ]
     boxes += [
-        _growing_field(field, one.kind, one.tags, one.size, one.growth, one.reach)
+        threshold_field(
+            field,
+            one.kind,
+            one.tags,
+            (one.size, one.size + 10 * one.reach * one.growth),
+            (0.0, 10 * one.reach),
+        )
         for one in details
         if one.tags and one.size > 0
     ]
@@ -309,67 +321,6 @@ def _radial_extent(gmsh: ModuleType, curve: int) -> float:
     """Radial extent of a curve [m]."""
     low, _, _, high, _, _ = gmsh.model.getBoundingBox(1, curve)
     return high - low
-
-
-def _growing_field(
-    field: Any,
-    kind: str,
-    tags: list[int],
-    size: float,
-    growth: float,
-    reach: float,
-) -> int:
-    """Elements of a size on curves or surfaces, which grow with the distance up to 10 reach."""
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
-    field.setNumbers(distance, kind, tags)
-    field.setNumber(distance, "Sampling", 60)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", size),
-        ("SizeMax", size + 10 * reach * growth),
-        ("DistMin", 0.0),
-        ("DistMax", 10 * reach),
-    ):
-        field.setNumber(threshold, name, value)
-    return threshold
-
-
-def _box_field(
-    field: Any,
-    inside: float,
-    outside: float,
-    thickness: float,
-    limits: list[float],
-) -> int:
-    tag = field.add("Box")
-    for name, value in zip(("XMin", "XMax", "YMin", "YMax", "ZMin", "ZMax"), limits, strict=True):
-        field.setNumber(tag, name, value)
-    field.setNumber(tag, "VIn", inside)
-    field.setNumber(tag, "VOut", outside)
-    field.setNumber(tag, "Thickness", thickness)
-    return tag
-
-
-def _distance_field(
-    field: Any,
-    curves: list[int],
-    size: float,
-    far: float,
-) -> int:
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
-    field.setNumbers(distance, "CurvesList", curves)
-    field.setNumber(distance, "Sampling", 60)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", size),
-        ("SizeMax", 10 * far),
-        ("DistMin", size / 2),
-        ("DistMax", 20 * far),
-    ):
-        field.setNumber(threshold, name, value)
-    return threshold
 
 
 def count_sector_cells(

@@ -30,6 +30,7 @@ from .parameters import MeshSize, Wedge
 from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
 from .session import gmsh_path, gmsh_session, gmsh_step
+from .size_fields import threshold_field
 from .step_names import solids_of_volumes, written_solids
 from .step_unit import file_unit
 
@@ -342,18 +343,7 @@ def _refine_faces(
 ) -> None:
     """Size ``fine`` on some faces [m], growing to ``base`` within five of its elements."""
     field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
-    field.setNumbers(distance, "SurfacesList", faces)
-    field.setNumber(distance, "Sampling", 60)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", fine),
-        ("SizeMax", base),
-        ("DistMin", fine),
-        ("DistMax", 5 * base),
-    ):
-        field.setNumber(threshold, name, value)
+    threshold = threshold_field(field, "SurfacesList", faces, (fine, base), (fine, 5 * base))
     field.setAsBackgroundMesh(threshold)
 
 
