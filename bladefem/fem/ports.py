@@ -22,9 +22,10 @@ from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .gyroscopic import Spin, constrained_coupling
+from .lanczos import DIRECTION_TOLERANCE, WantedPairs
 from .linalg import apply_block, hermitian_part, inner_products
 from .mode_count import lost_modes
-from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
+from .modes import SLEPC, canonical, elastic_pairs, proven_pairs
 from .open_sector import Opened
 from .separators import reduce_load, separator_solve
 
@@ -290,7 +291,7 @@ def _craig_bampton(
     """
     comm = flex.con.body.comm
     fixed = _fixed_inverse(flex, F, X)
-    _, inner = elastic_pairs(flex, count, inverse=fixed, solver=solver)
+    _, inner = elastic_pairs(flex, WantedPairs(count), inverse=fixed, solver=solver)
     V = np.concatenate([flex.R, X, inner], axis=1)
     V = V / np.sqrt(np.abs(inner_products(comm, V, apply_block(flex.con.M, V)).diagonal()))
     mass = hermitian_part(inner_products(comm, V, apply_block(flex.con.M, V)))
