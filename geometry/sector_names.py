@@ -12,7 +12,7 @@ from bladefem.errors import InputError
 
 from .draw import boundary_centres, face_at, tie_meshes
 from .extract_arrays import Groups
-from .finalise_mesh import Motion
+from .matching import FaceMotion
 from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
 from .profile import Profile, clearing_shift, turn_about_axis
@@ -188,15 +188,13 @@ def next_sector_motion(count: int) -> Sector:
     return Sector(count, turn_about_axis(2 * np.pi / count), np.zeros(3))
 
 
-def face_motions(profile: Profile) -> dict[str, Motion]:
-    """Faces that match, with the motion from master to slave."""
+def face_motions(profile: Profile) -> dict[str, FaceMotion]:
+    """Faces that match, by the name of the pair."""
     on = turn_about_axis(2 * profile.theta)
-    stay = np.eye(3)
-    still = np.zeros(3)
     return {
-        "cyclic": ("cyclic_low", "cyclic_high", on, still),
-        "this": ("seat_right", "damper_left", stay, still),
-        "next": ("seat_left", "damper_right", on, still),
+        "cyclic": FaceMotion("cyclic_low", "cyclic_high", on),
+        "this": FaceMotion("seat_right", "damper_left"),
+        "next": FaceMotion("seat_left", "damper_right", on),
     }
 
 
@@ -206,15 +204,8 @@ def link_faces(
     profile: Profile,
 ) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
-    for master, slave, rotation, shift in face_motions(profile).values():
-        tie_meshes(
-            gmsh,
-            2,
-            groups.faces[master],
-            groups.faces[slave],
-            rotation,
-            shift,
-        )
+    for motion in face_motions(profile).values():
+        tie_meshes(gmsh, 2, groups.faces, motion)
 
 
 def mark_tip(

@@ -1,7 +1,8 @@
-"""Fields of element sizes for gmsh: near curves or surfaces, and in a box."""
+"""Fields of element sizes for gmsh: near curves or surfaces, in a box, and by a formula."""
 
 from __future__ import annotations
 
+from types import ModuleType
 from typing import Any
 
 # points on each curve or surface that distances are measured from
@@ -61,3 +62,12 @@ def box_field(
     field.setNumber(tag, "VOut", outside)
     field.setNumber(tag, "Thickness", thickness)
     return tag
+
+
+def set_size_formula(gmsh: ModuleType, formula: str, least: float) -> None:
+    """Element sizes by a formula of x, y and z [m]; no element below ``least`` [m]."""
+    field = gmsh.model.mesh.field
+    tag = field.add("MathEval")
+    field.setString(tag, "F", formula)
+    field.setAsBackgroundMesh(tag)
+    gmsh.option.setNumber("Mesh.MeshSizeMin", least)

@@ -25,6 +25,7 @@ from .draw import boundary_centres, tie_meshes
 from .finalise_mesh import check_count
 from .fitted_wedge import Named, fit_wedge
 from .imported import check_extent, mesh_of_raw
+from .matching import FaceMotion
 from .mesh import Mesh
 from .parameters import MeshSize, Wedge
 from .raw_mesh import RawMesh, from_gmsh_model
@@ -325,14 +326,7 @@ def _tie_faces(
         )
         best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
         with gmsh_step("imported.file", f"match the faces {master} and {slave}"):
-            tie_meshes(
-                gmsh,
-                2,
-                tags[master],
-                tags[slave],
-                best,
-                np.zeros(3),
-            )
+            tie_meshes(gmsh, 2, tags, FaceMotion(master, slave, best))
 
 
 def _refine_faces(
