@@ -101,7 +101,7 @@ def file_names(imported: Any, wedge: Wedge) -> frozenset[str]:
 
 def _drawing_options(imported: Any, wedge: Wedge) -> dict[str, Any]:
     """Arguments of the functions that draw a STEP file."""
-    from .step_file import FittedDamper
+    from .fitted_wedge import FittedDamper
 
     fitted = None
     if imported.seats is not None:

@@ -12,7 +12,6 @@ the file does not. Solids are meshed separately: bodies that touch are not glued
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -23,11 +22,11 @@ from bladefem.errors import InputError, missing_file
 from .curving import second_order
 from .draw import boundary_centres, tie_meshes
 from .finalise_mesh import check_count
-from .fitted_wedge import Named, fit_wedge
+from .fitted_wedge import FittedDamper, Named, fit_wedge
 from .imported import check_extent, mesh_of_raw
 from .matching import FaceMotion
 from .mesh import Mesh
-from .parameters import MeshSize, Wedge
+from .parameters import MeshSize
 from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
 from .session import gmsh_path, gmsh_session, gmsh_step
@@ -42,17 +41,6 @@ STEP_REMEDY = "expected a STEP file of solids; export it anew from CAD"
 PREVIEW_ELEMENTS = 30
 # of the largest radius: faces that are as near to the axis as the nearest one
 NEAREST_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True)
-class FittedDamper:
-    """A damper to draw between two platform faces of a blade; see fitted_wedge.py."""
-
-    # faces towards the next blade and towards the previous one
-    seats: tuple[str, str]
-    wedge: Wedge
-    # from the platform's edge inwards [m]; of the narrower face when None
-    seat_width: float | None = None
 
 
 def read_step(
@@ -139,8 +127,7 @@ def _drawn_entities(
     named = _apply_names(_named_entities(gmsh, text), read_names(names))
     if fitted is not None:
         on = axis_rotation(axis, 2 * np.pi / sectors)
-        seats = fitted.seats, fitted.wedge, fitted.seat_width
-        named = fit_wedge(gmsh, named, *seats, on, axis)
+        named = fit_wedge(gmsh, named, fitted, on, axis)
     return named | _find_faces(gmsh, named, sectors, axis)
 
 
