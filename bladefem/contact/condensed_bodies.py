@@ -55,6 +55,10 @@ class CondensedBodies:
     # of the damper as meshed [kg]
     mass: float
 
+    def by_patch(self, values: np.ndarray) -> list[np.ndarray]:
+        """Values (n, ...) of all nodes, cut into those of each patch."""
+        return np.split(values, np.cumsum([len(p.area) for p in self.patches])[:-1])
+
 
 AnyBodies = TypeVar("AnyBodies", bound=CondensedBodies)
 

@@ -287,9 +287,9 @@ def _wanted(
 
 def _maps(problem: ContactProblem, solution: LCPSolution) -> list[PressureMap]:
     """Cut the solution into one map a patch."""
-    cuts = np.cumsum([len(p.area) for p in problem.patches])[:-1]
-    gaps = np.split(solution.gap.clip(min=0.0), cuts)
+    forces = problem.by_patch(solution.force)
+    gaps = problem.by_patch(solution.gap.clip(min=0.0))
     return [
         PressureMap(p, f, g, solution.residual)
-        for p, f, g in zip(problem.patches, np.split(solution.force, cuts), gaps, strict=True)
+        for p, f, g in zip(problem.patches, forces, gaps, strict=True)
     ]
