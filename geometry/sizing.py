@@ -7,6 +7,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi
 from types import ModuleType
+from typing import Any
 
 from bladefem.errors import InputError
 
@@ -166,25 +167,7 @@ def set_sizes(
         details: parts with smaller elements.
     """
     field = gmsh.model.mesh.field
-    reach = 4 * sizes.base
-    z = wedge.length / 2
-    radii = profile.seats[..., 0]
-    y_in = float(abs(profile.seats[:, 0, 1]).max())
-    below = sizes.disc, 5 * sizes.base
-    boxes = [
-        box_field(field, sizes.base, *below, [profile.underside, profile.top, -10, 10, -10, 10]),
-        box_field(field, sizes.aerofoil, *below, [profile.underside, 10, -10, 10, -10, 10]),
-    ]
-    for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
-        boxes.append(
-            box_field(
-                field,
-                sizes.contact,
-                sizes.disc,
-                reach,
-                [radii.min() - wedge.base, radii.max(), low, high, -z, z],
-            )
-        )
+    boxes = _sector_boxes(field, profile, wedge, sizes)
     boxes += [
         threshold_field(
             field,
@@ -213,6 +196,30 @@ def set_sizes(
     finest = min([one.size for one in details if one.size > 0], default=1.0)
     gmsh.option.setNumber("Mesh.MeshSizeMin", min(sizes.least, sizes.contact, finest))
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
+
+
+def _sector_boxes(field: Any, profile: Profile, wedge: Wedge, sizes: Sizes) -> list[int]:
+    """Fields for all above the rim, for the aerofoil, and round both seats."""
+    reach = 4 * sizes.base
+    z = wedge.length / 2
+    radii = profile.seats[..., 0]
+    y_in = float(abs(profile.seats[:, 0, 1]).max())
+    below = sizes.disc, 5 * sizes.base
+    boxes = [
+        box_field(field, sizes.base, *below, [profile.underside, profile.top, -10, 10, -10, 10]),
+        box_field(field, sizes.aerofoil, *below, [profile.underside, 10, -10, 10, -10, 10]),
+    ]
+    for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
+        boxes.append(
+            box_field(
+                field,
+                sizes.contact,
+                sizes.disc,
+                reach,
+                [radii.min() - wedge.base, radii.max(), low, high, -z, z],
+            )
+        )
+    return boxes
 
 
 def refined_parts(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from ...util.communicator import Communicator
 from .bodies import Bodies, is_wheel, on_one_rank, rotation_of
 from .normal_modes import KEPT_MODES, cost_of_diameter, eigensolver
 from .ports import Ports, blade_ports, damper_ports
+
+if TYPE_CHECKING:
+    from ...fem.ports import PortReduction
 
 # of the elastic damper, its six rigid ones included
 DAMPER_MODES = 16
@@ -93,30 +96,20 @@ def reduce_sector(
         readings: (n_points*dim, q) columns of the port "blade", where blades are to be mistuned.
         spanned: also what the modes of a wheel span, see `Reduced.span`.
     """
-    from ...fem.ports import PortReduction, port_model
+    from ...fem.ports import port_model
 
     scene = bodies.scene
     mesh = bodies.mesh
     ports = blade_ports(mesh, patches, scene.excitation, readings)
     other = damper_ports(mesh, patches)
-    solver = eigensolver(scene)
     span = None
     if is_wheel(mesh):
         sector, span = _reduced_diameters(bodies, ports, modes, diameters, spanned)
     else:
-        kind = scene.model.reduction
 
         def blade_model(some: Bodies) -> PortModel:
             flex = some.factorised(0)
-            wanted = PortReduction(
-                ports.matrix,
-                ports.names,
-                modes,
-                kind=kind,
-                solver=solver,
-                spin=rotation_of(some),
-            )
-            return port_model(flex.con, wanted, flex)
+            return port_model(flex.con, _blade_reduction(some, ports, modes), flex)
 
         sector = {0: on_one_rank(bodies, blade_model)}
 
@@ -131,6 +124,20 @@ def reduce_sector(
         {n: body.damping for n, body in sector.items() if body.damping is not None},
         damper_coriolis=floating.damping,
         span=span,
+    )
+
+
+def _blade_reduction(bodies: Bodies, ports: Ports, modes: int) -> PortReduction:
+    """The blade side's reduction to its ports, as the scene has it."""
+    from ...fem.ports import PortReduction
+
+    return PortReduction(
+        ports.matrix,
+        ports.names,
+        modes,
+        kind=bodies.scene.model.reduction,
+        solver=eigensolver(bodies.scene),
+        spin=rotation_of(bodies),
     )
 
 
@@ -161,13 +168,11 @@ def _reduced_diameters(
     from ...fem.compat import MPI
     from ...fem.diameter_space import sector_span
     from ...fem.groups import shared_out
-    from ...fem.ports import PortReduction, port_models
+    from ...fem.ports import port_models
 
-    scene = bodies.scene
-    solver = eigensolver(scene)
     comm = bodies.comm or MPI.COMM_WORLD
 
-    spanned = spanned and scene.model.reduction == "rubin"
+    spanned = spanned and bodies.scene.model.reduction == "rubin"
     blocks: dict[int, np.ndarray] = {}
 
     def keep_vectors(pairs: Eigenpairs) -> None:
@@ -178,17 +183,9 @@ def _reduced_diameters(
     interior = _interior_of_ranks(bodies, ports, len(wanted))
 
     def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
-        reduction = PortReduction(
-            ports.matrix,
-            ports.names,
-            modes,
-            kind=scene.model.reduction,
-            solver=solver,
-            spin=rotation_of(some_bodies),
-        )
         steps = port_models(
             some_bodies.frame,
-            reduction,
+            _blade_reduction(some_bodies, ports, modes),
             some,
             kept=some_bodies.kept.pop(KEPT_MODES, None),
             seen=keep_vectors if spanned else None,
