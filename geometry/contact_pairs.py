@@ -22,18 +22,20 @@ from .draw import (
     draw_polygon,
     draw_prism,
     imprint_marks,
-    set_background,
     tie_meshes,
 )
 from .extract_arrays import Groups
 from .finalise_mesh import complete_mesh, mesh_model
+from .matching import FaceMotion
 from .mesh import Mesh
 from .parameters import HertzPair, MeshSize, Punch
 from .quality import quality_report
 from .session import gmsh_session, gmsh_step
+from .size_fields import set_size_formula
 
 # seat of the Hertz pair over the expected contact radius
 SEAT_RATIO = 2.0
+SEAT_TO_DAMPER = FaceMotion("seat_right", "damper_left")
 
 
 def hertz_pair(hertz: HertzPair, size: MeshSize) -> Mesh:
@@ -167,25 +169,18 @@ def _mesh_facing_bodies(
             (width, upper or seat),
             seat,
         )
-        tie_meshes(
-            gmsh,
-            dimension - 1,
-            groups.faces["seat_right"],
-            groups.faces["damper_left"],
-            np.eye(3),
-            np.zeros(3),
-        )
+        tie_meshes(gmsh, dimension - 1, groups.faces, SEAT_TO_DAMPER)
         distance = "Sqrt(x*x + y*y + z*z)"
-        set_background(
+        set_size_formula(
             gmsh,
+            f"Min({far}, {fine[0]} + 0.3 * Max(0, {distance} - {fine[1]}))",
             fine[0] / 2,
-            MathEval=[{"F": f"Min({far}, {fine[0]} + 0.3 * Max(0, {distance} - {fine[1]}))"}],
         )
         with gmsh_step("mesh.contact_size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, dimension, size)
     return complete_mesh(
         mesh,
-        {"this": ("seat_right", "damper_left", np.eye(3), np.zeros(3))},
+        {"this": SEAT_TO_DAMPER},
         size.scale * far,
         flat=("seat_right", "damper_left"),
     )

@@ -8,6 +8,8 @@ from types import ModuleType
 
 import numpy as np
 
+from .matching import FaceMotion
+
 
 def draw_polygon(gmsh: ModuleType, corners: np.ndarray) -> tuple[int, list[int], list[int]]:
     """Surface, lines and points of a plane polygon (n, 2 or 3) [m]; line i runs from corner i to i
@@ -81,35 +83,18 @@ def face_at(
 def tie_meshes(
     gmsh: ModuleType,
     dimension: int,
-    master: list[int],
-    slave: list[int],
-    rotation: np.ndarray,
-    shift: np.ndarray,
+    tags: dict[str, list[int]],
+    motion: FaceMotion,
 ) -> None:
     """Have gmsh copy the mesh of the master's curves or surfaces onto the slave's under a rigid
     motion.
+
+    Args:
+        tags: of the curves or surfaces, by name.
     """
     affine = np.eye(4)
-    affine[:3, :3] = rotation
-    affine[:3, 3] = shift
-    gmsh.model.mesh.setPeriodic(dimension, slave, master, affine.ravel().tolist())
-
-
-def set_background(
-    gmsh: ModuleType, least: float, **parameters: list[dict[str, str | float]]
-) -> None:
-    """Use the smallest of some size fields, given as kind=[{option: value}, ...]; no element below
-    ``least`` [m].
-    """
-    field = gmsh.model.mesh.field
-    tags = []
-    for kind, setting in ((k, one) for k, settings in parameters.items() for one in settings):
-        tag = field.add(kind)
-        tags.append(tag)
-        for name, value in setting.items():
-            put = field.setString if isinstance(value, str) else field.setNumber
-            put(tag, name, value)
-    minimum = field.add("Min")
-    field.setNumbers(minimum, "FieldsList", tags)
-    field.setAsBackgroundMesh(minimum)
-    gmsh.option.setNumber("Mesh.MeshSizeMin", least)
+    affine[:3, :3] = motion.rotation
+    affine[:3, 3] = motion.shift
+    gmsh.model.mesh.setPeriodic(
+        dimension, tags[motion.slave], tags[motion.master], affine.ravel().tolist()
+    )

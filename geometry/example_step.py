@@ -6,14 +6,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .fillet import with_fillet
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
-from .profile import sector_profile
-from .root import root_slots
 from .sector import blade_solid
-from .sector_check import NO_SHROUD, PLAIN, check_sector
+from .sector_check import NO_SHROUD, PLAIN
+from .sector_shape import sector_shape
 from .session import gmsh_session
-from .shroud import shroud_block
 
 
 def write_blade_step(
@@ -35,15 +32,11 @@ def write_blade_step(
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    check_sector(aerofoil, platform, shank, disc, wedge, root, shroud)
-    aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, MeshSize())
-    shape = sector_profile(platform, shank, disc, wedge)
-    block = shroud_block(shroud, aerofoil, disc, shape.top)
-    slots = root_slots(root, shank, disc)
+    shape = sector_shape(aerofoil, platform, shank, disc, wedge, MeshSize(), root, shroud)
     file = Path(file)
     with gmsh_session() as gmsh:
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
-        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape, block, slots)
+        blade = blade_solid(gmsh, shape)
         gmsh.model.occ.dilate([(3, blade)], 0, 0, 0, 1e3, 1e3, 1e3)
         gmsh.model.occ.remove([e for e in gmsh.model.occ.getEntities(3) if e != (3, blade)])
         gmsh.model.occ.synchronize()

@@ -14,7 +14,7 @@ from bladefem.scene.units import show
 
 from .curving import second_order
 from .extract_arrays import Groups, extract_mesh
-from .matching import match_faces, snap_slaves
+from .matching import FaceMotion, match_faces, snap_slaves
 from .mesh import Mesh, Sector
 from .parameters import MAX_CELLS, MeshSize
 from .quality import edge_of_middle, quality_report, shape_quality, straighten_cells
@@ -29,8 +29,6 @@ REFUSED_QUALITY = 0.02
 # of the element size, one after the other while flat cells are left
 SIZE_FACTORS = (1.0, 0.8, 0.65)
 ALGORITHMS = {"hxt": 10, "delaunay": 1}
-# master, slave, rotation (3, 3), shift (3,) [m]
-Motion = tuple[str, str, np.ndarray, np.ndarray]
 
 
 def mesh_model(
@@ -182,7 +180,7 @@ def _worst_shape(mesh: Mesh) -> float:
 
 def complete_mesh(
     mesh: Mesh,
-    motions: dict[str, Motion],
+    motions: dict[str, FaceMotion],
     size: float,
     sector: Sector | None = None,
     flat: tuple[str, ...] = (),
@@ -190,22 +188,15 @@ def complete_mesh(
     """Pair the faces, make the pairs exact, straighten doubtful cells, and write the report.
 
     Args:
-        motions: pair name -> (master, slave, rotation, shift).
+        motions: by the name of the pair.
         size: element size [m], for the report.
         flat: plane faces, whose mid-side nodes go to the middle of their edges exactly (contact
             needs it).
     """
     mesh = replace(mesh, points=_flatten_faces(mesh, flat))
     pairs = {
-        name: match_faces(
-            mesh.points,
-            mesh.faces,
-            (m, s),
-            mesh.dimension,
-            r,
-            t,
-        )
-        for name, (m, s, r, t) in motions.items()
+        name: match_faces(mesh.points, mesh.faces, motion, mesh.dimension)
+        for name, motion in motions.items()
     }
     mesh = replace(mesh, points=snap_slaves(mesh.points, pairs), pairs=pairs, sector=sector)
     points, straightened = straighten_cells(mesh)

@@ -30,6 +30,34 @@ FLATNESS_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
+class FittedDamper:
+    """A damper to draw between two platform faces of a blade."""
+
+    # faces towards the next blade and towards the previous one
+    seats: tuple[str, str]
+    # its length, base; the angles are those of the faces
+    wedge: Wedge
+    # from the platform's edge inwards [m]; of the narrower face when None
+    seat_width: float | None = None
+
+
+@dataclass(frozen=True)
+class PlaneFace:
+    """A plane face of a solid."""
+
+    # (3,) [m]
+    centre: np.ndarray
+    # (3,) unit vector
+    normal: np.ndarray
+    # (n, 3) [m]
+    corners: np.ndarray
+
+    def turned(self, rotation: np.ndarray) -> PlaneFace:
+        """The face turned by a rotation (3, 3)."""
+        return PlaneFace(rotation @ self.centre, rotation @ self.normal, self.corners @ rotation.T)
+
+
+@dataclass(frozen=True)
 class Flanks:
     """Both flanks of a damper, in the axes of the wheel, the second one under the next blade."""
 
@@ -70,9 +98,7 @@ class Flanks:
 def fit_wedge(
     gmsh: ModuleType,
     named: Named,
-    seats: tuple[str, str],
-    wedge: Wedge,
-    width: float | None,
+    fitted: FittedDamper,
     on: np.ndarray,
     axis: np.ndarray,
 ) -> Named:
@@ -80,9 +106,6 @@ def fit_wedge(
 
     Args:
         named: solids and faces of the file, by name.
-        seats: names of the platform's faces towards the next blade and towards the last one.
-        wedge: its length, base; the angles are those of the faces.
-        width: of the seats, from the platforms' edges inwards [m]; of the narrower face when None.
         on: rotation (3, 3) from a blade to the next one.
         axis: (3,) unit vector of the engine axis.
 
@@ -90,16 +113,10 @@ def fit_wedge(
         InputError: faces that are not there, not plane or not opposite each other, or a damper that
             does not fit.
     """
+    seats = fitted.seats
     right, left = (_single_face(gmsh, named, name) for name in seats)
-    flanks = flanks_between(
-        gmsh,
-        right,
-        left,
-        wedge,
-        width,
-        on,
-        axis,
-    )
+    faces = faces_about_damper(gmsh, right, left, on)
+    flanks = flanks_between(faces, fitted.wedge, fitted.seat_width, axis)
     blade = _owning_solid(gmsh, right)
     before = _solid_faces(gmsh, blade)
     marks = [
@@ -108,7 +125,7 @@ def fit_wedge(
     ]
     with gmsh_step("imported.seats", "cut the seats into the platforms"):
         cut = imprint_marks(gmsh, blade, marks)
-        base, _, _ = draw_polygon(gmsh, flanks.section(wedge))
+        base, _, _ = draw_polygon(gmsh, flanks.section(fitted.wedge))
         drawn = gmsh.model.occ.extrude([(2, base)], *flanks.along)
     damper = next(tag for dim, tag in drawn if dim == 3)
     gmsh.model.occ.synchronize()
@@ -123,68 +140,101 @@ def fit_wedge(
     return result | {(3, "damper"): [damper]} | {(2, name): [face] for name, face in found.items()}
 
 
-def flanks_between(
+def faces_about_damper(
     gmsh: ModuleType,
     right: int,
     left: int,
-    wedge: Wedge,
-    width: float | None,
     on: np.ndarray,
-    axis: np.ndarray,
-) -> Flanks:
-    """Where the damper touches the faces ``right`` of this blade and ``left`` of the next one.
+) -> tuple[PlaneFace, PlaneFace]:
+    """The face ``right`` of this blade and the face ``left`` of the next one.
 
     Raises:
-        InputError: the damper does not fit between them.
+        InputError: the next blade is not on the side of the first face.
     """
     here = _plane_face(gmsh, right)
     there = _plane_face(gmsh, left)
     # the neighbour may be in either sense of the rotation
-    turned = min((on, on.T), key=lambda turn: float(np.linalg.norm(turn @ there[0] - here[0])))
+    turned = min(
+        (on, on.T), key=lambda turn: float(np.linalg.norm(turn @ there.centre - here.centre))
+    )
     if not np.allclose(turned, on):
         raise InputError(
             "imported.seats: the first face looks towards the previous blade, expected the face "
             "towards the next one first; exchange the two names"
         )
-    places = (here[0], on @ there[0])
-    normals = (here[1], on @ there[1])
-    corners = (here[2], there[2] @ on.T)
-    along = np.cross(*normals)
-    if np.linalg.norm(along) < PARALLEL_SINE:
-        along = axis - (axis @ normals[0]) * normals[0]
-    along /= np.linalg.norm(along)
-    along *= 1.0 if along @ axis >= 0 else -1.0
-    low, high = _common_length(corners, along, wedge.length)
+    return here, there.turned(on)
+
+
+def flanks_between(
+    faces: tuple[PlaneFace, PlaneFace],
+    wedge: Wedge,
+    width: float | None,
+    axis: np.ndarray,
+) -> Flanks:
+    """Where the damper touches two faces.
+
+    Args:
+        width: of the seats [m]; of the narrower face when None.
+        axis: (3,) unit vector of the engine axis.
+
+    Raises:
+        InputError: the damper does not fit between them.
+    """
+    along = _damper_direction(faces, axis)
+    middle = (sum(_common_extent(faces, along, wedge.length)) - wedge.length) / 2
+    acrosses = [_across_flank(faces, along, i) for i in (0, 1)]
+    extents = [
+        _extent_along(face.corners, across) for face, across in zip(faces, acrosses, strict=True)
+    ]
+    wanted = _seat_width(extents, width)
     ends = []
-    widths = [_extent_along(corners[i], _across_flank(normals, places, along, i)) for i in (0, 1)]
-    narrowest = min(top - bottom for bottom, top in widths)
-    wanted = narrowest if width is None else width
-    if wanted > narrowest * (1 + ROUNDING_TOLERANCE):
-        raise InputError(
-            f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most {1e3 * narrowest:.4g} "
-            "mm, the width of the narrower platform face"
-        )
-    for i in (0, 1):
-        across = _across_flank(normals, places, along, i)
-        top = widths[i][1]
-        origin = places[i] - (places[i] @ across) * across - (places[i] @ along) * along
-        foot = origin + (low + high - wedge.length) / 2 * along
+    for face, across, (_, top) in zip(faces, acrosses, extents, strict=True):
+        place = face.centre
+        origin = place - (place @ across) * across - (place @ along) * along
+        foot = origin + middle * along
         ends.append([foot + (top - wanted) * across, foot + top * across])
-    middle = (places[0] + places[1]) / 2
-    outward = middle - (middle @ axis) * axis
+    between = (faces[0].centre + faces[1].centre) / 2
+    outward = between - (between @ axis) * axis
     outward -= (outward @ along) * along
     flanks = Flanks(np.array(ends), wedge.length * along, outward / np.linalg.norm(outward))
     _refuse_crossed(flanks)
     return flanks
 
 
-def _common_length(
-    corners: tuple[np.ndarray, np.ndarray],
+def _damper_direction(faces: tuple[PlaneFace, PlaneFace], axis: np.ndarray) -> np.ndarray:
+    """(3,) unit vector along the line in which both planes meet, in the sense of the axis; the
+    axis in one plane.
+    """
+    along = np.cross(faces[0].normal, faces[1].normal)
+    if np.linalg.norm(along) < PARALLEL_SINE:
+        along = axis - (axis @ faces[0].normal) * faces[0].normal
+    along /= np.linalg.norm(along)
+    return along if along @ axis >= 0 else -along
+
+
+def _seat_width(extents: list[tuple[float, float]], width: float | None) -> float:
+    """Width of the seats [m]: the one given, or that of the narrower face.
+
+    Args:
+        extents: of both faces across the damper [m].
+    """
+    narrowest = min(top - bottom for bottom, top in extents)
+    wanted = narrowest if width is None else width
+    if wanted > narrowest * (1 + ROUNDING_TOLERANCE):
+        raise InputError(
+            f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most {1e3 * narrowest:.4g} "
+            "mm, the width of the narrower platform face"
+        )
+    return wanted
+
+
+def _common_extent(
+    faces: tuple[PlaneFace, PlaneFace],
     along: np.ndarray,
     length: float,
 ) -> tuple[float, float]:
     """Where both faces are, along the damper [m]."""
-    extents = [_extent_along(points, along) for points in corners]
+    extents = [_extent_along(face.corners, along) for face in faces]
     low = max(extent[0] for extent in extents)
     high = min(extent[1] for extent in extents)
     if length > (high - low) * (1 + ROUNDING_TOLERANCE):
@@ -196,15 +246,14 @@ def _common_length(
 
 
 def _across_flank(
-    normals: tuple[np.ndarray, np.ndarray],
-    places: tuple[np.ndarray, np.ndarray],
+    faces: tuple[PlaneFace, PlaneFace],
     along: np.ndarray,
     flank: int,
 ) -> np.ndarray:
     """Unit vector in a flank's plane, across the damper, towards the other flank."""
-    direction = np.cross(normals[flank], along)
+    direction = np.cross(faces[flank].normal, along)
     direction /= np.linalg.norm(direction)
-    towards = places[1 - flank] - places[flank]
+    towards = faces[1 - flank].centre - faces[flank].centre
     return direction if direction @ towards >= 0 else -direction
 
 
@@ -244,23 +293,23 @@ def _single_face(
 
 def _is_plane(gmsh: ModuleType, face: int) -> bool:
     """By its points: CAD systems write planes as splines too."""
-    centre, normal, corners = _plane_face(gmsh, face)
+    plane = _plane_face(gmsh, face)
     low, high = gmsh.model.getParametrizationBounds(2, face)
     across = [a + (b - a) * np.linspace(0.05, 0.95, 5) for a, b in zip(low, high, strict=True)]
     grid = np.stack(np.meshgrid(*across), axis=-1).reshape(-1, 2).ravel().tolist()
     points = np.array(gmsh.model.getValue(2, face, grid)).reshape(-1, 3)
-    size = np.ptp(corners, axis=0).max()
-    away = np.abs((np.concatenate([points, corners]) - centre) @ normal).max()
+    size = np.ptp(plane.corners, axis=0).max()
+    away = np.abs((np.concatenate([points, plane.corners]) - plane.centre) @ plane.normal).max()
     return bool(away < FLATNESS_TOLERANCE * size)
 
 
-def _plane_face(gmsh: ModuleType, face: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centre (3,), normal (3,) and corners (n, 3) of a plane face [m]."""
+def _plane_face(gmsh: ModuleType, face: int) -> PlaneFace:
+    """A face that is plane."""
     centre = np.array(gmsh.model.occ.getCenterOfMass(2, face))
     normal = np.array(gmsh.model.getNormal(face, gmsh.model.getParametrization(2, face, centre)))
     points = gmsh.model.getBoundary([(2, face)], oriented=False, recursive=True)
     corners = np.array([gmsh.model.getValue(0, tag, []) for _, tag in points])
-    return centre, normal / np.linalg.norm(normal), corners
+    return PlaneFace(centre, normal / np.linalg.norm(normal), corners)
 
 
 def _owning_solid(gmsh: ModuleType, face: int) -> int:

@@ -24,11 +24,10 @@ from bladefem.errors import InputError, suggestion
 from bladefem.util.arrays import IntegerArray
 
 from .face_distance import distance_to_face
-from .finalise_mesh import Motion
 from .imported_check import STEP_SUFFIXES
 from .jacobian import straight_jacobian
 from .joined_files import joined_files
-from .matching import match_faces, snap_slaves
+from .matching import FaceMotion, match_faces, snap_slaves
 from .mesh import Mesh, Pair, Sector, padded_numbers
 from .named_facets import named_facets
 from .parameters import MeshSize, Wedge
@@ -102,7 +101,7 @@ def file_names(imported: Any, wedge: Wedge) -> frozenset[str]:
 
 def _drawing_options(imported: Any, wedge: Wedge) -> dict[str, Any]:
     """Arguments of the functions that draw a STEP file."""
-    from .step_file import FittedDamper
+    from .fitted_wedge import FittedDamper
 
     fitted = None
     if imported.seats is not None:
@@ -416,29 +415,20 @@ def _find_pairs(
         mesh, pairs["cyclic"] = _cyclic_pair(mesh, on, tolerance, cut_gap)
         mesh = _turned(mesh, _centring_turn(mesh))
     shift = _row_pitch(mesh) if not sectors else np.zeros(3)
-    motions: dict[str, Motion] = {
-        "this": ("seat_right", "damper_left", np.eye(3), np.zeros(3)),
-        "next": ("seat_left", "damper_right", on, shift),
+    motions = {
+        "this": FaceMotion("seat_right", "damper_left"),
+        "next": FaceMotion("seat_left", "damper_right", on, shift),
     }
-    for name, (master, slave, rotation, way) in motions.items():
-        if master in mesh.faces and slave in mesh.faces:
-            pairs[name] = _matched_contact(
-                mesh,
-                (master, slave),
-                rotation,
-                way,
-                sectors,
-                tolerance,
-            )
+    for name, motion in motions.items():
+        if motion.master in mesh.faces and motion.slave in mesh.faces:
+            pairs[name] = _matched_contact(mesh, motion, sectors, tolerance)
     row = Sector(sectors, on, shift) if sectors or shift.any() else None
     return replace(mesh, pairs=pairs, sector=row)
 
 
 def _matched_contact(
     mesh: Mesh,
-    names: tuple[str, str],
-    rotation: np.ndarray,
-    shift: np.ndarray,
+    motion: FaceMotion,
     sectors: int,
     tolerance: float,
 ) -> Pair:
@@ -449,34 +439,27 @@ def _matched_contact(
         InputError: neither; with a hint when the number of sectors was left out.
     """
     try:
-        return match_faces(
-            mesh.points,
-            mesh.faces,
-            names,
-            mesh.dimension,
-            rotation,
-            shift,
-            tolerance,
-        )
+        return match_faces(mesh.points, mesh.faces, motion, mesh.dimension, tolerance)
     except InputError as error:
-        if sectors and _faces_look(mesh, names, rotation, shift):
-            return Pair(*names, np.zeros((2, 0), dtype=int), rotation, shift)
-        hint = _side_hint(mesh, names, rotation, sectors)
+        if sectors and _faces_look(mesh, motion):
+            return motion.pair()
+        hint = _side_hint(mesh, motion, sectors)
         raise InputError(f"{error}{hint}") from None
 
 
-def _side_hint(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, sectors: int) -> str:
+def _side_hint(mesh: Mesh, motion: FaceMotion, sectors: int) -> str:
     """What to change where the flank lies one sector before its seat, as in a mirrored model."""
     if not sectors:
         return "; on a wheel, imported.sectors must be given"
-    seat, flank = (mesh.points[np.unique(mesh.faces[name])].mean(axis=0) for name in names)
+    seat, flank = (mesh.points[np.unique(mesh.faces[name])].mean(axis=0) for name in motion.names)
     back = turn_about_axis(-2 * np.pi / sectors)
-    if np.linalg.norm(back @ seat - flank) > _measure_face(mesh, names[0])[0]:
+    if np.linalg.norm(back @ seat - flank) > _measure_face(mesh, motion.master)[0]:
         return ""
-    if np.array_equal(rotation, np.eye(3)):
+    if np.array_equal(motion.rotation, np.eye(3)):
         return (
             f"; the damper is the one on the other side of the blade: expected it turned by "
-            f"{360 / sectors:.6g} deg about imported.axis, between {names[0]} and the next blade"
+            f"{360 / sectors:.6g} deg about imported.axis, between {motion.master} and the next "
+            "blade"
         )
     return (
         "; blades follow each other the other way round about imported.axis: expected the axis in "
@@ -484,21 +467,17 @@ def _side_hint(mesh: Mesh, names: tuple[str, str], rotation: np.ndarray, sectors
     )
 
 
-def _faces_look(
-    mesh: Mesh,
-    names: tuple[str, str],
-    rotation: np.ndarray,
-    shift: np.ndarray,
-) -> bool:
+def _faces_look(mesh: Mesh, motion: FaceMotion) -> bool:
     """Two faces look at each other, and half of the smaller one's nodes are within an edge of the
     other's.
     """
-    master, slave = (mesh.points[np.unique(mesh.faces[name])] for name in names)
-    edges, normals = zip(*(_measure_face(mesh, name) for name in names), strict=True)
-    apart = cKDTree(master).query((slave - shift) @ rotation)[0]
-    back = cKDTree((slave - shift) @ rotation).query(master)[0]
+    master, slave = (mesh.points[np.unique(mesh.faces[name])] for name in motion.names)
+    edges, normals = zip(*(_measure_face(mesh, name) for name in motion.names), strict=True)
+    there = motion.image_back(slave)
+    apart = cKDTree(master).query(there)[0]
+    back = cKDTree(there).query(master)[0]
     near = max((apart < max(edges)).mean(), (back < max(edges)).mean())
-    return bool(near > 0.5 and normals[0] @ (normals[1] @ rotation) < OPPOSITE_COSINE)
+    return bool(near > 0.5 and normals[0] @ (normals[1] @ motion.rotation) < OPPOSITE_COSINE)
 
 
 def _measure_face(mesh: Mesh, name: str) -> tuple[float, np.ndarray]:
@@ -533,7 +512,8 @@ def _cyclic_pair(
     Raises:
         InputError: neither.
     """
-    names = ("cyclic_low", "cyclic_high")
+    motion = FaceMotion("cyclic_low", "cyclic_high", on)
+    names = motion.names
     swapped = replace(
         mesh,
         faces={**mesh.faces, names[0]: mesh.faces[names[1]], names[1]: mesh.faces[names[0]]},
@@ -541,7 +521,7 @@ def _cyclic_pair(
     errors = []
     for some in (mesh, swapped):
         try:
-            found = match_faces(some.points, some.faces, names, mesh.dimension, on, None, tolerance)
+            found = match_faces(some.points, some.faces, motion, mesh.dimension, tolerance)
             return some, found
         except InputError as error:
             errors.append(error)
@@ -553,7 +533,7 @@ def _cyclic_pair(
             f"{errors[0]}, or faces within imported.cut_gap = {cut_gap:g} of their size, which a "
             f"mortar ties{hint}"
         )
-    return (mesh, swapped)[best], Pair(*names, np.zeros((2, 0), dtype=int), on, np.zeros(3))
+    return (mesh, swapped)[best], motion.pair()
 
 
 def _largest_gap(

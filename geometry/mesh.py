@@ -140,3 +140,22 @@ def sector_of(mesh: Mesh) -> Sector:
     if mesh.sector is None:
         raise InputError("the mesh is of a single blade, expected the sector of a wheel")
     return mesh.sector
+
+
+def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
+    """The engine axis z; for an endless row of plane blades the y axis, so that the pull is along x
+    only.
+    """
+    endless = mesh.sector is not None and mesh.sector.count == 0
+    return (
+        (0.0, 1.0, 0.0)
+        if endless or (mesh.dimension == 2 and mesh.sector is None)
+        else (0.0, 0.0, 1.0)
+    )
+
+
+def counting_sense(mesh: Mesh) -> int:
+    """+1 where sectors are counted in the sense of a positive rotation about z, else -1."""
+    if mesh.sector is None or not mesh.sector.count:
+        return 1
+    return 1 if mesh.sector.rotation[1, 0] >= 0 else -1

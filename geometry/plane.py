@@ -14,10 +14,12 @@ from bladefem.scene.units import show, show_most
 
 from .draw import draw_polygon, tie_meshes
 from .extract_arrays import Groups
-from .finalise_mesh import Motion, complete_mesh, mesh_model
+from .finalise_mesh import complete_mesh, mesh_model
+from .matching import FaceMotion
 from .mesh import Mesh, Sector
 from .parameters import MeshSize, Plane
 from .session import gmsh_session, gmsh_step
+from .size_fields import threshold_field
 
 # on each seat: half of it lifts off, and with 10 a resonance between stick and slip is 30 % low
 SEAT_ELEMENTS = 40
@@ -41,15 +43,8 @@ def plane_blades(plane: Plane, size: MeshSize) -> Mesh:
     motions = plane_motions(plane)
     with gmsh_session() as gmsh:
         groups = _draw_plane(gmsh, plane)
-        for master, slave, rotation, shift in motions.values():
-            tie_meshes(
-                gmsh,
-                1,
-                groups.faces[master],
-                groups.faces[slave],
-                rotation,
-                shift,
-            )
+        for motion in motions.values():
+            tie_meshes(gmsh, 1, groups.faces, motion)
         _set_sizes(gmsh, groups, base, contact)
         with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 2, size)
@@ -95,13 +90,12 @@ def check_plane(plane: Plane) -> None:
         )
 
 
-def plane_motions(plane: Plane) -> dict[str, Motion]:
-    """Edges that match, with the motion from master to slave."""
-    still = np.zeros(3)
+def plane_motions(plane: Plane) -> dict[str, FaceMotion]:
+    """Edges that match, by the name of the pair."""
     pitch = np.array([0.0, plane.pitch, 0.0])
     return {
-        "this": ("seat_right", "damper_left", np.eye(3), still),
-        "next": ("seat_left", "damper_right", np.eye(3), pitch),
+        "this": FaceMotion("seat_right", "damper_left"),
+        "next": FaceMotion("seat_left", "damper_right", shift=pitch),
     }
 
 
@@ -164,19 +158,15 @@ def _set_sizes(
     contact: float,
 ) -> None:
     field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
     names = ("seat_left", "seat_right", "damper_left", "damper_right")
-    field.setNumbers(distance, "CurvesList", [c for name in names for c in groups.faces[name]])
-    field.setNumber(distance, "Sampling", 100)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", contact),
-        ("SizeMax", base),
-        ("DistMin", contact),
-        ("DistMax", 5 * base),
-    ):
-        field.setNumber(threshold, name, value)
+    threshold = threshold_field(
+        field,
+        "CurvesList",
+        [c for name in names for c in groups.faces[name]],
+        (contact, base),
+        (contact, 5 * base),
+        samples=100,
+    )
     field.setAsBackgroundMesh(threshold)
     gmsh.option.setNumber("Mesh.MeshSizeMin", contact / 2)
 

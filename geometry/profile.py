@@ -85,6 +85,22 @@ def sector_profile(
     )
 
 
+def clearing_shift(wedge: Wedge, profile: Profile) -> np.ndarray:
+    """(2,) motion of the damper that opens both flanks by wedge.clearance [m]."""
+    # unit normals of the flanks, out of the damper, in the axes of the radial plane midway
+    normals = np.array(
+        [
+            [np.sin(angle), side * np.cos(angle)]
+            for angle, side in zip(wedge.angles, (-1, 1), strict=True)
+        ]
+    )
+    # the shortest one: flanks in one plane leave the motion along them open
+    radial, across = np.linalg.lstsq(normals, np.full(2, -wedge.clearance), rcond=1e-9)[0]
+    c = np.cos(profile.theta)
+    s = np.sin(profile.theta)
+    return np.array([radial * c - across * s, radial * s + across * c])
+
+
 def _damper_corners(
     seats: np.ndarray,
     theta: float,

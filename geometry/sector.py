@@ -4,7 +4,6 @@ all pairs match.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import pi
 from types import ModuleType
 
@@ -14,14 +13,11 @@ from bladefem.errors import InputError
 
 from .draw import clear_leftovers, draw_polygon, draw_prism, imprint_marks
 from .extract_arrays import Groups
-from .fillet import with_fillet
 from .finalise_mesh import complete_mesh, mesh_model
 from .mesh import Mesh
 from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
-from .profile import Profile, sector_profile
-from .root import root_slots
 from .section import FILLET_ANGLE, section_outline
-from .sector_check import NO_SHROUD, PLAIN, check_sector
+from .sector_check import NO_SHROUD, PLAIN
 from .sector_names import (
     damper_moved_inwards,
     edge_curves,
@@ -32,10 +28,9 @@ from .sector_names import (
     next_sector_motion,
     seat_face_corners,
 )
+from .sector_shape import SectorShape, sector_shape
 from .session import gmsh_session, gmsh_step
-from .shroud import Block, shroud_block
 from .sizing import (
-    Refined,
     Sizes,
     refined_parts,
     sector_sizes,
@@ -65,66 +60,57 @@ def wedge_sector(
     Raises:
         InputError: a parameter has to change; the message names it.
     """
-    check_sector(aerofoil, platform, shank, disc, wedge, root, shroud)
-    aerofoil = with_fillet(aerofoil, platform, shank, disc, wedge, size)
-    shape = sector_profile(platform, shank, disc, wedge)
-    block = shroud_block(shroud, aerofoil, disc, shape.top)
-    sizes = sector_sizes(aerofoil, platform, shank, disc, wedge, size)
-    slots = root_slots(root, shank, disc)
+    shape = sector_shape(aerofoil, platform, shank, disc, wedge, size, root, shroud)
+    sizes = sector_sizes(shape.aerofoil, platform, shank, disc, wedge, size)
+    profile = shape.profile
     with gmsh_session() as gmsh:
-        blade = blade_solid(gmsh, aerofoil, platform, shank, disc, shape, block, slots)
-        marks = [
-            (2, draw_polygon(gmsh, seat_face_corners(shape, wedge.length, side))[0])
-            for side in (-1, 1)
-        ]
-        with gmsh_step("damper.length", "imprint the seats on the platform"):
-            blade = imprint_marks(gmsh, blade, marks)
-        damper = draw_prism(gmsh, shape.damper, -wedge.length / 2, wedge.length / 2)
-        clear_leftovers(gmsh)
-        gmsh.model.occ.synchronize()
-        groups = name_faces(
-            gmsh,
-            blade,
-            damper,
-            aerofoil,
-            disc,
-            wedge,
-            shape,
-            block,
-        )
-        groups = mark_tip(gmsh, groups, aerofoil, shape)
-        link_faces(gmsh, groups, shape)
-        details = refined_parts(gmsh, groups, shape, sizes, (root, shank, disc), block)
-        _prescribe_sizes(gmsh, groups, (shape, wedge), sizes, size, details)
+        groups = _draw_bodies(gmsh, shape)
+        groups = mark_tip(gmsh, groups, shape)
+        link_faces(gmsh, groups, profile)
+        _prescribe_sizes(gmsh, groups, shape, sizes, size)
         with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
     mesh = complete_mesh(
         mesh,
-        face_motions(shape),
+        face_motions(profile),
         size.scale * sizes.base,
         next_sector_motion(disc.sectors),
         flat=SEATS,
     )
-    return damper_moved_inwards(mesh, wedge, shape) if wedge.clearance else mesh
+    return damper_moved_inwards(mesh, wedge, profile) if wedge.clearance else mesh
+
+
+def _draw_bodies(gmsh: ModuleType, shape: SectorShape) -> Groups:
+    """Blade, with its seats imprinted, and damper; returns bodies and faces by name."""
+    blade = blade_solid(gmsh, shape)
+    wedge = shape.wedge
+    marks = [
+        (2, draw_polygon(gmsh, seat_face_corners(shape.profile, wedge.length, side))[0])
+        for side in (-1, 1)
+    ]
+    with gmsh_step("damper.length", "imprint the seats on the platform"):
+        blade = imprint_marks(gmsh, blade, marks)
+    damper = draw_prism(gmsh, shape.profile.damper, -wedge.length / 2, wedge.length / 2)
+    clear_leftovers(gmsh)
+    gmsh.model.occ.synchronize()
+    return name_faces(gmsh, blade, damper, shape)
 
 
 def _prescribe_sizes(
     gmsh: ModuleType,
     groups: Groups,
-    section: tuple[Profile, Wedge],
+    shape: SectorShape,
     sizes: Sizes,
     size: MeshSize,
-    details: list[Refined],
 ) -> None:
     """Element sizes of the volumes, grids on fillet and seats."""
-    fillet = groups.faces.get("fillet", [])
-    shape, wedge = section
-    set_sizes(gmsh, shape, wedge, sizes, edge_curves(gmsh, groups), details)
+    details = refined_parts(gmsh, groups, shape, sizes)
+    set_sizes(gmsh, shape.profile, shape.wedge, sizes, edge_curves(gmsh, groups), details)
     with gmsh_step("aerofoil.fillet", "mesh the fillet in a grid"):
-        set_fillet_grid(gmsh, fillet, sizes, size)
+        set_fillet_grid(gmsh, groups.faces.get("fillet", []), sizes, size)
     # an element size on the seats without a number across asks for free triangles
     if size.seat_elements or size.contact_size is None:
-        set_grids(gmsh, [groups.faces[name][0] for name in SEATS], wedge, size)
+        set_grids(gmsh, [groups.faces[name][0] for name in SEATS], shape.wedge, size)
 
 
 def disc_segment(
@@ -201,27 +187,20 @@ def _profile_wire(gmsh: ModuleType, points: np.ndarray) -> int:
     return occ.addWire([*sides, occ.addLine(tags[-1], tags[0])])
 
 
-def blade_solid(
-    gmsh: ModuleType,
-    aerofoil: Aerofoil,
-    platform: Platform,
-    shank: Shank,
-    disc: Disc,
-    shape: Profile,
-    block: Block | None = None,
-    slots: Sequence[np.ndarray] = (),
-) -> int:
+def blade_solid(gmsh: ModuleType, shape: SectorShape) -> int:
     """One solid of disc segment, shank, platform, aerofoil and shroud, less the slots of its
     root.
     """
     occ = gmsh.model.occ
+    platform, shank, disc, profile = shape.platform, shape.shank, shape.disc, shape.profile
     half = shank.width / 2
     foot = np.sqrt(disc.rim_radius**2 - half**2) - 0.2 * (disc.rim_radius - disc.bore_radius)
     right, left = (
-        np.vstack([seat, corner]) for seat, corner in zip(shape.seats, shape.corners, strict=True)
+        np.vstack([seat, corner])
+        for seat, corner in zip(profile.seats, profile.corners, strict=True)
     )
     neck = np.array(
-        [[foot, -half], [shape.underside, -half], [shape.underside, half], [foot, half]]
+        [[foot, -half], [profile.underside, -half], [profile.underside, half], [foot, half]]
     )
     parts = [
         draw_prism(gmsh, neck, -shank.length / 2, shank.length / 2),
@@ -231,15 +210,15 @@ def blade_solid(
             -platform.length / 2,
             platform.length / 2,
         ),
-        _draw_aerofoil(gmsh, aerofoil, shape.top, _aerofoil_end(aerofoil, shape, block)),
+        _draw_aerofoil(gmsh, shape.aerofoil, profile.top, _aerofoil_end(shape)),
     ]
-    if block is not None:
-        parts.append(occ.addBox(*block.low, *(block.high - block.low)))
+    if shape.block is not None:
+        parts.append(occ.addBox(*shape.block.low, *(shape.block.high - shape.block.low)))
     with gmsh_step("aerofoil", "join aerofoil, platform, shank and disc"):
-        solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, shape.theta))], [(3, p) for p in parts])
-    if slots:
+        solid, _ = occ.fuse([(3, disc_segment(gmsh, disc, profile.theta))], [(3, p) for p in parts])
+    if shape.slots:
         with gmsh_step("root", "cut the slots of the root"):
-            cut = [(3, draw_prism(gmsh, slot, -disc.width, disc.width)) for slot in slots]
+            cut = [(3, draw_prism(gmsh, slot, -disc.width, disc.width)) for slot in shape.slots]
             solid, _ = occ.cut(solid, cut)
     volumes = [tag for dim, tag in solid if dim == 3]
     if len(volumes) != 1:
@@ -250,10 +229,11 @@ def blade_solid(
     return volumes[0]
 
 
-def _aerofoil_end(aerofoil: Aerofoil, shape: Profile, block: Block | None) -> float:
+def _aerofoil_end(shape: SectorShape) -> float:
     """Share of the span at which the loft ends: the middle of a tip shroud, whose outer face then
     is the tip.
     """
+    block = shape.block
     if block is None or not block.at_tip:
         return 1.0
-    return float((block.low[0] + block.high[0]) / 2 - shape.top) / aerofoil.span
+    return float((block.low[0] + block.high[0]) / 2 - shape.profile.top) / shape.aerofoil.span

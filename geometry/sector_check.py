@@ -13,10 +13,9 @@ from bladefem.scene.units import LIMIT_TOLERANCE, show, show_least, show_most
 
 from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
-from .profile import Profile, sector_profile
+from .profile import Profile, clearing_shift, sector_profile
 from .root import check_root
 from .section import section_outline, section_shape
-from .sector_names import clearing_shift
 from .shroud import shroud_block
 
 PLAIN = Root()

@@ -12,11 +12,12 @@ from bladefem.errors import InputError
 
 from .draw import boundary_centres, face_at, tie_meshes
 from .extract_arrays import Groups
-from .finalise_mesh import Motion
+from .matching import FaceMotion
 from .mesh import Mesh, Sector
 from .parameters import Aerofoil, Disc, Wedge
-from .profile import Profile, turn_about_axis
+from .profile import Profile, clearing_shift, turn_about_axis
 from .section import place_section, section_frame, section_outline
+from .sector_shape import SectorShape
 from .shroud import Block
 
 
@@ -35,18 +36,21 @@ def name_faces(
     gmsh: ModuleType,
     blade: int,
     damper: int,
-    aerofoil: Aerofoil,
-    disc: Disc,
-    wedge: Wedge,
-    profile: Profile,
-    block: Block | None = None,
+    shape: SectorShape,
 ) -> Groups:
-    """Find every named face by where its centre must be."""
+    """Bodies, and every named face by where its centre must be.
+
+    Args:
+        blade, damper: tags of the solids.
+    """
+    aerofoil, disc, profile = shape.aerofoil, shape.disc, shape.profile
     theta = profile.theta
     tolerance = 1e-6 * profile.top
     middle = (disc.bore_radius + disc.rim_radius) / 2
     cut = np.array([middle * np.cos(theta), middle * np.sin(theta), 0])
-    low, high = (seat_face_corners(profile, wedge.length, side).mean(axis=0) for side in (-1, 1))
+    low, high = (
+        seat_face_corners(profile, shape.wedge.length, side).mean(axis=0) for side in (-1, 1)
+    )
     on_blade = boundary_centres(gmsh, blade)
     faces = {
         name: face_at(on_blade, where, tolerance, name)
@@ -66,8 +70,8 @@ def name_faces(
     faces["tip"] = [
         t for t, c in on_blade.items() if abs(c[0] - profile.top - aerofoil.span) < tolerance
     ]
-    shroud = shroud_faces(gmsh, list(on_blade), block)
-    faces |= {name: tags for name, tags in shroud.items() if block is not None and name}
+    shroud = shroud_faces(gmsh, list(on_blade), shape.block)
+    faces |= {name: tags for name, tags in shroud.items() if name}
     on_block = {tag for tags in shroud.values() for tag in tags}
     above = {
         t: c[0] - profile.top
@@ -184,15 +188,13 @@ def next_sector_motion(count: int) -> Sector:
     return Sector(count, turn_about_axis(2 * np.pi / count), np.zeros(3))
 
 
-def face_motions(profile: Profile) -> dict[str, Motion]:
-    """Faces that match, with the motion from master to slave."""
+def face_motions(profile: Profile) -> dict[str, FaceMotion]:
+    """Faces that match, by the name of the pair."""
     on = turn_about_axis(2 * profile.theta)
-    stay = np.eye(3)
-    still = np.zeros(3)
     return {
-        "cyclic": ("cyclic_low", "cyclic_high", on, still),
-        "this": ("seat_right", "damper_left", stay, still),
-        "next": ("seat_left", "damper_right", on, still),
+        "cyclic": FaceMotion("cyclic_low", "cyclic_high", on),
+        "this": FaceMotion("seat_right", "damper_left"),
+        "next": FaceMotion("seat_left", "damper_right", on),
     }
 
 
@@ -202,22 +204,14 @@ def link_faces(
     profile: Profile,
 ) -> None:
     """Tell gmsh to copy the mesh of each master face onto its slave."""
-    for master, slave, rotation, shift in face_motions(profile).values():
-        tie_meshes(
-            gmsh,
-            2,
-            groups.faces[master],
-            groups.faces[slave],
-            rotation,
-            shift,
-        )
+    for motion in face_motions(profile).values():
+        tie_meshes(gmsh, 2, groups.faces, motion)
 
 
 def mark_tip(
     gmsh: ModuleType,
     groups: Groups,
-    aerofoil: Aerofoil,
-    profile: Profile,
+    shape: SectorShape,
 ) -> Groups:
     """Groups with three points of the tip that are nodes of any mesh.
 
@@ -225,19 +219,20 @@ def mark_tip(
     suction side; tip_mid (on the camber line at half chord) is embedded, and so are all of them in
     the outer face of a tip shroud.
     """
+    aerofoil, top = shape.aerofoil, shape.profile.top
     tip = groups.faces["tip"][0]
     corners = {
         tag: np.array(gmsh.model.getValue(0, tag, []))
         for _, tag in gmsh.model.getBoundary([(2, tip)], oriented=False, recursive=True)
     }
-    edge = section_outline(aerofoil, profile.top, 1)
-    middle = place_section(aerofoil, profile.top, 1, np.array([[0.5, aerofoil.camber]]))[0]
+    edge = section_outline(aerofoil, top, 1)
+    middle = place_section(aerofoil, top, 1, np.array([[0.5, aerofoil.camber]]))[0]
     wanted = {"tip_leading": edge[len(edge) // 2], "tip_mid": middle, "tip_trailing": edge[0]}
     tags = {}
     added = []
     for name, point in wanted.items():
         nearest = _nearest_tag(corners, point)
-        if np.linalg.norm(corners[nearest] - point) < 1e-6 * profile.top:
+        if np.linalg.norm(corners[nearest] - point) < 1e-6 * top:
             tags[name] = nearest
         else:
             tags[name] = gmsh.model.occ.addPoint(*point)
@@ -266,19 +261,3 @@ def damper_moved_inwards(
         n: replace(p, shift=p.shift + shift) if n != "cyclic" else p for n, p in mesh.pairs.items()
     }
     return replace(mesh, points=points, pairs=pairs)
-
-
-def clearing_shift(wedge: Wedge, profile: Profile) -> np.ndarray:
-    """(2,) motion of the damper that opens both flanks by wedge.clearance [m]."""
-    # unit normals of the flanks, out of the damper, in the axes of the radial plane midway
-    normals = np.array(
-        [
-            [np.sin(angle), side * np.cos(angle)]
-            for angle, side in zip(wedge.angles, (-1, 1), strict=True)
-        ]
-    )
-    # the shortest one: flanks in one plane leave the motion along them open
-    radial, across = np.linalg.lstsq(normals, np.full(2, -wedge.clearance), rcond=1e-9)[0]
-    c = np.cos(profile.theta)
-    s = np.sin(profile.theta)
-    return np.array([radial * c - across * s, radial * s + across * c])

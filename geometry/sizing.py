@@ -12,12 +12,12 @@ from typing import Any
 from bladefem.errors import InputError
 
 from .extract_arrays import Groups
-from .parameters import Aerofoil, Disc, MeshSize, Platform, Root, Shank, Wedge
+from .parameters import Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
 from .profile import Profile
-from .root import root_slots
 from .section import FILLET_ANGLE, TRAILING_EDGE_RATIO
 from .sector_names import foot_curves, shroud_faces, slot_curves
-from .shroud import Block
+from .sector_shape import SectorShape
+from .size_fields import box_field, threshold_field
 
 # element along the leading edge over those of the aerofoil
 LEADING_EDGE_SIZE = 0.6
@@ -167,31 +167,25 @@ def set_sizes(
         details: parts with smaller elements.
     """
     field = gmsh.model.mesh.field
-    reach = 4 * sizes.base
-    z = wedge.length / 2
-    radii = profile.seats[..., 0]
-    y_in = float(abs(profile.seats[:, 0, 1]).max())
-    below = sizes.disc, 5 * sizes.base
-    boxes = [
-        _box_field(field, sizes.base, *below, [profile.underside, profile.top, -10, 10, -10, 10]),
-        _box_field(field, sizes.aerofoil, *below, [profile.underside, 10, -10, 10, -10, 10]),
-    ]
-    for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
-        boxes.append(
-            _box_field(
-                field,
-                sizes.contact,
-                sizes.disc,
-                reach,
-                [radii.min() - wedge.base, radii.max(), low, high, -z, z],
-            )
-        )
+    boxes = _sector_boxes(field, profile, wedge, sizes)
     boxes += [
-        _distance_field(field, curves, size, sizes.aerofoil)
+        threshold_field(
+            field,
+            "CurvesList",
+            curves,
+            (size, 10 * sizes.aerofoil),
+            (size / 2, 20 * sizes.aerofoil),
+        )
         for curves, size in zip(edges, (sizes.nose, sizes.edge), strict=True)
     ]
     boxes += [
-        _growing_field(field, one.kind, one.tags, one.size, one.growth, one.reach)
+        threshold_field(
+            field,
+            one.kind,
+            one.tags,
+            (one.size, one.size + 10 * one.reach * one.growth),
+            (0.0, 10 * one.reach),
+        )
         for one in details
         if one.tags and one.size > 0
     ]
@@ -204,29 +198,53 @@ def set_sizes(
     gmsh.option.setNumber("Mesh.MeshSizeMax", sizes.disc)
 
 
+def _sector_boxes(field: Any, profile: Profile, wedge: Wedge, sizes: Sizes) -> list[int]:
+    """Fields for all above the rim, for the aerofoil, and round both seats."""
+    reach = 4 * sizes.base
+    z = wedge.length / 2
+    radii = profile.seats[..., 0]
+    y_in = float(abs(profile.seats[:, 0, 1]).max())
+    below = sizes.disc, 5 * sizes.base
+    boxes = [
+        box_field(field, sizes.base, *below, [profile.underside, profile.top, -10, 10, -10, 10]),
+        box_field(field, sizes.aerofoil, *below, [profile.underside, 10, -10, 10, -10, 10]),
+    ]
+    for low, high in ((y_in, 2 * y_in), (-2 * y_in, -y_in)):
+        boxes.append(
+            box_field(
+                field,
+                sizes.contact,
+                sizes.disc,
+                reach,
+                [radii.min() - wedge.base, radii.max(), low, high, -z, z],
+            )
+        )
+    return boxes
+
+
 def refined_parts(
     gmsh: ModuleType,
     groups: Groups,
-    section: Profile,
+    shape: SectorShape,
     sizes: Sizes,
-    below: tuple[Root, Shank, Disc],
-    block: Block | None,
 ) -> list[Refined]:
-    """Fillet, foot of the shank, slots of the root and shroud, those that the sector has.
-
-    Args:
-        below: root, shank and disc.
-    """
+    """Fillet, foot of the shank, slots of the root and shroud, those that the sector has."""
     fillet = groups.faces.get("fillet", [])
     details = [
         Refined("SurfacesList", fillet, sizes.fillet, FILLET_GROWTH, sizes.base),
-        Refined("CurvesList", foot_curves(gmsh, section), sizes.foot, FOOT_GROWTH, 2 * sizes.base),
+        Refined(
+            "CurvesList",
+            foot_curves(gmsh, shape.profile),
+            sizes.foot,
+            FOOT_GROWTH,
+            2 * sizes.base,
+        ),
     ]
-    root, shank, disc = below
-    if root.lobes:
-        inside = slot_curves(gmsh, root_slots(root, shank, disc), disc)
-        wide = SLOT_SIZE * root.clearance * sizes.coarsening
+    if shape.root.lobes:
+        inside = slot_curves(gmsh, shape.slots, shape.disc)
+        wide = SLOT_SIZE * shape.root.clearance * sizes.coarsening
         details.append(Refined("CurvesList", inside, wide, SLOT_GROWTH, sizes.base))
+    block = shape.block
     if block is not None:
         faces = [t for tags in shroud_faces(gmsh, _all_faces(gmsh), block).values() for t in tags]
         thick = min(sizes.aerofoil, float(block.high[0] - block.low[0]))
@@ -310,67 +328,6 @@ def _radial_extent(gmsh: ModuleType, curve: int) -> float:
     """Radial extent of a curve [m]."""
     low, _, _, high, _, _ = gmsh.model.getBoundingBox(1, curve)
     return high - low
-
-
-def _growing_field(
-    field: Any,
-    kind: str,
-    tags: list[int],
-    size: float,
-    growth: float,
-    reach: float,
-) -> int:
-    """Elements of a size on curves or surfaces, which grow with the distance up to 10 reach."""
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
-    field.setNumbers(distance, kind, tags)
-    field.setNumber(distance, "Sampling", 60)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", size),
-        ("SizeMax", size + 10 * reach * growth),
-        ("DistMin", 0.0),
-        ("DistMax", 10 * reach),
-    ):
-        field.setNumber(threshold, name, value)
-    return threshold
-
-
-def _box_field(
-    field: Any,
-    inside: float,
-    outside: float,
-    thickness: float,
-    limits: list[float],
-) -> int:
-    tag = field.add("Box")
-    for name, value in zip(("XMin", "XMax", "YMin", "YMax", "ZMin", "ZMax"), limits, strict=True):
-        field.setNumber(tag, name, value)
-    field.setNumber(tag, "VIn", inside)
-    field.setNumber(tag, "VOut", outside)
-    field.setNumber(tag, "Thickness", thickness)
-    return tag
-
-
-def _distance_field(
-    field: Any,
-    curves: list[int],
-    size: float,
-    far: float,
-) -> int:
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
-    field.setNumbers(distance, "CurvesList", curves)
-    field.setNumber(distance, "Sampling", 60)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", size),
-        ("SizeMax", 10 * far),
-        ("DistMin", size / 2),
-        ("DistMax", 20 * far),
-    ):
-        field.setNumber(threshold, name, value)
-    return threshold
 
 
 def count_sector_cells(

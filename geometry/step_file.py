@@ -12,7 +12,6 @@ the file does not. Solids are meshed separately: bodies that touch are not glued
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
@@ -23,13 +22,15 @@ from bladefem.errors import InputError, missing_file
 from .curving import second_order
 from .draw import boundary_centres, tie_meshes
 from .finalise_mesh import check_count
-from .fitted_wedge import Named, fit_wedge
+from .fitted_wedge import FittedDamper, Named, fit_wedge
 from .imported import check_extent, mesh_of_raw
+from .matching import FaceMotion
 from .mesh import Mesh
-from .parameters import MeshSize, Wedge
+from .parameters import MeshSize
 from .raw_mesh import RawMesh, from_gmsh_model
 from .renaming import read_names, rename_groups
 from .session import gmsh_path, gmsh_session, gmsh_step
+from .size_fields import threshold_field
 from .step_names import solids_of_volumes, written_solids
 from .step_unit import file_unit
 
@@ -40,17 +41,6 @@ STEP_REMEDY = "expected a STEP file of solids; export it anew from CAD"
 PREVIEW_ELEMENTS = 30
 # of the largest radius: faces that are as near to the axis as the nearest one
 NEAREST_TOLERANCE = 1e-6
-
-
-@dataclass(frozen=True)
-class FittedDamper:
-    """A damper to draw between two platform faces of a blade; see fitted_wedge.py."""
-
-    # faces towards the next blade and towards the previous one
-    seats: tuple[str, str]
-    wedge: Wedge
-    # from the platform's edge inwards [m]; of the narrower face when None
-    seat_width: float | None = None
 
 
 def read_step(
@@ -137,8 +127,7 @@ def _drawn_entities(
     named = _apply_names(_named_entities(gmsh, text), read_names(names))
     if fitted is not None:
         on = axis_rotation(axis, 2 * np.pi / sectors)
-        seats = fitted.seats, fitted.wedge, fitted.seat_width
-        named = fit_wedge(gmsh, named, *seats, on, axis)
+        named = fit_wedge(gmsh, named, fitted, on, axis)
     return named | _find_faces(gmsh, named, sectors, axis)
 
 
@@ -324,14 +313,7 @@ def _tie_faces(
         )
         best = min(motions, key=lambda r, a=start, b=end: np.linalg.norm(r @ a - b))
         with gmsh_step("imported.file", f"match the faces {master} and {slave}"):
-            tie_meshes(
-                gmsh,
-                2,
-                tags[master],
-                tags[slave],
-                best,
-                np.zeros(3),
-            )
+            tie_meshes(gmsh, 2, tags, FaceMotion(master, slave, best))
 
 
 def _refine_faces(
@@ -342,18 +324,7 @@ def _refine_faces(
 ) -> None:
     """Size ``fine`` on some faces [m], growing to ``base`` within five of its elements."""
     field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    threshold = field.add("Threshold")
-    field.setNumbers(distance, "SurfacesList", faces)
-    field.setNumber(distance, "Sampling", 60)
-    for name, value in (
-        ("InField", distance),
-        ("SizeMin", fine),
-        ("SizeMax", base),
-        ("DistMin", fine),
-        ("DistMax", 5 * base),
-    ):
-        field.setNumber(threshold, name, value)
+    threshold = threshold_field(field, "SurfacesList", faces, (fine, base), (fine, 5 * base))
     field.setAsBackgroundMesh(threshold)
 
 

@@ -16,17 +16,19 @@ from .draw import (
     draw_polygon,
     draw_prism,
     imprint_marks,
-    set_background,
     tie_meshes,
 )
 from .extract_arrays import Groups
 from .finalise_mesh import complete_mesh, mesh_model
+from .matching import FaceMotion
 from .mesh import Mesh
 from .parameters import MeshSize, ZMass
 from .session import gmsh_session, gmsh_step
+from .size_fields import set_size_formula
 
 # side of the foundation block over the larger side of the Z
 FOUNDATION_RATIO = 2.0
+SEAT_TO_FOOTPRINT = FaceMotion("seat", "footprint")
 
 
 def z_corners(z: ZMass) -> np.ndarray:
@@ -73,24 +75,15 @@ def z_mass(
         gmsh.model.occ.synchronize()
         groups = _name_faces(gmsh, z, depth, body, block)
         if block is not None:
-            tie_meshes(
-                gmsh,
-                2,
-                groups.faces["seat"],
-                groups.faces["footprint"],
-                np.eye(3),
-                np.zeros(3),
-            )
-        set_background(
+            tie_meshes(gmsh, 2, groups.faces, SEAT_TO_FOOTPRINT)
+        set_size_formula(
             gmsh,
+            f"{contact} + {base - contact} * Max(0, z) / {z.thickness} - 0.6 * Min(0, z)",
             min(base, contact) / 2,
-            MathEval=[
-                {"F": f"{contact} + {base - contact} * Max(0, z) / {z.thickness} - 0.6 * Min(0, z)"}
-            ],
         )
         with gmsh_step("mesh.size", "mesh this geometry"):
             mesh = mesh_model(gmsh, groups, 3, size)
-    pairs = {"this": ("seat", "footprint", np.eye(3), np.zeros(3))} if depth else {}
+    pairs = {"this": SEAT_TO_FOOTPRINT} if depth else {}
     return complete_mesh(
         mesh, pairs, size.scale * base, flat=("seat", "footprint") if depth else ()
     )

@@ -25,11 +25,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import TypeVar
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, spin_axis
 
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
@@ -37,19 +36,17 @@ from ..fem.flexibility import Flexibility
 from ..fem.loads import body_mass, centrifugal
 from ..scene.units import newtons
 from ..util.arrays import RealArray
-from .interface_law import InterfaceLaw, closure_of, compliance_at
-from .patch import initial_gap, port_matrix
-from .seating import (
-    ContactProblem,
+from .condensed_bodies import (
+    CondensedBodies,
     condense_blade,
     condense_body,
     held_motions,
     rigid_and_load,
-    spin_axis,
 )
+from .interface_law import InterfaceLaw, closure_of, compliance_at
+from .patch import initial_gap, port_matrix
+from .seating import ContactProblem
 
-# number of the translation along the engine axis among the rigid motions of a body in space
-AXIAL_TRANSLATION = 2
 # accepted residual of a step, over the largest force
 RESIDUAL_TOLERANCE = 1e-10
 # Newton steps of a load step, and halvings of one
@@ -67,30 +64,8 @@ MIN_LOAD_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
-class FrictionalProblem:
-    """All ports of two bodies, node-major (normal, tangents): n nodes, m ports.
-
-    "For unit rotation" means for a speed of 1 rad/s; multiply by the speed squared.
-    """
-
-    patches: tuple[Patch, ...]
-    # (m, m) blade and damper, elastic [m/N]
-    flexibility: RealArray
-    # (n,) gap before anything moves [m]
-    clearance: RealArray
-    # (m,) damper minus blade by the rotation of the blade, for unit rotation
-    blade_swell: RealArray
-    # (m,) damper minus blade by the damper's deformation under its load, for unit rotation
-    damper_swell: RealArray
-    # (m, d) of unit rigid motions of the damper; rotations per length
-    rigid: RealArray
-    # (d,) centrifugal load on the damper, for unit rotation
-    load: RealArray
-    # of the damper as meshed [kg]
-    mass: float
-
-
-Seated = TypeVar("Seated", ContactProblem, FrictionalProblem)
+class FrictionalProblem(CondensedBodies):
+    """Two bodies at all ports of their patches, node-major (normal, tangents)."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +95,18 @@ class _Interface:
     # at first touch
     kt: RealArray
     mu: RealArray
+
+
+@dataclass(frozen=True)
+class _History:
+    """How a load comes about."""
+
+    # [rad/s], passed in this order from rest
+    speeds: Sequence[float]
+    # load on the damper over that of the meshed damper
+    scale: float
+    # gaps, and displacements by the rotation, open nothing
+    bedded: bool
 
 
 @dataclass(frozen=True)
@@ -155,22 +142,6 @@ def frictional_problem(
     return FrictionalProblem(
         tuple(patches), C + C_damper, gap, -blade_swell, damper_swell, rigid, load, body_mass(body)
     )
-
-
-def hold_axially(problem: Seated) -> Seated:
-    """A contact problem whose damper has a stop along the engine axis, which takes the load along
-    it and lets the damper turn.
-
-    Raises:
-        InputError: the bodies are plane.
-    """
-    if len(problem.load) < 6:
-        raise InputError(
-            'damper.axial = "held": a plane damper does not move along the engine axis, expected '
-            '"free"'
-        )
-    others = np.arange(len(problem.load)) != AXIAL_TRANSLATION
-    return replace(problem, rigid=problem.rigid[:, others], load=problem.load[others])
 
 
 def normal_part(problem: FrictionalProblem) -> ContactProblem:
@@ -220,10 +191,10 @@ def seat_with_friction(
         )
     face = _Interface(law, np.asarray(kt, dtype=float), np.asarray(mu, dtype=float))
     if normal is None:
-        return _refined(problem, face, speeds, 1.0, bedded)
+        return _refined(problem, face, _History(speeds, 1.0, bedded))
     scale = _frictionless_scale(problem, speeds[-1], normal)
     for _ in range(30):
-        found = _refined(problem, face, speeds, scale, bedded)
+        found = _refined(problem, face, _History(speeds, scale, bedded))
         error = float(np.mean([m.force.sum() for m in found.maps])) / normal - 1
         if abs(error) < MIN_LOAD_SHARE:
             return found
@@ -249,24 +220,24 @@ def _frictionless_scale(
 def _refined(
     problem: FrictionalProblem,
     face: _Interface,
-    speeds: Sequence[float],
-    scale: float,
-    bedded: bool,
+    history: _History,
 ) -> FrictionalSeating:
     """With as many load steps as the tangential forces need."""
     steps = FIRST_STEPS
     solved = problem if face.mu.any() else _held_problem(problem)
-    before = _history(solved, face, speeds, scale, bedded, steps)
+    before = _pass_through(solved, face, history, steps)
     while True:
         steps *= 2
-        after = _history(solved, face, speeds, scale, bedded, steps)
+        after = _pass_through(solved, face, history, steps)
         limit = float((face.mu * after.force[:, 0]).max())
         apart = float(np.abs(after.force[:, 1:] - before.force[:, 1:]).max())
         change = apart / limit if limit > 0 else 0.0
         if change < FORCE_CHANGE_TOLERANCE or steps >= MOST_STEPS:
             break
         before = after
-    return _seating(problem, face, after, scale * speeds[-1] ** 2, scale, steps, change)
+    share = _carried_share(problem, after, history.scale * history.speeds[-1] ** 2)
+    maps = _maps(problem, face, after)
+    return FrictionalSeating(maps, history.scale, share, after.slips, steps, change)
 
 
 def _held_problem(problem: FrictionalProblem) -> FrictionalProblem:
@@ -278,20 +249,19 @@ def _held_problem(problem: FrictionalProblem) -> FrictionalProblem:
     return replace(problem, rigid=problem.rigid @ held, load=problem.load @ held)
 
 
-def _history(
+def _pass_through(
     problem: FrictionalProblem,
     face: _Interface,
-    speeds: Sequence[float],
-    scale: float,
-    bedded: bool,
+    history: _History,
     steps: int,
 ) -> _State:
     """March through the speeds in even steps of their squares."""
+    scale = history.scale
     n = len(problem.clearance)
     d = len(problem.flexibility) // n
     gap = np.zeros((n, d))
     swell = np.zeros((n, d))
-    if not bedded:
+    if not history.bedded:
         gap[:, 0] = problem.clearance
         swell = (problem.blade_swell + scale * problem.damper_swell).reshape(n, d)
     state = _State(np.zeros((n, d)), np.zeros(problem.rigid.shape[1]), gap, 0)
@@ -300,7 +270,7 @@ def _history(
         return _step(problem, face, before, gap + square * swell, scale * square)
 
     last = 0.0
-    for speed in speeds:
+    for speed in history.speeds:
         ends = last + (speed**2 - last) * np.arange(steps + 1) / steps
         for first, square in pairwise(ends):
             try:
@@ -498,33 +468,31 @@ def _sticking_forces(
     return f[:, 1:] + sigma * slip, unit[:, 1:] + sigma[:, :, None] * slip_by
 
 
-def _seating(
-    problem: FrictionalProblem,
-    face: _Interface,
-    state: _State,
-    pull: float,
-    scale: float,
-    steps: int,
-    change: float,
-) -> FrictionalSeating:
-    """The state as maps, and what friction carries of the load."""
+def _carried_share(problem: FrictionalProblem, state: _State, pull: float) -> float:
+    """Share of the damper's load that friction carries.
+
+    Args:
+        pull: of the damper, over its load for unit rotation [rad^2/s^2].
+    """
     d = state.force.shape[1]
     # without the rotations: fewer translations than directions where one is held
     translations = len(problem.load) - (1 if d == 2 else 3)
-    force = problem.load[:translations]
-    outward = force / np.linalg.norm(force)
+    load = problem.load[:translations]
+    outward = load / np.linalg.norm(load)
     tangential = state.force.copy()
     tangential[:, 0] = 0.0
     carried = -(problem.rigid.T @ tangential.ravel())[:translations] @ outward
+    return float(carried / (pull * np.linalg.norm(load)))
+
+
+def _maps(problem: FrictionalProblem, face: _Interface, state: _State) -> list[PressureMap]:
+    """One map a patch, with its tangential forces."""
     closure = closure_of(face.law, state.force[:, 0])
     gap = np.maximum(state.moved[:, 0] + closure, 0.0)
     gap[state.force[:, 0] > 0] = 0.0
-    cuts = np.cumsum([len(p.area) for p in problem.patches])[:-1]
-    maps = [
+    return [
         PressureMap(patch, f[:, 0], g, RESIDUAL_TOLERANCE, f[:, 1:])
         for patch, f, g in zip(
-            problem.patches, np.split(state.force, cuts), np.split(gap, cuts), strict=True
+            problem.patches, problem.by_patch(state.force), problem.by_patch(gap), strict=True
         )
     ]
-    share = float(carried / (pull * np.linalg.norm(force)))
-    return FrictionalSeating(maps, scale, share, state.slips, steps, change)

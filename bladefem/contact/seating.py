@@ -24,29 +24,30 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 from scipy.optimize import nnls
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, spin_axis
 
 from ..data import Patch, PressureMap
 from ..errors import InputError, NotSolvedError
 from ..fem.body import Body
-from ..fem.constraint import restrict_load
-from ..fem.flexibility import Flexibility, compliance
-from ..fem.linalg import inner_products
+from ..fem.flexibility import Flexibility
 from ..fem.loads import body_mass, centrifugal
 from ..scene.units import newtons
-from ..util.arrays import RealArray
 from .as_array import as_float_array
 from .complementarity import LCPSolution, held_directions, solve_lcp
+from .condensed_bodies import (
+    CondensedBodies,
+    condense_blade,
+    condense_body,
+    held_motions,
+    rigid_and_load,
+)
 from .interface_law import InterfaceLaw, closure_of, compliance_at, rigid_faces
-from .patch import initial_gap, normal_ports, port_matrix, rigid_ports
+from .patch import initial_gap, normal_ports, port_matrix
 
 # gaps over elastic displacements beyond which a load is too light to be solved for
 MAX_GAP_OVER_DISPLACEMENT = 1e4
-# accepted part of the load along directions that frictionless seats can't hold
-UNHELD_LOAD_SHARE = 0.01
 # steps of Newton's method on a layer that stiffens, and the relative change of force that ends them
 MAX_LAYER_STEPS = 50
 LAYER_TOLERANCE = 1e-12
@@ -55,28 +56,9 @@ ROUNDED_LAYER_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True)
-class ContactProblem:
-    """All that a new load state needs: dense matrices over the n normal ports of the patches, one
-    after the other.
+class ContactProblem(CondensedBodies):
+    """Two bodies at the normal ports of their patches alone, m = n, and the layer between."""
 
-    "For unit rotation" means for a speed of 1 rad/s; multiply by the speed squared.
-    """
-
-    patches: tuple[Patch, ...]
-    # (n, n) blade and damper, elastic [m/N]
-    flexibility: RealArray
-    # (n,) gap before anything moves [m]
-    clearance: RealArray
-    # (n,) gap opened by the blade's centrifugal displacement, for unit rotation [m s^2]
-    blade_swell: RealArray
-    # (n,) gap opened by the damper's deformation under its load, for unit rotation [m s^2]
-    damper_swell: RealArray
-    # (n, d) gap opened by unit rigid motions of the damper [1]; rotations times a length
-    rigid: RealArray
-    # (d,) centrifugal load on the damper along these motions, for unit rotation [N s^2]
-    load: RealArray
-    # of the damper as meshed [kg]
-    mass: float
     # (n,) of the interface layer; rigid faces when None
     layer: InterfaceLaw | None = None
 
@@ -197,80 +179,10 @@ def _check_load(
         raise InputError(f"damper_mass is {damper_mass} kg, expected a positive, finite one")
 
 
-def spin_axis(mesh: Mesh) -> tuple[float, float, float]:
-    """The engine axis z; for an endless row of plane blades the y axis, so that the pull is along x
-    only.
-    """
-    endless = mesh.sector is not None and mesh.sector.count == 0
-    return (
-        (0.0, 1.0, 0.0)
-        if endless or (mesh.dimension == 2 and mesh.sector is None)
-        else (0.0, 0.0, 1.0)
-    )
-
-
-def counting_sense(mesh: Mesh) -> int:
-    """+1 where sectors are counted in the sense of a positive rotation about z, else -1."""
-    if mesh.sector is None or not mesh.sector.count:
-        return 1
-    return 1 if mesh.sector.rotation[1, 0] >= 0 else -1
-
-
 def _fitted(problem: ContactProblem) -> ContactProblem:
     """The problem with faces that fit each other whatever the rotation."""
     none = np.zeros_like(problem.clearance)
     return replace(problem, clearance=none, blade_swell=none, damper_swell=none)
-
-
-def condense_blade(
-    blade: Flexibility,
-    P: sp.spmatrix,
-    mesh: Mesh,
-    swell: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Flexibility (n, n) of the blade at its ports, and their displacement (n,) for unit rotation.
-
-    Args:
-        swell: as in :func:`contact_problem`.
-    """
-    C, moved = condense_body(blade, P, centrifugal(blade.con.body, 1.0, spin_axis(mesh)))
-    return C, moved if swell is None else P.T @ swell.ravel()
-
-
-def condense_body(
-    flex: Flexibility,
-    P: sp.spmatrix,
-    load: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Flexibility (n, n) at the ports, and their displacement (n,) under a load in mesh
-    numbering.
-    """
-    columns = restrict_load(flex.con, sp.hstack([P, sp.csc_matrix(load[:, None])], format="csc"))
-    G = inner_products(flex.con.body.comm, columns[:, :-1], compliance(flex, columns)).real
-    return (G[:, :-1] + G[:, :-1].T) / 2, G[:, -1]
-
-
-def rigid_and_load(
-    mesh: Mesh,
-    patches: Sequence[Patch],
-    body: Body,
-    pull: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rigid motions at all damper ports (ports, d) and the load that goes with them (d,), rotations
-    times a length.
-    """
-    inside = np.unique(np.concatenate([mesh.bodies[name].ravel() for name in body.material]))
-    origin = mesh.points[inside].mean(axis=0)
-    length = np.linalg.norm(mesh.points[inside] - origin, axis=1).max()
-    d = mesh.dimension
-    scale = np.r_[np.ones(d), np.full(1 if d == 2 else 3, 1 / length)]
-    force = pull.reshape(-1, d)
-    arm = mesh.points - origin
-    full = np.zeros((len(force), 3))
-    full[:, :d] = force
-    moment = np.cross(arm, full).sum(axis=0)
-    load = np.r_[force.sum(axis=0), moment[2:] if d == 2 else moment]
-    return rigid_ports(patches, mesh, origin) * scale, load * scale
 
 
 def _state(
@@ -289,26 +201,6 @@ def _state(
             f"{solution.reason}"
         )
     return solution
-
-
-def held_motions(rigid: np.ndarray, load: np.ndarray) -> np.ndarray:
-    """(d, r) motions of the damper that frictionless seats hold, orthonormal.
-
-    Args:
-        rigid: (n, d) gap opened by unit rigid motions.
-        load: (d,) on the damper along these.
-
-    Raises:
-        NotSolvedError: too much of the load is along the other motions.
-    """
-    _, _, held = held_directions(rigid)
-    sideways = np.linalg.norm(load - held @ (held.T @ load)) / np.linalg.norm(load)
-    if sideways > UNHELD_LOAD_SHARE:
-        raise NotSolvedError(
-            f"{sideways:.1%} of the damper's load is along a direction in which frictionless seats "
-            f"can't hold it, expected below {UNHELD_LOAD_SHARE:.0%}"
-        )
-    return held
 
 
 def _on_layer(
@@ -395,9 +287,9 @@ def _wanted(
 
 def _maps(problem: ContactProblem, solution: LCPSolution) -> list[PressureMap]:
     """Cut the solution into one map a patch."""
-    cuts = np.cumsum([len(p.area) for p in problem.patches])[:-1]
-    gaps = np.split(solution.gap.clip(min=0.0), cuts)
+    forces = problem.by_patch(solution.force)
+    gaps = problem.by_patch(solution.gap.clip(min=0.0))
     return [
         PressureMap(p, f, g, solution.residual)
-        for p, f, g in zip(problem.patches, np.split(solution.force, cuts), gaps, strict=True)
+        for p, f, g in zip(problem.patches, forces, gaps, strict=True)
     ]

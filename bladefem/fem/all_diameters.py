@@ -27,12 +27,13 @@ from .constraint import (
 from .diameter_space import extend_space, initial_vectors
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, flexible
+from .lanczos import DIRECTION_TOLERANCE, WantedPairs
 from .memory import give_back
 from .mode_count import Count, lost_modes
 from .modes import (
     BLOCKS,
-    DIRECTION_TOLERANCE,
     SLEPC,
+    existing_pairs,
     lowest_pairs,
     mode_set,
     pairs_together,
@@ -156,7 +157,7 @@ def eigenpairs(
     guard = EXTRA_ROUGH_MODES if guessed else GUARD_MODES
     for first in range(0, len(scratch), DIAMETERS_AT_A_TIME):
         some = scratch[first : first + DIAMETERS_AT_A_TIME]
-        together = _solve_together(t, some, count, tolerance, guard, solver)
+        together = _solve_together(t, some, WantedPairs(count, tolerance, guard), solver)
         while together:
             found = together.pop(0)
             if guessed:
@@ -200,11 +201,9 @@ def _guessed_pairs(
         found = _solve_pairs(
             t,
             n,
-            count,
+            WantedPairs(count, tolerance, EXTRA_ROUGH_MODES if helps else GUARD_MODES),
             starts.pop(n),
             solver,
-            tolerance,
-            EXTRA_ROUGH_MODES if helps else GUARD_MODES,
         )
         if helps:
             blocks.append(found.X)
@@ -215,14 +214,12 @@ def _guessed_pairs(
 def _solve_together(
     t: Transformation,
     diameters: list[int],
-    count: int,
-    tolerance: float,
-    guard: int,
+    wanted: WantedPairs,
     solver: Eigensolver,
 ) -> list[Eigenpairs]:
     """A few nodal diameters from scratch."""
     some = [flexible(at_diameter(t, n)) for n in diameters]
-    solved = pairs_together(some, count, tolerance, guard, solver)
+    solved = pairs_together(some, wanted, solver)
     return [
         Eigenpairs(t, n, lam, X, flex)
         for n, flex, (lam, X) in zip(diameters, some, solved, strict=True)
@@ -262,15 +259,12 @@ def _diameter_order(order: list[int]) -> list[int]:
 def _solve_pairs(
     t: Transformation,
     nodal_diameter: int,
-    count: int,
+    wanted: WantedPairs,
     start: np.ndarray | None,
     solver: Eigensolver,
-    tolerance: float = VECTOR_TOLERANCE,
-    guard: int = GUARD_MODES,
 ) -> Eigenpairs:
     flex = flexible(at_diameter(t, nodal_diameter))
-    guard = min(guard, flex.con.T.shape[1] - count)
-    lam, X = lowest_pairs(flex, count, tolerance, start, guard, solver)
+    lam, X = lowest_pairs(flex, existing_pairs(flex, wanted), start, solver)
     return Eigenpairs(t, nodal_diameter, lam, X, flex)
 
 
@@ -306,7 +300,8 @@ def found_again(
         NotSolvedError: the numbers differ even so.
     """
     enough = max(count, truth.exact + 1)
-    p = _solve_pairs(t, nodal_diameter, enough, None, BLOCKS, tolerance)
+    wanted = WantedPairs(enough, tolerance, GUARD_MODES)
+    p = _solve_pairs(t, nodal_diameter, wanted, None, BLOCKS)
     found = np.count_nonzero(p.lam[:enough] < truth.shift)
     if found != truth.exact:
         raise NotSolvedError(

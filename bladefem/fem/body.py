@@ -116,6 +116,18 @@ class Piece:
         return np.asarray(self.spread.T @ force.reshape(-1, self.body.dim)).ravel()
 
 
+@dataclass(frozen=True)
+class Formulation:
+    """How the matrices of a body are integrated."""
+
+    # "stress" or "strain", of plane meshes
+    plane: str
+    # "exact", or "ccx" as CalculiX does
+    quadrature: str
+    # temperatures of the mesh, which decide on properties; None: those of the materials
+    heat: Temperatures | None
+
+
 def assemble(
     mesh: Mesh,
     name: str | tuple[str, ...],
@@ -151,16 +163,15 @@ def assemble(
     nodes = np.unique(np.concatenate([mesh.bodies[n] for n in names]))
     cut = cut_face_nodes(mesh, nodes)
     plan = check_memory(mesh.dimension * len(nodes), comm, cut=mesh.dimension * cut)
-    return replace(_assemble_bodies(mesh, own, comm, plane, quadrature, heat), plan=plan)
+    formulation = Formulation(plane, quadrature, heat)
+    return replace(_assemble_bodies(mesh, own, comm, formulation), plan=plan)
 
 
 def _assemble_bodies(
     mesh: Mesh,
     materials: dict[str, Material],
     comm: MPI.Comm,
-    plane: str,
-    quadrature: str,
-    heat: Temperatures | None,
+    formulation: Formulation,
     piece: bool = False,
 ) -> Body:
     """The bodies that have materials.
@@ -175,9 +186,9 @@ def _assemble_bodies(
     rows = _block_rows(mesh, space, used[local], origin, comm)
     pieces: tuple[Piece, ...] = ()
     if any(n in mesh.whole for n in materials):
-        K, mass, pieces = _sum_of_pieces(mesh, materials, (space, rows), plane, quadrature, heat)
+        K, mass, pieces = _sum_of_pieces(mesh, materials, space, rows, formulation)
     else:
-        K, mass = _matrices(mesh, materials, (space, cells), plane, quadrature, heat)
+        K, mass = _matrices(mesh, materials, space, cells, formulation)
     return Body(
         mesh,
         " + ".join(materials),
@@ -187,9 +198,9 @@ def _assemble_bodies(
         mass,
         rows,
         space,
-        plane,
+        formulation.plane,
         comm,
-        heat=heat,
+        heat=formulation.heat,
         pieces=pieces,
     )
 
@@ -197,19 +208,21 @@ def _assemble_bodies(
 def _matrices(
     mesh: Mesh,
     materials: dict[str, Material],
-    where: tuple[Any, np.ndarray],
-    plane: str,
-    quadrature: str,
-    heat: Temperatures | None,
+    space: Any,
+    cells: np.ndarray,
+    formulation: Formulation,
 ) -> tuple[PETSc.Mat, Mass]:
     """Stiffness and mass of cells of one shape.
 
     Args:
-        where: the space of the displacements, and all cells (nc, k).
+        space: of the displacements.
+        cells: (nc, k) all of them.
     """
-    space, cells = where
-    stiff, mass = degrees(mesh, cells, quadrature, heat)
-    law, rho, depth = properties(mesh, materials, space.mesh, plane, heat, (stiff, mass))
+    heat = formulation.heat
+    stiff, mass = degrees(mesh, cells, formulation.quadrature, heat)
+    law, rho, depth = properties(
+        mesh, materials, space.mesh, formulation.plane, heat, (stiff, mass)
+    )
     u = ufl.TrialFunction(space)
     v = ufl.TestFunction(space)
     energy = depth * ufl.inner(law(ufl.sym(ufl.grad(u))), ufl.sym(ufl.grad(v)))
@@ -220,26 +233,27 @@ def _matrices(
 def _sum_of_pieces(
     mesh: Mesh,
     materials: dict[str, Material],
-    layout: tuple[Any, np.ndarray],
-    plane: str,
-    quadrature: str,
-    heat: Temperatures | None,
+    space: Any,
+    rows: np.ndarray,
+    formulation: Formulation,
 ) -> tuple[PETSc.Mat, Mass, tuple[Piece, ...]]:
     """Stiffness and mass of a body of mixed shapes, and what they were summed from.
 
     Args:
-        layout: the space whose rows the matrices have, and the row of each point.
+        space: whose rows the matrices have.
+        rows: (n_points,) the row of each point.
     """
-    space, _ = layout
+    heat = formulation.heat
     pieces = []
     total: list[PETSc.Mat] = []
     for part, spread in pieces_of_one_shape(mesh, tuple(materials)):
         own = {name: materials[name] for name in part.bodies}
         warm = None if heat is None else replace(heat, nodal=np.asarray(spread @ heat.nodal))
-        comm = space.mesh.comm
-        body = _assemble_bodies(part, own, comm, plane, quadrature, warm, piece=True)
+        body = _assemble_bodies(
+            part, own, space.mesh.comm, replace(formulation, heat=warm), piece=True
+        )
         piece = Piece(body, spread)
-        gathered = [_gathered(piece, layout, matrix) for matrix in (body.K, body.M)]
+        gathered = [_gathered(piece, (space, rows), matrix) for matrix in (body.K, body.M)]
         total = (
             gathered if not total else [_added(*both) for both in zip(total, gathered, strict=True)]
         )

@@ -23,7 +23,7 @@ import numpy as np
 from ..errors import InputError, NotSolvedError, suggestion
 from .compat import PETSc, SLEPc, option_used, pages_kept
 from .constraint import Constrained
-from .lanczos import lowest_eigenpairs, orthonormal
+from .lanczos import WantedPairs, lowest_eigenpairs, orthonormal
 from .linalg import (
     apply_block,
     hermitian_part,
@@ -286,24 +286,22 @@ def krylov_schur(
     con: Constrained,
     inverse: Callable[[np.ndarray], np.ndarray],
     start: np.ndarray,
-    count: int,
-    tolerance: float,
-    guard: int = 0,
+    wanted: WantedPairs,
     settings: Eigensolver | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest eigenpairs; arguments and result as of :func:`lanczos.lowest`.
+    """The lowest eigenpairs; arguments and result as of :func:`lanczos.lowest_eigenpairs`.
 
     Args:
         start: (n_own, k), the columns' sum is the first vector.
-        guard: pairs beyond count, as far as they have come.
 
     Raises:
         NotSolvedError: no convergence, with SLEPc's reason.
         InputError: an option for SLEPc's solver that it does not know.
     """
+    count, guard = wanted.count, wanted.guard
     pencil = _Pencil(con, inverse, kept=guard > 0)
     settings = settings or Eigensolver()
-    eps = _make_solver(pencil, start, count, tolerance, settings)
+    eps = _make_solver(pencil, start, wanted, settings)
     try:
         with pages_kept():
             eps.solve()
@@ -318,15 +316,15 @@ def krylov_schur(
     finally:
         # now: at the end of the program its callbacks would be gone
         eps.destroy()
-    wanted = min(count + guard, found.shape[1])
+    most = min(count + guard, found.shape[1])
     directions = orthonormal(con, [], [], found, NEW_DIRECTION_SHARE)[1]
     # the solves that follow are the peak of memory
     del found
     give_back()
-    lam, X = _purify_vectors(con, inverse, directions, wanted)
+    lam, X = _purify_vectors(con, inverse, directions, most)
     if len(lam) < count and reason > 0:
         # some came twice after many restarts of a small basis: blocks find the others
-        return lowest_eigenpairs(con, inverse, np.asfortranarray(X), count, tolerance, guard)
+        return lowest_eigenpairs(con, inverse, np.asfortranarray(X), wanted)
     if len(lam) < count:
         raise NotSolvedError(
             f"SLEPc found {len(lam)} of {count} modes: {REASON_WORDS.get(reason, 'no convergence')}"
@@ -368,11 +366,11 @@ def basis_size(count: int) -> int:
 def _make_solver(
     pencil: _Pencil,
     start: np.ndarray,
-    count: int,
-    tolerance: float,
+    wanted: WantedPairs,
     settings: Eigensolver,
 ) -> SLEPc.EPS:
     """SLEPc's solver with everything set."""
+    count = wanted.count
     con = pencil.con
     comm = con.body.comm
     parts = 2 if pencil.doubled else 1
@@ -392,7 +390,7 @@ def _make_solver(
     basis = settings.vectors or basis_size(count)
     eps.setDimensions(count, max(basis, count + 1))
     eps.setKrylovSchurRestart(KEPT_SHARE)
-    eps.setTolerances(tolerance, MAX_RESTARTS)
+    eps.setTolerances(wanted.tolerance, MAX_RESTARTS)
     # done here, for all vectors in one batch
     eps.setPurify(False)
     transform = eps.getST()

@@ -20,6 +20,8 @@ from .constraint import Constrained
 from .linalg import apply_block, inner_products, linear_combinations, recombine, subtract_product
 from .memory import give_back
 
+# error of a vector's direction; that of a frequency is its square
+DIRECTION_TOLERANCE = 1e-8
 MAX_STEPS = 200
 # share of old directions in a new one below which its image under M is corrected, not computed
 # again
@@ -32,6 +34,17 @@ DROPPED_DIRECTION_SHARE = 1e-26
 TRUE_DIRECTION = 0.25
 # share of the tolerance below which a direction of the residual waits
 DEFERRED_SHARE = 0.1
+
+
+@dataclass(frozen=True)
+class WantedPairs:
+    """How many of the lowest eigenpairs are wanted, and how exactly."""
+
+    count: int
+    # largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error times a gap
+    tolerance: float = DIRECTION_TOLERANCE
+    # pairs returned beyond count, as far as they have come
+    guard: int = 0
 
 
 @dataclass
@@ -53,18 +66,13 @@ def lowest_eigenpairs(
     con: Constrained,
     inverse: Callable[[np.ndarray], np.ndarray],
     start: np.ndarray,
-    count: int,
-    tolerance: float,
-    guard: int = 0,
+    wanted: WantedPairs,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The lowest eigenpairs of K x = lambda M x.
 
     Args:
         inverse: K^-1 (or its replacement) on blocks (n_own, k).
         start: (n_own, k) first block.
-        tolerance: largest |K^-1 M x - x / lambda| lambda in the M-norm: the direction's error
-            times a gap.
-        guard: pairs returned beyond count as far as they have come.
 
     The vectors returned are K^-1 M x lambda, one free step of inverse iteration beyond the Ritz
     vectors x: it wipes out what rounding and the iteration leave in stiff directions.
@@ -74,9 +82,10 @@ def lowest_eigenpairs(
         vectors.
 
     Raises:
-        InputError: fewer than ``count`` pairs exist.
+        InputError: fewer pairs exist than are wanted.
         NotSolvedError: the iteration does not converge.
     """
+    count, tolerance = wanted.count, wanted.tolerance
     space = _Space()
     block, Mblock, _ = orthonormal(con, [], [], start.astype(con.dtype))
     for _ in range(MAX_STEPS):
@@ -89,7 +98,7 @@ def lowest_eigenpairs(
         theta, S = eigh(space.H)
         theta = theta[::-1]
         S = S[:, ::-1]
-        k = min(count + guard, len(theta))
+        k = min(count + wanted.guard, len(theta))
         rest = space.C @ S[:, :k] / theta[:k]
         error = np.linalg.norm(rest[:, :count], axis=0).max(initial=0.0)
         if (k >= count and error < tolerance) or not len(rest):

@@ -9,6 +9,7 @@ has; so the inertia of K - s M counts the eigenvalues, and what was missed is fo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,7 +22,7 @@ from .constraint import Constrained, expand_to_mesh, restrict_load
 from .cyclic_schur import count_negative
 from .eigensolver import Eigensolver, basis_size, krylov_schur
 from .flexibility import Flexibility, compliance, compliances, flexible
-from .lanczos import lowest_eigenpairs
+from .lanczos import DIRECTION_TOLERANCE, WantedPairs, lowest_eigenpairs
 from .linalg import (
     Folded,
     apply_block,
@@ -35,9 +36,7 @@ from .linalg import (
 from .memory import give_back
 from .open_matrix import entries_of_sum
 
-# error of a vector's direction; that of a frequency is its square
-DIRECTION_TOLERANCE = 1e-8
-# the same where modes are looked at, not reduced with
+# error of a vector's direction where modes are looked at, not reduced with
 SHOWN_DIRECTION_TOLERANCE = 1e-6
 # of a gap between eigenvalues: where the inertia is counted
 GAP_SHARE = 0.9
@@ -72,7 +71,8 @@ def modes(
     if count < 1:
         raise InputError(f"count is {count}, expected at least 1 mode")
     if not prove:
-        return mode_set(con, *lowest_pairs(flex or flexible(con), count, tolerance, solver=solver))
+        wanted = WantedPairs(count, tolerance)
+        return mode_set(con, *lowest_pairs(flex or flexible(con), wanted, solver=solver))
     if flex is not None:
         return mode_set(con, *proven_pairs(flex, count, tolerance, solver))
     # these factors make room for those of the count
@@ -98,7 +98,7 @@ def proven_pairs(
     Raises:
         NotSolvedError: the numbers differ even so.
     """
-    lam, X = lowest_pairs(flex, count, tolerance, solver=solver)
+    lam, X = lowest_pairs(flex, WantedPairs(count, tolerance), solver=solver)
     if not lam[-1] > 0:
         # rigid motions alone, which geometry counts
         return lam, X
@@ -113,7 +113,7 @@ def proven_pairs(
     if exact == expected:
         return lam, X
     flex = flex if keep else flexible(flex.con)
-    lam, X = lowest_pairs(flex, max(count, exact), tolerance, solver=BLOCKS)
+    lam, X = lowest_pairs(flex, WantedPairs(max(count, exact), tolerance), solver=BLOCKS)
     found = np.count_nonzero(lam < upper)
     if found != exact:
         raise NotSolvedError(
@@ -125,10 +125,8 @@ def proven_pairs(
 
 def lowest_pairs(
     flex: Flexibility,
-    count: int,
-    tolerance: float = DIRECTION_TOLERANCE,
+    wanted: WantedPairs,
     start: np.ndarray | None = None,
-    guard: int = 0,
     solver: Eigensolver = SLEPC,
     inverse: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -137,21 +135,19 @@ def lowest_pairs(
 
     Args:
         start: (n_own, k) good guesses of the vectors.
-        guard: pairs beyond count, as far as they have come.
         inverse: computes K^+ B in place of ``flexibility.compliance``.
     """
-    r = min(flex.R.shape[1], count)
-    if r == count:
+    r = min(flex.R.shape[1], wanted.count)
+    if r == wanted.count:
         return np.zeros(r), flex.R[:, :r]
-    lam, X = elastic_pairs(flex, count - r, tolerance, inverse, start, guard, solver)
+    elastic = replace(wanted, count=wanted.count - r)
+    lam, X = elastic_pairs(flex, elastic, inverse, start, solver)
     return np.concatenate([np.zeros(r), lam]), np.concatenate([flex.R[:, :r], X], axis=1)
 
 
 def pairs_together(
     bodies: Sequence[Flexibility],
-    count: int,
-    tolerance: float = DIRECTION_TOLERANCE,
-    guard: int = 0,
+    wanted: WantedPairs,
     solver: Eigensolver = SLEPC,
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """``lowest_pairs`` of several nodal diameters from scratch, with iterations that advance
@@ -162,13 +158,18 @@ def pairs_together(
     """
 
     def iteration(flex: Flexibility) -> Callable[..., tuple[np.ndarray, np.ndarray]]:
-        few = min(guard, flex.con.T.shape[1] - count)
-        return lambda ask: lowest_pairs(flex, count, tolerance, None, few, solver, ask)
+        own = existing_pairs(flex, wanted)
+        return lambda ask: lowest_pairs(flex, own, None, solver, ask)
 
     def answer(asked: list[tuple[int, np.ndarray]]) -> list[np.ndarray]:
         return compliances([(bodies[i], B) for i, B in asked])
 
     return run_together([iteration(flex) for flex in bodies], answer)
+
+
+def existing_pairs(flex: Flexibility, wanted: WantedPairs) -> WantedPairs:
+    """The pairs wanted, with no more guards than the body has modes for."""
+    return replace(wanted, guard=min(wanted.guard, flex.con.T.shape[1] - wanted.count))
 
 
 def mode_set(
@@ -214,11 +215,9 @@ def _stiffness_scale(con: Constrained, X: np.ndarray) -> float:
 
 def elastic_pairs(
     flex: Flexibility,
-    count: int,
-    tolerance: float = DIRECTION_TOLERANCE,
+    wanted: WantedPairs,
     inverse: Callable[[np.ndarray], np.ndarray] | None = None,
     start: np.ndarray | None = None,
-    guard: int = 0,
     solver: Eigensolver = SLEPC,
 ) -> tuple[np.ndarray, np.ndarray]:
     """The lowest elastic eigenpairs of K x = lambda M x.
@@ -227,24 +226,23 @@ def elastic_pairs(
         inverse: its replacement for K^+ (fixed interfaces).
         start: (n_own, k) good guesses, finished by blocks; random loads, the same for any number of
             ranks, when left out.
-        guard: pairs beyond count, as far as they have come.
 
     Raises:
         InputError: there are fewer.
         NotSolvedError: no convergence.
     """
     inverse = inverse or (lambda B: compliance(flex, B))
-    few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(count)
+    few = flex.con.T.shape[1] < MIN_SPARE_MODES * basis_size(wanted.count)
     if start is None and solver.method == "slepc" and not few:
         # SLEPc begins with its image under K^-1 M
         first = restrict_load(flex.con, _rotation_probe(flex.con, 1))
-        return krylov_schur(flex.con, inverse, first, count, tolerance, guard, solver)
+        return krylov_schur(flex.con, inverse, first, wanted, solver)
     if start is None:
-        width = min(max(8 if flex.con.dtype is float else 6, count // 3), 16)
+        width = min(max(8 if flex.con.dtype is float else 6, wanted.count // 3), 16)
         start = inverse(restrict_load(flex.con, _rotation_probe(flex.con, width)))
     elif flex.R.shape[1]:
         start = start - flex.R @ inner_products(flex.con.body.comm, flex.MR, start)
-    return lowest_eigenpairs(flex.con, inverse, start, count, tolerance, guard)
+    return lowest_eigenpairs(flex.con, inverse, start, wanted)
 
 
 def _rotation_probe(con: Constrained, width: int) -> np.ndarray:

@@ -6,7 +6,7 @@ Both come from the one factorisation that also gives the modes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -22,9 +22,10 @@ from .cyclic_schur import Rim, face_solve, inner_solve
 from .eigensolver import Eigensolver
 from .flexibility import Flexibility, compliance, flexible
 from .gyroscopic import Spin, constrained_coupling
+from .lanczos import DIRECTION_TOLERANCE, WantedPairs
 from .linalg import apply_block, hermitian_part, inner_products
 from .mode_count import lost_modes
-from .modes import DIRECTION_TOLERANCE, SLEPC, canonical, elastic_pairs, proven_pairs
+from .modes import SLEPC, canonical, elastic_pairs, proven_pairs
 from .open_sector import Opened
 from .separators import reduce_load, separator_solve
 
@@ -37,74 +38,72 @@ REDUCTION_KINDS = ("rubin", "craig-bampton")
 NO_COUPLING = 1e-12
 
 
+@dataclass(frozen=True)
+class PortReduction:
+    """The reduced model that is wanted of a body or sector."""
+
+    # (n_points*dim, p) port vectors in mesh numbering, real: displacements P^T u, forces P f
+    P: sp.spmatrix
+    # slices of the p ports
+    names: dict[str, slice]
+    # modes kept, rigid ones included; of "craig-bampton" the fixed-interface modes
+    count: int
+    # (n_points*dim,) [N], its displacement at the ports is the static offset; of nodal diameter 0
+    static_load: np.ndarray | None = None
+    # "rubin" or "craig-bampton"
+    kind: str = "rubin"
+    solver: Eigensolver = SLEPC
+    # rotation whose Coriolis forces couple the modes kept, as damping without work; those of the
+    # modes left out are left out
+    spin: Spin | None = None
+
+
 def port_model(
     con: Constrained,
-    P: sp.spmatrix,
-    names: dict[str, slice],
-    count: int,
-    static_load: np.ndarray | None = None,
-    kind: str = "rubin",
+    wanted: PortReduction,
     flex: Flexibility | None = None,
-    solver: Eigensolver = SLEPC,
-    spin: Spin | None = None,
 ) -> PortModel:
     """Reduce a constrained body to its ports.
 
     Args:
-        P: (n_points*dim, p) port vectors in mesh numbering, real: displacements P^T u, forces P f.
-        names: slices of the p ports.
-        count: modes kept, rigid ones included.
-        static_load: (n_points*dim,) [N], its displacement at the ports is the static offset.
-        kind: "rubin" or "craig-bampton" (count is then the number of fixed-interface modes).
         flex: factorisation to use again.
-        spin: rotation whose Coriolis forces couple the modes kept, as damping without work; those
-            of the modes left out are left out.
 
     Raises:
-        InputError: P does not fit the mesh, or knows no such kind.
+        InputError: the port vectors do not fit the mesh, or there is no such kind.
         NotSolvedError: from the factorisation or the modes.
     """
-    if kind not in REDUCTION_KINDS:
-        raise InputError(f"reduction is '{kind}'{suggestion(kind, REDUCTION_KINDS)}")
-    F = _restrict_ports(con, P)
+    if wanted.kind not in REDUCTION_KINDS:
+        raise InputError(f"reduction is '{wanted.kind}'{suggestion(wanted.kind, REDUCTION_KINDS)}")
+    F = _restrict_ports(con, wanted.P)
     flex = flex or flexible(con)
+    load = wanted.static_load
     columns = (
-        F
-        if static_load is None
-        else np.concatenate([F, restrict_load(con, static_load.reshape(-1, 1))], axis=1)
+        F if load is None else np.concatenate([F, restrict_load(con, load.reshape(-1, 1))], axis=1)
     )
     X = compliance(flex, columns)
     offset = (
-        None
-        if static_load is None
-        else inner_products(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
+        None if load is None else inner_products(con.body.comm, F, X[:, F.shape[1] :])[:, 0].real
     )
     X = X[:, : F.shape[1]]
-    reduce = _rubin_modes if kind == "rubin" else _craig_bampton
-    omega, V, residual = reduce(flex, F, X, count, solver)
+    reduce = _rubin_modes if wanted.kind == "rubin" else _craig_bampton
+    omega, V, residual = reduce(flex, F, X, wanted.count, wanted.solver)
     shapes = inner_products(con.body.comm, F, V)
     return PortModel(
         omega,
         shapes,
         residual,
-        names,
+        wanted.names,
         con.nodal_diameter,
         offset,
-        damping=_coriolis_damping(con, V, spin),
+        damping=_coriolis_damping(con, V, wanted.spin),
     )
 
 
 def port_models(
     t: Transformation,
-    P: sp.spmatrix,
-    names: dict[str, slice],
-    count: int,
+    wanted: PortReduction,
     diameters: Sequence[int],
-    static_load: np.ndarray | None = None,
-    kind: str = "rubin",
-    solver: Eigensolver = SLEPC,
     kept: KeptPairs | None = None,
-    spin: Spin | None = None,
     seen: Callable[[Eigenpairs], None] | None = None,
     interior: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Iterator[tuple[int, PortModel]]:
@@ -115,26 +114,29 @@ def port_models(
     counts the modes; a diameter that lost one comes once more, whole.
 
     Args:
-        static_load: (n_points*dim,) [N], of nodal diameter 0.
         kept: modes of the same body that are known; they are used up.
-        spin: as for :func:`port_model`.
         seen: is shown the modes of each nodal diameter.
         interior: what ``interior_flexibility`` gives, where it is known.
     """
-    shared = interior
-    if shared is None and t.opened is not None and kind == "rubin":
-        shared = interior_flexibility(t.opened, P, static_load)
-    model = _Ports(P, names, count, static_load, kind, solver, shared, spin, seen)
+    count = wanted.count
+    if interior is None and t.opened is not None and wanted.kind == "rubin":
+        interior = interior_flexibility(t.opened, wanted.P, wanted.static_load)
+
+    def reduced(pairs: Eigenpairs) -> tuple[int, PortModel]:
+        if seen is not None:
+            seen(pairs)
+        return pairs.nodal_diameter, _reduced_pairs(wanted, pairs, interior)
+
     if kept is not None and kept.serves(diameters, count):
         for n in diameters:
-            yield n, _port_model(model, kept.pairs.pop(n))
+            yield reduced(kept.pairs.pop(n))
         return
     lam = {}
-    for p in eigenpairs(t, count, diameters, tolerance=DIRECTION_TOLERANCE, solver=solver):
+    for p in eigenpairs(t, count, diameters, tolerance=DIRECTION_TOLERANCE, solver=wanted.solver):
         lam[p.nodal_diameter] = p.lam
-        yield p.nodal_diameter, _port_model(model, p)
+        yield reduced(p)
     for n, truth in lost_modes(t, lam, count).items():
-        yield n, _port_model(model, found_again(t, n, count, truth, DIRECTION_TOLERANCE))
+        yield reduced(found_again(t, n, count, truth, DIRECTION_TOLERANCE))
 
 
 def deal_to_one(work: Callable[[int], Any], items: Sequence[int]) -> Iterator[tuple[int, Any]]:
@@ -142,39 +144,27 @@ def deal_to_one(work: Callable[[int], Any], items: Sequence[int]) -> Iterator[tu
     return ((item, work(item)) for item in items)
 
 
-@dataclass(frozen=True)
-class _Ports:
-    """Ports and number of modes with which every nodal diameter is reduced."""
+def _reduced_pairs(
+    wanted: PortReduction,
+    p: Eigenpairs,
+    interior: tuple[np.ndarray, np.ndarray] | None,
+) -> PortModel:
+    """The port model of one nodal diameter from its modes.
 
-    P: sp.spmatrix
-    names: dict[str, slice]
-    count: int
-    static_load: np.ndarray | None
-    kind: str
-    solver: Eigensolver
-    # see ``interior_flexibility``
-    shared: tuple[np.ndarray, np.ndarray] | None
-    spin: Spin | None
-    seen: Callable[[Eigenpairs], None] | None
-
-
-def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
-    """The port model of one nodal diameter from its modes."""
-    if model.seen is not None:
-        model.seen(p)
+    Args:
+        interior: see ``interior_flexibility``; None where the body is reduced whole.
+    """
     n = p.con.nodal_diameter
-    load = model.static_load if n == 0 else None
-    P = model.P
+    load = wanted.static_load if n == 0 else None
+    P = wanted.P
     flex = p.flex or flexible(p.con)
     rim = flex.factor.parts
-    if model.shared is None or not isinstance(rim, Rim) or flex.R.shape[1]:
-        return port_model(
-            p.con, P, model.names, model.count, load, model.kind, flex, model.solver, model.spin
-        )
+    if interior is None or not isinstance(rim, Rim) or flex.R.shape[1]:
+        return port_model(p.con, replace(wanted, static_load=load), flex)
     _check_ports(p.con, P)
-    G, offset = _closed_flexibility(model.shared, rim)
-    lam = p.lam[: model.count]
-    vectors = canonical(p.con, lam, p.X[:, : model.count])
+    G, offset = _closed_flexibility(interior, rim)
+    lam = p.lam[: wanted.count]
+    vectors = canonical(p.con, lam, p.X[:, : wanted.count])
     # the ports stay sparse: dense they were the peak of memory
     shapes = (sp.csc_matrix(P).T @ p.con.T)[:, p.con.own] @ vectors
     comm = p.con.body.comm
@@ -184,10 +174,10 @@ def _port_model(model: _Ports, p: Eigenpairs) -> PortModel:
         np.sqrt(lam),
         shapes,
         _residual_flexibility(G[:ports, :ports], lam, shapes),
-        model.names,
+        wanted.names,
         n,
         None if load is None else offset,
-        damping=_coriolis_damping(p.con, vectors, model.spin),
+        damping=_coriolis_damping(p.con, vectors, wanted.spin),
     )
 
 
@@ -253,11 +243,11 @@ def interior_flexibility(
 
 
 def _closed_flexibility(
-    shared: tuple[np.ndarray, np.ndarray], rim: Rim
+    interior: tuple[np.ndarray, np.ndarray], rim: Rim
 ) -> tuple[np.ndarray, np.ndarray]:
     """The flexibility (p, p) with the cut faces joined, and its last column's real part."""
-    g = rim.faces.C.conj().T @ shared[1]
-    G = hermitian_part(shared[0] + g.conj().T @ face_solve(rim, g))
+    g = rim.faces.C.conj().T @ interior[1]
+    G = hermitian_part(interior[0] + g.conj().T @ face_solve(rim, g))
     return G, G[:-1, -1].real
 
 
@@ -301,7 +291,7 @@ def _craig_bampton(
     """
     comm = flex.con.body.comm
     fixed = _fixed_inverse(flex, F, X)
-    _, inner = elastic_pairs(flex, count, inverse=fixed, solver=solver)
+    _, inner = elastic_pairs(flex, WantedPairs(count), inverse=fixed, solver=solver)
     V = np.concatenate([flex.R, X, inner], axis=1)
     V = V / np.sqrt(np.abs(inner_products(comm, V, apply_block(flex.con.M, V)).diagonal()))
     mass = hermitian_part(inner_products(comm, V, apply_block(flex.con.M, V)))

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from geometry.matching import match_faces
+from geometry.matching import FaceMotion, match_faces
 from geometry.mesh import Mesh, Pair
 from geometry.second_order_cells import COMPLETE_CELL as SECOND_ORDER
 from geometry.split_cells import split_cells, vertex_order
@@ -321,13 +321,5 @@ def _matched(mesh: Mesh, pair: Pair) -> Pair:
     """The pair with its new nodes; none where they were none."""
     if not pair.nodes.size:
         return pair
-    names = (pair.master, pair.slave)
-    return match_faces(
-        mesh.points,
-        mesh.faces,
-        names,
-        mesh.dimension,
-        pair.rotation,
-        pair.shift,
-        MATCH_TOLERANCE,
-    )
+    motion = FaceMotion(pair.master, pair.slave, pair.rotation, pair.shift)
+    return match_faces(mesh.points, mesh.faces, motion, mesh.dimension, MATCH_TOLERANCE)

@@ -28,26 +28,113 @@ PRECISIONS = {"double": np.float64, "single": np.float32}
 PERIODIC = "periodic"
 
 
-def _vector_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
-    """Fill forces, shares and cycles of 2-D elements; returns their Jacobian (n, d, K, d K)."""
-    n, d, K = w.shape
-    H = harmonics_of(w)
-    J = np.empty((n, d, K, d * K) if jacobian else (n, 0, 0, 0))
-    rows = derivative_patterns(H, samples, PRECISIONS[precision])
-    tab = trigonometric_tables(H, samples)
-    disc_batch(w, ramp, load, nodes, tab, rows, cycles, F, J, shares, used)
-    return J
-
-
-def _plain_kernel(w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used):
-    """Fill forces, shares and cycles of 2-D elements by the plain kernel; returns their Jacobian
-    (n, d, K, d K).
+@dataclass(frozen=True)
+class Motion:
+    """Periodic relative motion of n elements in d = 1 + tangents directions, and the loads
+    prescribed with it.
     """
-    n, d, K = w.shape
+
+    # (n, d, K) coefficients [mean, cos 1, sin 1, ...] [m]
+    w: np.ndarray
+    # (n, tangents) how far the tangential motion goes on in each period [m]
+    walk: np.ndarray
+    # (n, samples) prescribed part of the normal load [N]; (n, 0) where the constant n0 is it
+    load: np.ndarray
+
+    def of_elements(self, rows: np.ndarray) -> Motion:
+        """The motion of some of the elements."""
+        return Motion(self.w[rows], self.walk[rows], self.load[rows])
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How the forces over a period are taken."""
+
+    # instants of a period
+    samples: int
+    # with the derivatives of the forces by the motion
+    jacobian: bool
+    # most periods that are marched until a force is periodic
+    cycles: int
+    # in which the derivatives of 2-D elements are summed, a key of PRECISIONS
+    precision: str
+    # of 2-D elements, a key of KERNELS_2D
+    kernel: str
+
+
+def _vector_kernel(nodes: np.ndarray, motion: Motion, sampling: Sampling) -> LawForces:
+    """Coulomb forces of 2-D elements with the table nodes (n, 4)."""
+    n, d, K = motion.w.shape
+    H = harmonics_of(motion.w)
+    tab = trigonometric_tables(H, sampling.samples)
+    rows = derivative_patterns(H, sampling.samples, PRECISIONS[sampling.precision])
+    found = _empty_forces(n, d, K)
+    J = np.empty((n, d, K, d * K) if sampling.jacobian else (n, 0, 0, 0))
+    disc_batch(
+        motion.w,
+        motion.walk,
+        motion.load,
+        nodes,
+        tab,
+        rows,
+        sampling.cycles,
+        found.f,
+        J,
+        found.shares,
+        found.cycles,
+    )
+    return replace(found, dfdw=J.reshape(n, d, K, d, K)) if sampling.jacobian else found
+
+
+def _plain_kernel(nodes: np.ndarray, motion: Motion, sampling: Sampling) -> LawForces:
+    """Coulomb forces of 2-D elements with the table nodes (n, 4), by the plain kernel."""
+    n, d, K = motion.w.shape
+    tab = trigonometric_tables(harmonics_of(motion.w), sampling.samples)
+    found = _empty_forces(n, d, K)
     J = np.empty((n, d, K, d * K))
-    tab = trigonometric_tables(harmonics_of(w), samples)
-    plain_batch(w, ramp, load, nodes, tab, cycles, F, J, shares, used)
-    return J
+    plain_batch(
+        motion.w,
+        motion.walk,
+        motion.load,
+        nodes,
+        tab,
+        sampling.cycles,
+        found.f,
+        J,
+        found.shares,
+        found.cycles,
+    )
+    return replace(found, dfdw=J.reshape(n, d, K, d, K)) if sampling.jacobian else found
+
+
+def _line_kernel(nodes: np.ndarray, motion: Motion, sampling: Sampling) -> LawForces:
+    """Coulomb forces of 1-D elements with the table nodes (n, 4)."""
+    n, d, K = motion.w.shape
+    tab = trigonometric_tables(harmonics_of(motion.w), sampling.samples)
+    found = _empty_forces(n, d, K)
+    J = np.empty((n, d, K, d, K))
+    if np.any(motion.walk):
+        walking_batch(
+            motion.w,
+            np.ascontiguousarray(motion.walk[:, 0]),
+            motion.load,
+            nodes,
+            tab,
+            sampling.cycles,
+            sampling.jacobian,
+            found.f,
+            J,
+            found.shares,
+            found.cycles,
+        )
+    else:
+        jenkins_batch(motion.w, motion.load, nodes, tab, found.f, J, found.shares)
+    return replace(found, dfdw=J) if sampling.jacobian else found
+
+
+def _empty_forces(n: int, d: int, K: int) -> LawForces:
+    """For kernels to fill; two periods where a kernel marches none."""
+    return LawForces(np.empty((n, d, K)), None, np.empty((n, 3)), np.full(n, 2))
 
 
 # of 2-D elements
@@ -120,30 +207,31 @@ def evaluate(
     w, nodes = check_motion(elements, w)
     if precision not in PRECISIONS:
         raise InputError(f"precision {precision!r}: expected one of {', '.join(PRECISIONS)}")
-    n, d, K = w.shape
     if kernel not in KERNELS_2D:
         raise InputError(f"kernel {kernel!r}: expected one of {', '.join(KERNELS_2D)}")
-    load = _prescribed_load(load, n, samples)
-    ramp = _checked_walk(elements, walk)
-    if elements.law is not None:
-        return _evaluate_laws(elements, w, samples, jacobian, load, cycles, precision, kernel, ramp)
-    tab = trigonometric_tables(harmonics_of(w), samples)
-    F = np.empty((n, d, K))
-    shares = np.empty((n, 3))
-    used = np.full(n, 2)
-    if d == 2:
-        J = np.empty((n, d, K, d, K))
-        if np.any(ramp):
-            along = np.ascontiguousarray(ramp[:, 0])
-            walking_batch(w, along, load, nodes, tab, cycles, jacobian, F, J, shares, used)
-        else:
-            jenkins_batch(w, load, nodes, tab, F, J, shares)
+    prescribed = _prescribed_load(load, len(w), samples)
+    motion = Motion(w, _checked_walk(elements, walk), prescribed)
+    sampling = Sampling(samples, jacobian, cycles, precision, kernel)
+    if elements.law is None:
+        found = _coulomb_forces(nodes, motion, sampling)
     else:
-        J = KERNELS_2D[kernel](
-            w, ramp, load, nodes, samples, precision, cycles, jacobian, F, shares, used
-        )
-    derivative = J.reshape(n, d, K, d, K) if jacobian else None
-    return _forces_of(F, derivative, w, ramp, shares, used, cycles)
+        found = _forces_by_law(elements, motion, sampling)
+    reason = convergence_reason(found.f, found.cycles, f"were not periodic after {cycles} cycles")
+    return Forces(
+        found.f,
+        found.dfdw,
+        found.shares,
+        dissipated_energy(found.f, w) + np.sum(found.f[:, 1:, 0] * motion.walk, axis=1),
+        np.abs(found.cycles),
+        reason == PERIODIC,
+        reason,
+    )
+
+
+def _coulomb_forces(nodes: np.ndarray, motion: Motion, sampling: Sampling) -> LawForces:
+    """Forces of Coulomb elements with the table nodes (n, 4), by the kernel of their directions."""
+    kernel = _line_kernel if motion.w.shape[1] == 2 else KERNELS_2D[sampling.kernel]
+    return kernel(nodes, motion, sampling)
 
 
 def _checked_walk(elements: Elements, walk: np.ndarray | None) -> np.ndarray:
@@ -160,85 +248,35 @@ def _checked_walk(elements: Elements, walk: np.ndarray | None) -> np.ndarray:
     return np.ascontiguousarray(walk, dtype=float)
 
 
-def _evaluate_laws(
-    elements: Elements,
-    w: np.ndarray,
-    samples: int,
-    jacobian: bool,
-    load: np.ndarray,
-    cycles: int,
-    precision: str,
-    kernel: str,
-    ramp: np.ndarray,
-) -> Forces:
-    """Harmonics of the contact forces of elements of several laws, law after law; Coulomb's by its
-    kernels.
-    """
-    n, d, K = w.shape
+def _forces_by_law(elements: Elements, motion: Motion, sampling: Sampling) -> LawForces:
+    """Forces of elements of several laws, law after law; Coulomb's by its kernels."""
+    n, d, K = motion.w.shape
     # raises where the samples are too few
-    trigonometric_tables(harmonics_of(w), samples)
-    F = np.empty((n, d, K))
-    J = np.empty((n, d, K, d, K)) if jacobian else None
-    shares = np.empty((n, 3))
-    used = np.full(n, 2)
+    trigonometric_tables(harmonics_of(motion.w), sampling.samples)
+    dfdw = np.empty((n, d, K, d, K)) if sampling.jacobian else None
+    found = replace(_empty_forces(n, d, K), dfdw=dfdw)
     for law, rows in groups_by_law(elements):
         some = replace(select_elements(elements, rows), law=None)
-        prescribed = load[rows] if load.shape[1] else None
-        part: Forces | LawForces
+        own = motion.of_elements(rows)
         if law is None:
-            part = evaluate(
-                some,
-                w[rows],
-                samples,
-                jacobian,
-                load=prescribed,
-                cycles=cycles,
-                precision=precision,
-                kernel=kernel,
-                walk=ramp[rows],
-            )
-            used[rows] = part.cycles if part.converged else -part.cycles
+            part = _coulomb_forces(some.table, own, sampling)
         else:
             part = periodic_forces(
                 law,
                 some,
-                w[rows],
-                samples,
-                load=prescribed,
-                jacobian=jacobian,
-                cycles=cycles,
-                walk=ramp[rows],
+                own.w,
+                sampling.samples,
+                load=own.load if own.load.shape[1] else None,
+                jacobian=sampling.jacobian,
+                cycles=sampling.cycles,
+                walk=own.walk,
             )
-            used[rows] = part.cycles
-        F[rows] = part.f
-        shares[rows] = part.shares
-        if J is not None:
-            J[rows] = part.dfdw
-    return _forces_of(F, J, w, ramp, shares, used, cycles)
-
-
-def _forces_of(
-    F: np.ndarray,
-    J: np.ndarray | None,
-    w: np.ndarray,
-    ramp: np.ndarray,
-    shares: np.ndarray,
-    used: np.ndarray,
-    cycles: int,
-) -> Forces:
-    """The result, with states, works and the reason from harmonics (n, d, K), shares of the period
-    (n, 3) and periods (n,), below zero where the state was not periodic.
-    """
-    reason = convergence_reason(F, used, f"were not periodic after {cycles} cycles")
-    return Forces(
-        F,
-        J,
-        shares,
-        dissipated_energy(F, w) + np.sum(F[:, 1:, 0] * ramp, axis=1),
-        np.abs(used),
-        reason == PERIODIC,
-        reason,
-    )
+        found.f[rows] = part.f
+        found.shares[rows] = part.shares
+        found.cycles[rows] = part.cycles
+        if dfdw is not None:
+            dfdw[rows] = part.dfdw
+    return found
 
 
 def convergence_reason(

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_seat import ALPHA, SPEED, condensed
+from seated_wedge import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 import bladefem

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import i0, i1
-from test_frictional_seating import condensed
+from seated_wedge import condensed_both_ways
 
 from bladefem.contact.equivalent_layer import LayerState, decay_lengths, equivalent_springs
 from bladefem.contact.interface_elements import friction_elements, with_interface_law
@@ -32,7 +32,7 @@ from bladefem.study.stability.resonance_in_time import resonance_in_time
 
 @pytest.fixture(scope="module")
 def problem():
-    return condensed(3)[1]
+    return condensed_both_ways(3)[1]
 
 
 # [m]

@@ -4,41 +4,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wedge import wedge_mesh
+from seated_wedge import ALPHA, SPEED, condensed_both_ways
 
 from bladefem.contact.admissible_load import holds_itself, normal_load_bounds
+from bladefem.contact.condensed_bodies import hold_axially
 from bladefem.contact.frictional_seating import (
-    frictional_problem,
-    hold_axially,
     seat_with_friction,
 )
 from bladefem.contact.interface_law import InterfaceLaw
-from bladefem.contact.patch import make_patch
 from bladefem.contact.rough_layer import TOUCHING_PRESSURE, decay_length
-from bladefem.contact.seating import contact_problem, solve_seating
+from bladefem.contact.seating import solve_seating
 from bladefem.errors import InputError, NotSolvedError
-from bladefem.fem.body import assemble
-from bladefem.fem.constraint import constrain
-from bladefem.fem.flexibility import flexible
-from bladefem.scene.tables import Material
 
-ALPHA = np.radians(40)
-SPEED = 800.0
 MU = 0.3
-
-
-def condensed(dimension):
-    mesh = wedge_mesh(ALPHA, dimension=dimension)
-    patches = [make_patch(mesh, name) for name in ("this", "next")]
-    blade = flexible(constrain(assemble(mesh, "blade", Material()), "clamp"))
-    damper = flexible(constrain(assemble(mesh, "damper", Material()), None))
-    rough = frictional_problem(mesh, patches, blade, damper)
-    return rough, contact_problem(mesh, patches, blade, damper)
 
 
 @pytest.fixture(scope="module", params=[2, 3])
 def problems(request):
-    return condensed(request.param)
+    return condensed_both_ways(request.param)
 
 
 def layer(problem, kn=5e13, kt=4e13):

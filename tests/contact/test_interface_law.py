@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_seat import ALPHA, SPEED, condensed
+from seated_wedge import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 from bladefem.contact.interface_elements import friction_elements, interface_law, with_interface_law

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_seat import ALPHA, condensed
+from seated_wedge import ALPHA, condensed
 from wedge import wedge_mesh
 
 from bladefem.contact.interface_elements import gives_stiffness, pair_ratio, with_interface_law

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from blocks import compliances, facing_blocks, graded, rollers
-from test_seat import ALPHA, SPEED, condensed
+from seated_wedge import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 from bladefem.contact.complementarity import solve_lcp

@@ -5,7 +5,7 @@ communicator.
 import numpy as np
 import pytest
 from mesh_seating import solve_mesh_seating
-from test_seat import ALPHA, SPEED
+from seated_wedge import ALPHA, SPEED
 from wedge import wedge_mesh
 
 from bladefem.fem.compat import MPI

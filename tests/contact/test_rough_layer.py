@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from test_frictional_seating import condensed
+from seated_wedge import condensed_both_ways
 
 from bladefem.contact.frictional_seating import _Interface, _projections, _State
 from bladefem.contact.interface_elements import (
@@ -28,7 +28,7 @@ LENGTH = 0.4 * sqrt(2) * 1.25 * 0.8e-6
 
 @pytest.fixture(scope="module")
 def both():
-    return condensed(3)
+    return condensed_both_ways(3)
 
 
 @pytest.fixture(scope="module")

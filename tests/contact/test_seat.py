@@ -6,31 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from seated_wedge import ALPHA, SPEED, condensed
 from wedge import wedge_mesh
 
 import bladefem
 from bladefem.contact.interface_law import InterfaceLaw, closure_of
 from bladefem.contact.patch import make_patch
 from bladefem.contact.rough_layer import TOUCHING_PRESSURE, decay_length
-from bladefem.contact.seating import contact_problem, solve_seating
+from bladefem.contact.seating import solve_seating
 from bladefem.errors import InputError, NotSolvedError
-from bladefem.fem.body import assemble
-from bladefem.fem.constraint import constrain
-from bladefem.fem.flexibility import flexible
-from bladefem.scene.tables import Material
 from bladefem.study.pipeline.damper_contact import contact_patches
-
-ALPHA = np.radians(40)
-SPEED = 800.0  # rad/s
-
-
-def condensed(mesh, rigid=False, prop=1.0, clearance=0.0):
-    patches = [make_patch(mesh, name) for name in ("this", "next")]
-    blade = flexible(constrain(assemble(mesh, "blade", Material()), "clamp"))
-    body = assemble(mesh, "damper", Material())
-    return contact_problem(
-        mesh, patches, blade, body if rigid else flexible(constrain(body, None), prop), clearance
-    )
 
 
 @pytest.fixture(scope="module")

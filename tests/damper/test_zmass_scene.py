@@ -211,7 +211,7 @@ def test_clusters_stay_on_the_solid(pressed):
     assert near.max() < 0.005  # within an element of a node
 
 
-def test_refusals():
+def test_a_skew_beyond_one_and_another_kind_of_scene_are_refused():
     with pytest.raises(InputError, match=r"foundation\.skew.*at most 1"):
         vary(SCENE, foundation__skew=(0.8, 0.5))
     with pytest.raises(InputError, match="expected 'z mass'"):

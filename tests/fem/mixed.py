@@ -15,6 +15,11 @@ from geometry.topology import EDGES, QUADS, boundary_facets, outward_faces
 HEXAHEDRON = shape.reference_nodes("hexahedron").astype(int)
 
 
+def skew(points):
+    """Points (n, 3) of straight cells that are no boxes."""
+    return points @ np.array([[1.0, 0.1, 0.05], [0.2, 1.0, 0.1], [0.1, 0.3, 1.0]])
+
+
 def row(size=(0.5, 0.1, 0.1), map=None, order=2, corners_to=None):
     """Five cubes in a row along x: a hexahedron, two wedges, five pyramids with two tetrahedra, a
     hexahedron, two wedges. Node sets "clamp" (x = 0) and "end", faces x0, x1, y0, ...

@@ -17,7 +17,7 @@ from bladefem.fem.flexibility import flexible
 from bladefem.fem.gyroscopic import Spin, coupling, waves
 from bladefem.fem.linear_preload import linear_tangent, unit_speed_displacement
 from bladefem.fem.modes import modes
-from bladefem.fem.ports import port_model, port_models
+from bladefem.fem.ports import PortReduction, port_model, port_models
 from bladefem.hbm.linear.bodies import Damping, port_receptance
 from bladefem.hbm.linear_resonances import wave_frequencies
 from bladefem.scene.tables import Material
@@ -69,9 +69,10 @@ def test_reduced_response_is_that_of_full_matrices(ring, n):
     )
     spin = Spin(AXIS, SPEED)
     names = {"contact": slice(0, 1), "probe": slice(1, 2)}
-    whole = port_model(con, P, names, len(K), spin=spin)
+    whole = port_model(con, PortReduction(P, names, len(K), spin=spin))
     mass, stiff = 3.0, 2e-7
-    few = dict(port_models(transformation(body, "x0", True), P, names, 30, [n], spin=spin))[n]
+    wanted = PortReduction(P, names, 30, spin=spin)
+    few = dict(port_models(transformation(body, "x0", True), wanted, [n]))[n]
     F = (P.T @ T).toarray().conj().T
     both = np.arange(2)
     for w in whole.omega[0] * np.array([0.5, 0.999, 1.3]):
@@ -94,8 +95,8 @@ def test_craig_bampton_has_the_same_coriolis_forces(ring):
     names = {"contact": slice(0, 1), "probe": slice(1, 2)}
     spin = Spin(AXIS, SPEED)
     size = con.T.shape[1]
-    free = port_model(con, P, names, size, spin=spin)
-    fixed = port_model(con, P, names, 40, kind="craig-bampton", spin=spin)
+    free = port_model(con, PortReduction(P, names, size, spin=spin))
+    fixed = port_model(con, PortReduction(P, names, 40, kind="craig-bampton", spin=spin))
     ours, theirs = (wave_frequencies(model.omega, model.damping)[:6] for model in (free, fixed))
     np.testing.assert_allclose(ours, theirs, rtol=1e-4)
 
@@ -131,8 +132,9 @@ def test_standing_bodies_have_no_such_damping(ring):
     body, P = ring
     con = constrain(body, "x0", 2)
     names = {"contact": slice(0, 2)}
-    assert port_model(con, P, names, 4).damping is None
-    assert port_model(con, P, names, 4, spin=Spin(AXIS, 0.0)).damping is None
+    assert port_model(con, PortReduction(P, names, 4)).damping is None
+    at_rest = PortReduction(P, names, 4, spin=Spin(AXIS, 0.0))
+    assert port_model(con, at_rest).damping is None
 
 
 def test_waves_of_a_turning_bar_are_those_of_calculix():

@@ -55,7 +55,7 @@ def test_c3d20_with_node_sets_only(tmp_path):
     assert mesh.cell_type == "hexahedron27" and mesh.faces["cyclic_low"].shape[1] == 9
 
 
-def test_c3d20r_is_near(tmp_path):
+def test_reduced_integration_of_calculix_is_within_one_per_cent(tmp_path):
     """Reduced integration is softer on a coarse mesh; elements here are integrated fully."""
     deck = decks.flat_deck(decks.model("c3d20"), {}, "C3D20R")
     (tmp_path / "a.inp").write_text("\n".join(deck))
@@ -179,7 +179,7 @@ def lines_of_sets(lines):
     return next(x for x in reversed(lines) if x.startswith("*")).upper().startswith("*NSET")
 
 
-def test_sixteen_bit_text(tmp_path):
+def test_a_deck_in_sixteen_bit_text_agrees_with_calculix(tmp_path):
     deck = decks.flat_deck(decks.model("c3d10"), {})
     (tmp_path / "a.inp").write_bytes("\n".join(deck).encode("utf-16"))
     agrees(tmp_path / "a.inp", "c3d10", 1e-6, 1e-6)

@@ -89,7 +89,7 @@ def test_sense_of_counting_and_standing_modes():
     np.testing.assert_allclose(found[0], found[1], rtol=1e-9)
 
 
-def test_wrong_size():
+def test_a_coupling_of_another_number_of_modes_is_refused():
     body = assemble(sector(6, (1, 1, 1)), "blade", Material(), MPI.COMM_SELF)
     shapes = modes(constrain(body, "clamp", 1), 3)
     with pytest.raises(InputError, match=r"shape \(2, 2\), expected \(3, 3\)"):

@@ -11,7 +11,7 @@ from bladefem.errors import InputError
 from bladefem.fem.body import assemble
 from bladefem.fem.constraint import constrain
 from bladefem.fem.flexibility import compliance, flexible
-from bladefem.fem.lanczos import lowest_eigenpairs
+from bladefem.fem.lanczos import WantedPairs, lowest_eigenpairs
 from bladefem.fem.linalg import apply_block
 from bladefem.scene.tables import Material
 
@@ -34,7 +34,10 @@ def test_what_is_known_already_is_not_solved_for(n):
     )
     flex, widths = flexible(con), []
     found, Y = lowest_eigenpairs(
-        con, lambda B: widths.append(B.shape[1]) or compliance(flex, B), start, 10, 1e-6
+        con,
+        lambda B: widths.append(B.shape[1]) or compliance(flex, B),
+        start,
+        WantedPairs(10, 1e-6),
     )
     np.testing.assert_allclose(found, lam[:10], rtol=1e-11)
     np.testing.assert_allclose(
@@ -50,10 +53,14 @@ def test_all_modes_of_a_small_body():
     con, lam, _ = pencil(0)
     flex = flexible(con)
     start = np.random.default_rng(2).standard_normal((len(lam), 8))
-    found, _ = lowest_eigenpairs(con, lambda B: compliance(flex, B), start, len(lam), 1e-6)
+    found, _ = lowest_eigenpairs(
+        con, lambda B: compliance(flex, B), start, WantedPairs(len(lam), 1e-6)
+    )
     np.testing.assert_allclose(found, lam, rtol=1e-9)
     with pytest.raises(
         InputError,
         match=f"{len(lam) + 1} elastic modes were asked of a body that has {len(lam)}",
     ):
-        lowest_eigenpairs(con, lambda B: compliance(flex, B), start, len(lam) + 1, 1e-6)
+        lowest_eigenpairs(
+            con, lambda B: compliance(flex, B), start, WantedPairs(len(lam) + 1, 1e-6)
+        )

@@ -104,7 +104,7 @@ def test_files_that_a_container_keeps_in_memory_are_free(tmp_path, monkeypatch, 
         check_memory(1_000_000, MPI.COMM_SELF)
 
 
-def test_small_fits():
+def test_a_small_solve_fits_in_memory():
     plan = check_memory(1000, MPI.COMM_SELF)
     assert 0 < plan.memory < available_memory() and not plan.on_disk
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 import scipy.sparse.linalg
-from mixed import row, serendipity_matrices
+from mixed import row, serendipity_matrices, skew
 from structured import box, turn
 
 from bladefem.errors import InputError
@@ -33,11 +33,6 @@ from geometry.whole_cells import own_cells
 GOLDEN = json.loads((Path(__file__).parent / "ccx_decks.json").read_text())
 STEEL = Material()
 SIZE = (0.5, 0.1, 0.1)
-
-
-def skew(points):
-    """Straight cells that are no boxes."""
-    return points @ np.array([[1.0, 0.1, 0.05], [0.2, 1.0, 0.1], [0.1, 0.3, 1.0]])
 
 
 def dense(body, matrix):

@@ -9,7 +9,7 @@ from pathlib import Path
 import decks
 import numpy as np
 import pytest
-from mixed import chequered, cut, row
+from mixed import chequered, cut, row, skew
 from structured import box, face_areas, pair, sector, turn
 
 from bladefem.errors import InputError
@@ -39,11 +39,6 @@ FACES = ("x0", "x1", "y0", "y1", "z0", "z1")
 NORMALS = dict(
     zip(FACES, np.repeat(np.eye(3), 2, axis=0) * np.tile([[-1.0], [1.0]], (3, 1)), strict=True)
 )
-
-
-def skew(points):
-    """Straight cells that are no boxes."""
-    return points @ np.array([[1.0, 0.1, 0.05], [0.2, 1.0, 0.1], [0.1, 0.3, 1.0]])
 
 
 def bend(points):

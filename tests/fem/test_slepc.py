@@ -12,6 +12,7 @@ from bladefem.fem.compat import SLEPc
 from bladefem.fem.constraint import at_diameter, constrain, transformation
 from bladefem.fem.eigensolver import Eigensolver, krylov_schur
 from bladefem.fem.flexibility import compliance, flexible
+from bladefem.fem.lanczos import WantedPairs
 from bladefem.fem.linalg import Doubled, apply_block, solve_block
 from bladefem.fem.mode_count import _counting_shift as common_shift
 from bladefem.fem.modes import BLOCKS, SLEPC, _counting_shift, lowest_pairs, modes, pairs_together
@@ -93,8 +94,9 @@ def test_restarts_of_a_complex_pencil_keep_every_pair_single():
     )
     flex = flexible(at_diameter(t, 4))
     small = Eigensolver(vectors=12)
-    lam, X = lowest_pairs(flex, 10, 1e-10, solver=small)
-    exact, _ = lowest_pairs(flex, 10, 1e-10, solver=BLOCKS)
+    wanted = WantedPairs(10, 1e-10)
+    lam, X = lowest_pairs(flex, wanted, solver=small)
+    exact, _ = lowest_pairs(flex, wanted, solver=BLOCKS)
     np.testing.assert_allclose(lam, exact, rtol=1e-10)
     gram = X.conj().T @ apply_block(flex.con.M, X)
     np.testing.assert_allclose(gram, np.eye(10), atol=1e-10)
@@ -115,9 +117,9 @@ def test_slepc_makes_the_first_solve_itself(n, monkeypatch):
         return krylov_schur(*given)
 
     monkeypatch.setattr(modal, "krylov_schur", begins)
-    lam, _ = lowest_pairs(flex, 4, inverse=inverse)
+    lam, _ = lowest_pairs(flex, WantedPairs(4), inverse=inverse)
     assert solved_before == [0]
-    np.testing.assert_allclose(lam, lowest_pairs(flex, 4, solver=BLOCKS)[0], rtol=1e-9)
+    np.testing.assert_allclose(lam, lowest_pairs(flex, WantedPairs(4), solver=BLOCKS)[0], rtol=1e-9)
 
 
 def test_options_of_petsc_reach_the_solver(monkeypatch):
@@ -155,9 +157,10 @@ def test_diameters_solved_together_are_those_solved_alone(solver):
         assemble(sector(12, (5, 2, 2), bump=0.2), "blade", Material()), "clamp", True
     )
     bodies = [flexible(at_diameter(t, n)) for n in (0, 3, 6)]
-    together = pairs_together(bodies, 8, 1e-9, 2, solver)
+    wanted = WantedPairs(8, 1e-9, guard=2)
+    together = pairs_together(bodies, wanted, solver)
     for flex, (lam, X) in zip(bodies, together, strict=True):
-        alone, Y = lowest_pairs(flex, 8, 1e-9, guard=2, solver=solver)
+        alone, Y = lowest_pairs(flex, wanted, solver=solver)
         np.testing.assert_allclose(lam[:8], alone[:8], rtol=1e-11)
         overlap = abs(X[:, :8].conj().T @ apply_block(flex.con.M, Y[:, :8]))
         np.testing.assert_allclose(overlap, np.eye(8), atol=1e-6)
@@ -176,8 +179,8 @@ def test_what_a_solve_raises_comes_out_of_slepc(error):
         return solve_block(flex.factor, B)
 
     with pytest.raises(error, match="no"):
-        lowest_pairs(flex, 4, inverse=inverse)
-    assert len(lowest_pairs(flex, 4)[0]) == 4
+        lowest_pairs(flex, WantedPairs(4), inverse=inverse)
+    assert len(lowest_pairs(flex, WantedPairs(4))[0]) == 4
 
 
 def test_modes_that_are_missing_below_the_highest_gap_are_counted():

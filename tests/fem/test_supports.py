@@ -138,7 +138,7 @@ def test_what_turns_with_the_sector_is_not_held_on_its_cut():
     assert transformation(supported(body, "", directions=[("z0", "z")]), "clamp", True)
 
 
-def test_texts():
+def test_springs_and_directions_are_read_from_texts():
     support = Support(springs=("root: normal=2 N/mm^3; tangential=1e9",), directions=("rim: y, z",))
     assert list(area_springs(support)) == [("root", 2e9, 1e9)]
     assert held_letters(support) == [("rim", "yz")]

@@ -126,9 +126,9 @@ def test_guesses_wait_in_half_the_memory(monkeypatch):
     given = {}
     plain = wheel.lowest_pairs
 
-    def look(flex, count, tolerance, start, *rest):
+    def look(flex, wanted, start, *rest):
         given[flex.con.nodal_diameter] = None if start is None else start.dtype
-        return plain(flex, count, tolerance, start, *rest)
+        return plain(flex, wanted, start, *rest)
 
     monkeypatch.setattr(wheel, "lowest_pairs", look)
     all_diameters(body, 4)

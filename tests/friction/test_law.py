@@ -16,7 +16,7 @@ from bladefem.errors import InputError
 from bladefem.friction.aft import evaluate
 from bladefem.friction.kernel_1d_exact import evaluate_exact
 from bladefem.friction.law import FrictionLaw, NodeLaw
-from bladefem.friction.law_table import LAWS, merged_laws
+from bladefem.friction.law_table import LAWS, merged_laws, select_elements
 
 
 class Clamp(FrictionLaw):
@@ -163,6 +163,21 @@ def test_every_node_keeps_its_own_law():
     np.testing.assert_allclose(mixed.f[1::3], dahls.f[1::3], rtol=0, atol=1e-12)
     np.testing.assert_allclose(mixed.dfdw[1::3], dahls.dfdw[1::3], rtol=0, atol=1e-12)
     assert abs(mixed.f[2::3] - dahls.f[2::3]).max() > 1e-3
+
+
+def test_elements_of_several_laws_that_are_not_periodic_are_counted_one_by_one():
+    """Of two Coulomb elements the one that sticks is periodic at once."""
+    elements = Elements(np.ones(3), np.zeros(3), np.array([1.0, 50.0, 1.0]), np.ones(3), tangents=2)
+    elements = replace(elements, law=(None, None, "dahl"))
+    w = np.zeros((3, 3, 3))
+    w[:, 1, 1] = 1.2
+    w[:, 2, 2] = 0.5
+    alone = [
+        evaluate(select_elements(elements, [i]), w[i : i + 1], 128, cycles=1).converged
+        for i in range(3)
+    ]
+    assert alone == [False, True, False]
+    assert evaluate(elements, w, 128, cycles=1).reason.startswith("2 of 3 elements")
 
 
 def test_what_is_no_law_is_refused():

@@ -53,7 +53,7 @@ def test_hertz_volume_of_the_bent_block():
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
-def test_punch(dimension):
+def test_a_punch_has_its_area_pair_and_faces(dimension):
     block = Punch(dimension=dimension)
     mesh = mesh_punch(block, COARSE)
     area = np.linalg.norm(
@@ -70,7 +70,7 @@ def test_punch(dimension):
     np.testing.assert_allclose(far, -block.half_width, rtol=1e-12)
 
 
-def test_z_mass():
+def test_a_z_mass_has_its_volume_and_faces():
     z = ZMass()
     mesh = z_mass(z, MeshSize())
     area = 2 * z.width * z.bar + (z.height - 2 * z.bar) * z.bar
@@ -94,7 +94,7 @@ def test_z_mass():
         (mesh_punch, Punch(radius=0.015), "punch.radius"),
     ],
 )
-def test_refusals(build, part, field):
+def test_parts_that_do_not_fit_into_each_other_are_refused(build, part, field):
     with pytest.raises(InputError, match=field):
         build(part, MeshSize())
 

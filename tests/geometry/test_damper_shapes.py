@@ -14,10 +14,9 @@ from measure import volume
 from bladefem.errors import InputError
 from geometry.damper_shapes import SHAPES
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Shank, Wedge
-from geometry.profile import sector_profile
+from geometry.profile import clearing_shift, sector_profile
 from geometry.sector import wedge_sector
 from geometry.sector_check import check_sector
-from geometry.sector_names import clearing_shift
 
 PARTS = (Aerofoil(), Platform(), Shank(), Disc())
 # few elements on the seats, round which a mesh is fine: outlines are what this is about

@@ -15,13 +15,12 @@ from bladefem.fem.loads import body_volume
 from bladefem.scene.toml import scene_of
 from geometry.example_step import write_blade_step
 from geometry.fillet import with_fillet
-from geometry.fitted_wedge import flanks_between
+from geometry.fitted_wedge import FittedDamper, faces_about_damper, flanks_between
 from geometry.parameters import DEG, Aerofoil, Disc, MeshSize, Platform, Root, Shank, Shroud, Wedge
 from geometry.profile import sector_profile
 from geometry.section import section_outline
 from geometry.session import gmsh_session
 from geometry.step_file import (
-    FittedDamper,
     _import_shapes,
     axis_rotation,
     read_step,
@@ -139,7 +138,8 @@ def test_twenty_variations_are_fitted(tmp_path):
         on = axis_rotation(AXIS, 2 * pi / BLADE[3].sectors)
         with gmsh_session() as gmsh:
             _import_shapes(gmsh, file, 1.0)
-            flanks = flanks_between(gmsh, 14, 11, wedge, width, on, AXIS)
+            faces = faces_about_damper(gmsh, 14, 11, on)
+            flanks = flanks_between(faces, wedge, width, AXIS)
         assert flanks.width == pytest.approx(width, rel=1e-9)
         assert flanks.length == pytest.approx(wedge.length, rel=1e-9)
         outer = np.array([*shape.seats[0, 1], -wedge.length / 2])

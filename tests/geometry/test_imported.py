@@ -52,7 +52,7 @@ def same(found, mesh, tolerance=1e-12):
 
 
 @pytest.mark.parametrize("version, binary", [(2.2, False), (4.1, False), (4.1, True)])
-def test_msh(coarse_sector, tmp_path, version, binary):
+def test_a_mesh_of_gmsh_comes_back_as_it_was(coarse_sector, tmp_path, version, binary):
     write_msh(coarse_sector, tmp_path / "a.msh", version, binary)
     found = read_mesh(tmp_path / "a.msh", sectors=36)
     same(found, coarse_sector)
@@ -166,7 +166,7 @@ def test_unusable_files(tmp_path, name, text, words):
     assert "\n" not in str(caught.value)
 
 
-def test_plane_row(tmp_path):
+def test_a_plane_row_comes_back_with_its_pitch(tmp_path):
     mesh = plane_blades(Plane(), MeshSize())
     write_msh(mesh, tmp_path / "a.msh")
     found = read_mesh(tmp_path / "a.msh")

@@ -177,7 +177,7 @@ def test_faces_that_a_second_turn_carries_on_are_no_cut_faces(tmp_path):
     assert look_at(tmp_path / "a.inp").cut is None
 
 
-def test_command(deck, capsys):
+def test_the_command_prints_draws_and_writes_a_scene_once(deck, capsys):
     picture = deck.with_name("a.png")
     assert main(["look", str(deck), "--view", str(picture), "--scene"]) == 0
     said = capsys.readouterr().out

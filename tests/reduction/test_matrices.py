@@ -146,7 +146,7 @@ def free_beam(elements):
     return K, M
 
 
-def test_files(tmp_path):
+def test_matrices_are_read_from_npz_mat_and_mtx(tmp_path):
     K, M = beam_matrices(elements=2)
     np.savez(tmp_path / "a.npz", K=K, M=M)
     io.savemat(tmp_path / "a.mat", {"K": K, "M": M})

@@ -30,7 +30,7 @@ def scene(blade=None, **temperature):
     )
 
 
-def test_units():
+def test_temperatures_and_expansions_are_read_with_their_units():
     assert parse("20 degC", "K") == 293.15
     assert parse("1.2e-5 1/K", "1/K") == 1.2e-5
     assert parse("12 um/m/K", "1/K") == pytest.approx(1.2e-5)
@@ -99,7 +99,7 @@ def test_what_does_not_go_together(tmp_path):
         scene_of({"kind": "punch", "material": {"blade": {"table": ROWS}}})
 
 
-def test_a_file(tmp_path):
+def test_a_file_of_places(tmp_path):
     file = tmp_path / "t.csv"
     file.write_text("\ufeffT [degC], x [mm], y [mm], z [mm], note\n20, 1, 2, 3, a\n\n30,4,5,6,b\n")
     found = read_temperatures(str(file))

@@ -27,7 +27,7 @@ def southwell(speeds, still=300.0, factor=1.7):
     "order, sectors, diameter",
     [(6, 36, 6), (30, 36, 6), (36, 36, 0), (18, 36, 18), (43, 36, 7), (0, 12, 0)],
 )
-def test_folding(order, sectors, diameter):
+def test_engine_orders_fold_to_nodal_diameters(order, sectors, diameter):
     assert fold_order(order, sectors) == diameter
 
 

@@ -90,8 +90,9 @@ def plane():
 
 def test_displacement_and_stress_equal_a_full_order_solve(plane):
     scene, bodies, patches, case, solution, found, flex = plane
-    motion = subject.damped_motion(bodies, patches, [found], case, solution)
-    loads = subject.blade_loads(bodies, patches, case, solution)
+    point = subject.SolvedPoint(case, solution)
+    motion = subject.damped_motion(bodies, patches, [found], point)
+    loads = subject.blade_loads(bodies, patches, point)
     for h, u in enumerate(motion.harmonics, 1):
         exact = full_order(flex, found, loads[h - 1], h * solution.omega, scene.operation.damping)
         assert abs(u - exact).max() < 1e-6 * abs(exact).max()
@@ -102,7 +103,7 @@ def test_displacement_and_stress_equal_a_full_order_solve(plane):
 
 def test_the_probe_moves_as_in_the_balance(plane):
     _, bodies, patches, case, solution, found, _ = plane
-    motion = subject.damped_motion(bodies, patches, [found], case, solution)
+    motion = subject.damped_motion(bodies, patches, [found], subject.SolvedPoint(case, solution))
     assert motion.mismatch < 1e-3
     assert motion.probe[0] == pytest.approx(solution.probe[1, 0], rel=1e-3)
 
@@ -131,8 +132,9 @@ def test_the_damper_moves_as_the_balance_has_it(plane, damper):
         solution = solve(model, solution.omega, 5, 256)
         assert solution.converged
     body = rigid_body(scene, bodies.mesh, reduced, patches, damper)
-    motion = subject.damped_motion(bodies, patches, [found], case, solution)
-    moved = subject.damper_motion(bodies.mesh, patches, case, solution, body)
+    point = subject.SolvedPoint(case, solution)
+    motion = subject.damped_motion(bodies, patches, [found], point)
+    moved = subject.damper_motion(bodies.mesh, patches, point, body)
     assert np.abs(motion.harmonics * moved).max() == 0.0
     there = relative_motion(
         bodies, patches, solution, motion.harmonics + moved, scene.excitation.phase
@@ -198,7 +200,7 @@ def test_a_wheel_moves_at_the_probe_as_in_the_balance(order, fast):
     excited = next(one for one in modes if one.nodal_diameter == 9)
     solution = solve(model, excited.frequencies[0] * 2 * np.pi, 3, 128)
     assert solution.converged and solution.work.friction > 0
-    motion = subject.damped_motion(bodies, patches, modes, case, solution)
+    motion = subject.damped_motion(bodies, patches, modes, subject.SolvedPoint(case, solution))
     assert motion.mismatch < 2e-3
 
 

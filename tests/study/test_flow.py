@@ -24,7 +24,7 @@ from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
 from bladefem.study.pipeline.coriolis import has_coriolis, with_coriolis
-from bladefem.study.pipeline.damped_motion import damped_motion
+from bladefem.study.pipeline.damped_motion import SolvedPoint, damped_motion
 from bladefem.study.pipeline.flow import scene_flow
 from bladefem.study.pipeline.seated_loads import seat_at_loads
 from bladefem.study.pipeline.stage_runner import StageClock, StageRunner
@@ -71,11 +71,12 @@ def test_flow_of_sector_wheel_and_finite_elements_is_one(reduced, finest):
     turn = np.exp(2j * np.pi * 9 / COUNT * np.arange(COUNT))
     scale = abs(one.probe).max()
     np.testing.assert_allclose(found.probe[:, 1, 0], one.probe[1, 0] * turn, atol=1e-7 * scale)
-    motion = damped_motion(bodies, patches, reduced.modes, case, one, settings.points)
+    point = SolvedPoint(case, one, settings.points)
+    motion = damped_motion(bodies, patches, reduced.modes, point)
     assert motion.mismatch < 2e-3
     # the flow is felt, and without it the finite elements would move otherwise
     still = Bodies(vary(scene, aerodynamics__influence=None), reduced.mesh)
-    other = damped_motion(still, patches, reduced.modes, case, one, settings.points)
+    other = damped_motion(still, patches, reduced.modes, point)
     assert other.mismatch > 5 * motion.mismatch
     pattern = frequency_pattern(sector.families, np.zeros((COUNT, 3)))
     _, readings = blade_readings(bodies, reduced.clamped, 3)

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from wheels import bodies as wheel_bodies
 
+from bladefem.contact.condensed_bodies import condense_body
 from bladefem.contact.patch import normal_ports, port_matrix
-from bladefem.contact.seating import condense_body, solve_seating, spin_axis
+from bladefem.contact.seating import solve_seating
 from bladefem.fem import rotating_forms
 from bladefem.fem.constraint import expand_to_mesh, in_step, restrict_load
 from bladefem.fem.flexibility import compliance, flexible
@@ -21,6 +22,7 @@ from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.damper_contact import condense_contact, contact_patches, on_layer
 from bladefem.study.pipeline.history import condense_friction
 from bladefem.study.pipeline.scene_mesh import build_mesh
+from geometry.mesh import spin_axis
 
 PLANE = Path(__file__).parents[2] / "scenes" / "plane.toml"
 HOT = [

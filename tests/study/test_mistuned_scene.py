@@ -58,7 +58,7 @@ from bladefem.study.mistuning.whole_wheel import blade_readings, reduce_wheel, w
 from bladefem.study.pipeline import pipeline
 from bladefem.study.pipeline.bodies import Bodies
 from bladefem.study.pipeline.case_models import family_of_case, load_cases
-from bladefem.study.pipeline.damped_motion import damped_stress, stress_of_motion
+from bladefem.study.pipeline.damped_motion import SolvedPoint, damped_motion, stress_of_motion
 from bladefem.study.pipeline.preflight import refuse_run
 from bladefem.study.pipeline.stage_inputs import stage_key
 from bladefem.study.pipeline.utilisation import (
@@ -179,7 +179,10 @@ def test_worst_blade_of_a_tuned_wheel_is_used_as_the_tuned_one(reduced, shapes, 
     found = solve_wheel(wheel, omega, 1, 72, pattern=pattern, options=TIGHT)
     assert one.converged and one.states["slip"] == len(one.w)
     points = settings.points
-    stress = damped_stress(shapes.bodies, patches, shapes.modes, case, one, points)
+    tuned_motion = damped_motion(
+        shapes.bodies, patches, shapes.modes, SolvedPoint(case, one, points)
+    )
+    stress = stress_of_motion(shapes.bodies, case, tuned_motion)
     diagram = haigh_diagram(Fatigue(endurance=3e8, ultimate=9e8))
     blade = blade_nodes(run.mesh)
     place = run.mesh.points[blade]

@@ -17,7 +17,7 @@ CYLINDER = load_scene(
 )
 
 
-def test_sphere():
+def test_a_sphere_is_pressed_as_hertz_says():
     """h = a/5: pressure 3.3 % (L2), in the middle 0.5 %, radius 0.3 %; blocks of ten radii only:
     -5.5 % approach.
     """

@@ -23,7 +23,7 @@ from bladefem.fem.held_part import held_part, part_above, section_motions, secti
 from bladefem.fem.linear_preload import unit_speed_displacement
 from bladefem.fem.loads import centrifugal
 from bladefem.fem.modes import modes
-from bladefem.fem.ports import port_model
+from bladefem.fem.ports import PortReduction, port_model
 from bladefem.fem.readings import modal_readings
 from bladefem.fem.stress import nodal_stress, signed_von_mises
 from bladefem.hbm.model import Damping
@@ -168,7 +168,8 @@ def reduced(families):
     names = {name: slice(ends[i], ends[i + 1]) for i, name in enumerate(blocks)}
     P = sp.csc_matrix(np.hstack(list(blocks.values())))
     sectors = {
-        n: port_model(constrain(body, "clamp", n), P, names, 40) for n in range(COUNT // 2 + 1)
+        n: port_model(constrain(body, "clamp", n), PortReduction(P, names, 40))
+        for n in range(COUNT // 2 + 1)
     }
     nothing = np.zeros(1)
     found = tuned_wheel(

@@ -274,9 +274,9 @@ def test_error_by_harmonics_where_no_richer_balance_walks(monkeypatch):
     grid = resonance() * np.linspace(0.97, 1.03, 13)
     judged_by = peak_choice._judged_by
 
-    def without_walks(wheel, *args):
-        found = judged_by(wheel, *args)
-        return found if wheel is held else replace(found, change=np.nan)
+    def without_walks(balances, *args):
+        found = judged_by(balances, *args)
+        return found if balances.wheel is held else replace(found, change=np.nan)
 
     searched = SearchedWheel(held, free, pattern, 1, DEFAULT_OPTIONS)
 

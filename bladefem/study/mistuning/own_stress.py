@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from geometry.mesh import Mesh
+from geometry.mesh import Mesh, spin_axis
 
-from ...contact.seating import spin_axis
 from ...scene.tables import Scene
 from ...util.arrays import ComplexArray, RealArray
 from ..pipeline.bodies import Bodies

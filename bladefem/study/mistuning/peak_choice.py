@@ -226,25 +226,20 @@ def _judged(searched: SearchedWheel, found: ChosenPeak, wanted: float | None, mo
     """What richer harmonics and samples change at a peak: with free means where it has these, since
     how far dampers walk depends on the high harmonics, or with held ones where this is not solved.
     """
-    present = found.harmonics, found.samples
-    pattern = searched.pattern
+    pattern, present = searched.pattern, (found.harmonics, found.samples)
     if searched.free is not None and found.free is not None:
-        options = searched.without_fallbacks
-        judged = _judged_by(
+        walking = LocalBalances(
             searched.free,
             pattern,
-            found.solution,
-            present,
-            options,
-            wanted,
-            most,
-            MOST_JUDGING_PRODUCTS,
+            *present,
+            searched.without_fallbacks,
+            most_products=MOST_JUDGING_PRODUCTS,
         )
+        judged = _judged_by(walking, found.solution, wanted, most)
         if np.isfinite(judged.change):
             return replace(judged, free=True)
-    return _judged_by(
-        searched.wheel, pattern, found.held_solution, present, searched.options, wanted, most
-    )
+    held = LocalBalances(searched.wheel, pattern, *present, searched.options)
+    return _judged_by(held, found.held_solution, wanted, most)
 
 
 def with_free_change(truncation: float, change: float) -> float:
@@ -262,33 +257,36 @@ def with_free_change(truncation: float, change: float) -> float:
 
 
 def _judged_by(
-    wheel: Wheel,
-    pattern: Pattern,
+    balances: LocalBalances,
     solution: WheelSolution,
-    present: tuple[int, int],
-    options: Options,
     wanted: float | None,
     most: int,
-    most_products: int | None = None,
 ) -> Judged:
-    """What the last one of `judging_balances` of the present harmonics and samples changes at a
-    peak, or the first one that asks for a search of its own; NaN where one before it is not solved.
+    """What the last one of `judging_balances` changes at a peak, or the first one that asks for a
+    search of its own; NaN where one before it is not solved.
+
+    Args:
+        balances: with the harmonics and samples of the solution.
+        solution: at the peak.
+        wanted, most: as for `chosen_peak`, in harmonics of the common period.
     """
+    present = balances.harmonics, balances.samples
     found = Judged(*present, 0.0, 0)
     point = solution
-    for number, more in enumerate(judging_balances(wheel, *present)):
+    for number, more in enumerate(judging_balances(balances.wheel, *present)):
         products = 0
         if point.converged:
             # where the poorer balance is no start for the richer one nothing else is likely to be
+            options = balances.options
             own = options if number == 0 else replace(options, fallbacks=False)
             point = solve_wheel(
-                wheel,
+                balances.wheel,
                 solution.omega,
                 *more,
-                pattern=pattern,
+                pattern=balances.pattern,
                 start=point,
                 options=own,
-                most_products=most_products,
+                most_products=balances.most_products,
             )
             products = point.products
         change = abs(point.size().max() / solution.size().max() - 1)

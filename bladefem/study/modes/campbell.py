@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from geometry.mesh import sector_of
+from geometry.mesh import counting_sense, sector_of, spin_axis
 
 from ...data import ModeSet
 from ...errors import InputError
@@ -114,7 +114,6 @@ def speed_models(
     """
     if len(speeds) < 2 or min(speeds) < 0 or not np.isfinite(speeds).all():
         raise InputError(f"speeds are {list(speeds)} rad/s, expected at least two, not negative")
-    from ...contact.seating import counting_sense, spin_axis
     from ...fem.constraint import transformation
     from .speed_model import speed_model
 

@@ -15,9 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from geometry.mesh import sector_of
+from geometry.mesh import counting_sense, sector_of
 
-from ...contact.seating import counting_sense
 from ...data import ModeSet
 from .comparison import rigid_motion
 

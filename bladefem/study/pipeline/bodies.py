@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from geometry.mesh import Mesh, chosen_whole, cut_face_nodes
+from geometry.mesh import Mesh, chosen_whole, counting_sense, cut_face_nodes, spin_axis
 
-from ...contact.seating import counting_sense, spin_axis
 from ...errors import InputError, suggestion
 from ...io.stage_cache import on_root
 from ...scene.fields import value_at

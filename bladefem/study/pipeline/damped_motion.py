@@ -34,6 +34,16 @@ MAX_FREQUENCY_RATIO = 0.8
 
 
 @dataclass(frozen=True)
+class SolvedPoint:
+    """A solved point of a response, and what it was solved for."""
+
+    case: LoadCase
+    solution: Solution
+    # friction elements on each patch that the solution was made with; None for all
+    points: int | None = None
+
+
+@dataclass(frozen=True)
 class DampedMotion:
     """Displacements of this blade at one point of a response."""
 
@@ -77,9 +87,7 @@ def damped_motion(
     bodies: Bodies,
     patches: Sequence[Patch],
     modes: Sequence[ModeSet],
-    case: LoadCase,
-    solution: Solution,
-    points: int | None = None,
+    point: SolvedPoint,
     factorised: Callable[[int], Any] | None = None,
 ) -> DampedMotion:
     """The field of displacements that belongs to a solved point.
@@ -87,17 +95,13 @@ def damped_motion(
     Args:
         modes: of the nodal diameters that the harmonics excite; a harmonic whose diameter is not
             among them borrows the nearest one, as in the balance.
-        case: the load of the solution.
-        points: friction elements on each patch that the solution was made with; None for all.
         factorised: nodal diameter to fem.flexibility.Flexibility, kept from load to load; made anew
             when left out.
-
     """
     parts = [
-        motion_in_diameter(bodies, patches, modes, i, case, solution, points, factorised)
-        for i in range(len(modes))
+        motion_in_diameter(bodies, patches, modes, i, point, factorised) for i in range(len(modes))
     ]
-    return sum_of_parts(bodies, patches, solution, parts)
+    return sum_of_parts(bodies, patches, point.solution, parts)
 
 
 @dataclass(frozen=True)
@@ -115,9 +119,7 @@ def motion_in_diameter(
     patches: Sequence[Patch],
     modes: Sequence[ModeSet],
     number: int,
-    case: LoadCase,
-    solution: Solution,
-    points: int | None = None,
+    point: SolvedPoint,
     factorised: Callable[[int], Any] | None = None,
 ) -> MotionPart:
     """What `damped_motion`, which has the other arguments, needs of one nodal diameter.
@@ -130,7 +132,8 @@ def motion_in_diameter(
     scene = bodies.scene
     mesh = bodies.mesh
     ports = blade_ports(mesh, list(patches), scene.excitation)
-    loads = blade_loads(bodies, patches, case, solution, points)
+    solution = point.solution
+    loads = blade_loads(bodies, patches, point)
     waves = [_diameter(bodies, h) for h in range(1, solution.harmonics + 1)]
     flow = scene_flow(scene, sector_of(mesh).count if is_wheel(mesh) else 0)
     found = modes[number]
@@ -178,28 +181,6 @@ def sum_of_parts(
     return DampedMotion(solution.frequency, fields, probe, mismatch)
 
 
-def damped_stress(
-    bodies: Bodies,
-    patches: Sequence[Patch],
-    modes: Sequence[ModeSet],
-    case: LoadCase,
-    solution: Solution,
-    points: int | None = None,
-    factorised: Callable[[int], Any] | None = None,
-    damper: RigidBody | None = None,
-) -> DampedStress:
-    """The largest alternating stress of the motion of `damped_motion`, which has the arguments.
-
-    Args:
-        damper: moves with the contact forces on it, for pictures; left at rest when None.
-    """
-    motion = damped_motion(bodies, patches, modes, case, solution, points, factorised)
-    if damper is None:
-        return stress_of_motion(bodies, case, motion)
-    moved = damper_motion(bodies.mesh, patches, case, solution, damper, points)
-    return stress_of_motion(bodies, case, motion, motion.harmonics + moved)
-
-
 def stress_of_motion(
     bodies: Bodies,
     case: LoadCase,
@@ -230,24 +211,22 @@ def stress_of_motion(
 def damper_motion(
     mesh: Mesh,
     patches: Sequence[Patch],
-    case: LoadCase,
-    solution: Solution,
+    point: SolvedPoint,
     damper: RigidBody,
-    points: int | None = None,
 ) -> ComplexArray:
     """(H, n_points, dim) complex displacements of the damper's nodes in harmonics 1..H [m]: its
     inertia in balance with the contact forces on it, without its deformation.
 
     Args:
         damper: on the ports of all contact nodes, see `assemble_model.rigid_body`.
-        points: as for `damped_motion`.
     """
+    case, solution = point.case, point.solution
     inside = np.unique(mesh.bodies["damper"])
     origin = mesh.points[inside].mean(axis=0)
     # which rigid motions of the mesh the generalised displacements are
     share = np.linalg.lstsq(rigid_ports(patches, mesh, origin), damper.B, rcond=None)[0]
     unit = rigid_motions(mesh, origin)[inside] @ share
-    forces = node_forces(case, patches, solution.f, points)
+    forces = node_forces(case, patches, solution.f, point.points)
     moved = np.zeros((solution.harmonics, len(mesh.points), mesh.dimension), complex)
     for h in range(1, solution.harmonics + 1):
         on_damper = damper.B.T @ (case.selection @ forces[h].ravel())
@@ -282,9 +261,7 @@ def touched_nodes(bodies: Bodies) -> np.ndarray:
 def blade_loads(
     bodies: Bodies,
     patches: Sequence[Patch],
-    case: LoadCase,
-    solution: Solution,
-    points: int | None = None,
+    point: SolvedPoint,
 ) -> np.ndarray:
     """(H, n_points*dim) complex loads on one blade in harmonics 1..H [N]: excitation and contacts.
 
@@ -292,10 +269,11 @@ def blade_loads(
     blade, an interblade phase earlier.
     """
     scene = bodies.scene
+    case, solution = point.case, point.solution
     ports = blade_ports(bodies.mesh, list(patches), scene.excitation)
     contact = ports.matrix[:, ports.names["contact"]]
     excitation = ports.matrix[:, ports.names["load"]].toarray()[:, 0] * scene.excitation.force
-    forces = node_forces(case, patches, solution.f, points)
+    forces = node_forces(case, patches, solution.f, point.points)
     rows = len(forces[0]) if len(forces) else 0
     dim = bodies.mesh.dimension
     following = np.zeros(contact.shape[1], bool)

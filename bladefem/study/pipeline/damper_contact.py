@@ -51,7 +51,7 @@ def on_layer(scene: Scene, problem: ContactProblem) -> ContactProblem:
 
 def condense_contact(bodies: Bodies, patches: list[Patch]) -> ContactProblem:
     """The contact problem of rigid faces: all that takes finite elements."""
-    from ...contact.frictional_seating import hold_axially
+    from ...contact.condensed_bodies import hold_axially
     from ...contact.seating import contact_problem
 
     gap = seat_clearance(bodies, patches) + thermal_gap(bodies, patches)

@@ -10,12 +10,12 @@ import numpy as np
 from geometry.mesh import Mesh
 
 from ...contact.admissible_load import holds_itself, normal_load_bounds
+from ...contact.condensed_bodies import hold_axially
 from ...contact.frictional_seating import (
     FORCE_CHANGE_TOLERANCE,
     FrictionalProblem,
     FrictionalSeating,
     frictional_problem,
-    hold_axially,
     seat_with_friction,
 )
 from ...contact.interface_elements import interface_law, layer_friction, pair_ratio

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from ...util.communicator import Communicator
 from .bodies import Bodies, is_wheel, on_one_rank, rotation_of
 from .normal_modes import KEPT_MODES, cost_of_diameter, eigensolver
 from .ports import Ports, blade_ports, damper_ports
+
+if TYPE_CHECKING:
+    from ...fem.ports import PortReduction
 
 # of the elastic damper, its six rigid ones included
 DAMPER_MODES = 16
@@ -99,25 +102,14 @@ def reduce_sector(
     mesh = bodies.mesh
     ports = blade_ports(mesh, patches, scene.excitation, readings)
     other = damper_ports(mesh, patches)
-    solver = eigensolver(scene)
     span = None
     if is_wheel(mesh):
         sector, span = _reduced_diameters(bodies, ports, modes, diameters, spanned)
     else:
-        kind = scene.model.reduction
 
         def blade_model(some: Bodies) -> PortModel:
             flex = some.factorised(0)
-            return port_model(
-                flex.con,
-                ports.matrix,
-                ports.names,
-                modes,
-                kind=kind,
-                flex=flex,
-                solver=solver,
-                spin=rotation_of(some),
-            )
+            return port_model(flex.con, _blade_reduction(some, ports, modes), flex)
 
         sector = {0: on_one_rank(bodies, blade_model)}
 
@@ -135,23 +127,31 @@ def reduce_sector(
     )
 
 
+def _blade_reduction(bodies: Bodies, ports: Ports, modes: int) -> PortReduction:
+    """The blade side's reduction to its ports, as the scene has it."""
+    from ...fem.ports import PortReduction
+
+    return PortReduction(
+        ports.matrix,
+        ports.names,
+        modes,
+        kind=bodies.scene.model.reduction,
+        solver=eigensolver(bodies.scene),
+        spin=rotation_of(bodies),
+    )
+
+
 def _reduced_damper(bodies: Bodies, ports: Ports) -> tuple[PortModel, float]:
     """The floating damper at its ports, and its mass [kg]."""
     from ...fem.loads import body_mass
-    from ...fem.ports import port_model
+    from ...fem.ports import PortReduction, port_model
 
     flex = bodies.damper
     solver = eigensolver(bodies.scene)
-    model = port_model(
-        flex.con,
-        ports.matrix,
-        ports.names,
-        DAMPER_MODES,
-        flex=flex,
-        solver=solver,
-        spin=rotation_of(bodies),
+    wanted = PortReduction(
+        ports.matrix, ports.names, DAMPER_MODES, solver=solver, spin=rotation_of(bodies)
     )
-    return model, body_mass(flex.con.body)
+    return port_model(flex.con, wanted, flex), body_mass(flex.con.body)
 
 
 def _reduced_diameters(
@@ -170,11 +170,9 @@ def _reduced_diameters(
     from ...fem.groups import shared_out
     from ...fem.ports import port_models
 
-    scene = bodies.scene
-    solver = eigensolver(scene)
     comm = bodies.comm or MPI.COMM_WORLD
 
-    spanned = spanned and scene.model.reduction == "rubin"
+    spanned = spanned and bodies.scene.model.reduction == "rubin"
     blocks: dict[int, np.ndarray] = {}
 
     def keep_vectors(pairs: Eigenpairs) -> None:
@@ -187,14 +185,9 @@ def _reduced_diameters(
     def solved(some_bodies: Bodies, some: Sequence[int]) -> dict[int, PortModel]:
         steps = port_models(
             some_bodies.frame,
-            ports.matrix,
-            ports.names,
-            modes,
+            _blade_reduction(some_bodies, ports, modes),
             some,
-            kind=scene.model.reduction,
-            solver=solver,
             kept=some_bodies.kept.pop(KEPT_MODES, None),
-            spin=rotation_of(some_bodies),
             seen=keep_vectors if spanned else None,
             interior=interior,
         )

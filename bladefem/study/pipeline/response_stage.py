@@ -38,6 +38,7 @@ from .curve import Curve, load_of
 from .damped_motion import (
     DampedStress,
     MotionPart,
+    SolvedPoint,
     damper_motion,
     motion_in_diameter,
     stress_of_motion,
@@ -166,19 +167,17 @@ def _stresses(
     numbers = sorted(wanted)
     factorised = lru_cache(maxsize=None)(lambda n: bodies.alone.factorised(n))
 
+    peaks = {k: SolvedPoint(cases[k], curves[k].peak, curves[k].settings.points) for k in numbers}
+
     def part(of: tuple[int, int]) -> MotionPart:
         k, i = of
-        peak, points = curves[k].peak, curves[k].settings.points
-        return motion_in_diameter(
-            bodies.alone, patches, before.modes, i, cases[k], peak, points, factorised
-        )
+        return motion_in_diameter(bodies.alone, patches, before.modes, i, peaks[k], factorised)
 
     def stress(k: int, parts: Sequence[MotionPart]) -> DampedStress:
-        settings, peak = curves[k].settings, curves[k].peak
         reduced = with_damper_mass(before.reduced, cases[k].mass)
-        body = rigid_body(before.scene, before.mesh, reduced, patches, settings.damper)
-        motion = sum_of_parts(bodies.alone, patches, peak, parts)
-        moved = damper_motion(before.mesh, patches, cases[k], peak, body, settings.points)
+        body = rigid_body(before.scene, before.mesh, reduced, patches, curves[k].settings.damper)
+        motion = sum_of_parts(bodies.alone, patches, curves[k].peak, parts)
+        moved = damper_motion(before.mesh, patches, peaks[k], body)
         return stress_of_motion(bodies.alone, cases[k], motion, motion.harmonics + moved)
 
     def stresses(comm: Communicator | None) -> list[DampedStress]:
