@@ -239,13 +239,13 @@ def rest(case: Case) -> np.ndarray:
     return np.zeros(2 * d + 2 * n)
 
 
-def march(case: Case, omega: float, state: np.ndarray, periods: int) -> March:
-    """Some periods from a state at phase zero."""
+def march(case: Case, omega: float, state: np.ndarray, periods: int, least: int = STEPS) -> March:
+    """Some periods from a state at phase zero, of so many steps at least."""
     d = len(case.stiffness)
     springs = case.table[:, [1, 0, 0]].ravel()
     P = case.contact.reshape(-1, d)
     fast = linalg.eigvalsh(np.diag(case.stiffness) + P.T @ (springs[:, None] * P))[-1]
-    steps = max(STEPS, int(np.ceil(FASTEST * np.sqrt(fast) / omega)))
+    steps = max(least, int(np.ceil(FASTEST * np.sqrt(fast) / omega)))
     steps = 64 * -(-steps // 64)
     orders = np.array(sorted(case.force), dtype=np.int64)
     force = np.array([case.force[h] for h in orders])
@@ -282,6 +282,11 @@ def _leapfrog(y, omega, periods, steps, L, D, contact, table, orders, force, pro
     z = y[2 * d :].reshape(n, 2)
     cos = np.empty((orders.size, steps))
     sin = np.empty((orders.size, steps))
+    # readings of the step before: an open contact lands between two steps, and begins to stick
+    # where it was then. Begun at the last step before, the map of a period is a staircase of the
+    # states, on which small disturbances of an unstable motion decay.
+    before = np.zeros((n, 3))
+    known = False
     diagonal = True
     for i in range(d):
         for j in range(d):
@@ -315,6 +320,14 @@ def _leapfrog(y, omega, periods, steps, L, D, contact, table, orders, force, pro
                     u += contact[c, 1, i] * q[i]
                     w += contact[c, 2, i] * q[i]
                 N = max(n0 + kn * x, 0.0)
+                gap = -(n0 + kn * before[c, 0])
+                if known and N > 0.0 and gap > 0.0:
+                    share = gap / (gap + N)
+                    z[c, 0] = before[c, 1] + share * (u - before[c, 1])
+                    z[c, 1] = before[c, 2] + share * (w - before[c, 2])
+                before[c, 0] = x
+                before[c, 1] = u
+                before[c, 2] = w
                 fu = kt * (u - z[c, 0])
                 fw = kt * (w - z[c, 1])
                 size = np.sqrt(fu * fu + fw * fw)
@@ -327,6 +340,7 @@ def _leapfrog(y, omega, periods, steps, L, D, contact, table, orders, force, pro
                 push = N - max(n0, 0.0) if kn > 0 else 0.0
                 for i in range(d):
                     a[i] -= contact[c, 0, i] * push + contact[c, 1, i] * fu + contact[c, 2, i] * fw
+            known = True
             seen = 0.0
             for i in range(d):
                 v[i] += dt * a[i]

@@ -24,6 +24,11 @@ maximum for one of the richer models. Seed 192, which was wrong once, is in a te
 to 199 were not measured again. At 0.1 % it was measured last for seeds 0 to 32, by an earlier
 version: 0.82 in all, none wrong, 8 above 1.1.
 
+Seeds that nothing was tuned on, even from 400 to 520 and odd from 401 to 481, all solved. At 2 %
+none of 100 wrong, one told too low (449, repaired), unknown 411, 421 and 473. At 0.1 %, the first
+20 of both: seed 413 was 82 % wrong before paths began at lost ends of the band, 0.03 % now with
+0.44 % told; 411 unknown.
+
 To follow curves with lift-off only where the tangents of a sweep leave folds open saved 13 of these
 models half of their time, took as long in all, and on the odd seeds from 201 to 699 missed a peak
 5 % higher (seed 227).
@@ -82,6 +87,8 @@ TRUE_HARMONICS = 31
 TRUE_SAMPLES = 4096
 # relative difference of its peak up to which it is the same
 SAME_PEAK = 0.05
+# and of that which begins at the peak of the choice
+SAME_RESONANCE = 0.25
 # accuracy over the tolerance to which the choice closes in its peak, which no estimate contains
 SEARCHED = 80
 # CPU time over the rich model's that is too much
@@ -129,18 +136,27 @@ def warm_up(accuracy: float) -> None:
         chosen_curve(case.model, case.band, accuracy)
 
 
-def true_height(model: bf.ReducedModel, top: bf.Solution) -> float:
+def true_height(model: bf.ReducedModel, top: bf.Solution, chosen: bf.Solution) -> float:
     """Height of the peak that the rich model's sweep has found, with TRUE_HARMONICS [m].
 
     The choice takes more harmonics than the rich model where it has to, and that sweep closes its
-    peak in to 1e-3 only: both are more than many an estimate.
+    peak in to 1e-3 only: both are more than many an estimate. Where the search from that peak ends
+    at another one it begins at the peak of the choice where that has more: on seed 413, 15
+    harmonics are 8.3 % off what 31 have, 8.6 % off what a march keeps.
     """
-    try:
-        found = find_peak(model, top.omega, TRUE_HARMONICS, TRUE_SAMPLES, near=top, tolerance=1e-7)
-    except NotSolvedError:
-        return bf.size(top)
-    near = abs(found.height / bf.size(top) - 1) < SAME_PEAK
-    return found.height if near else bf.size(top)
+    starts = [(top, SAME_PEAK)]
+    if chosen.harmonics > top.harmonics:
+        starts.append((chosen, SAME_RESONANCE))
+    for start, same in starts:
+        try:
+            found = find_peak(
+                model, start.omega, TRUE_HARMONICS, TRUE_SAMPLES, near=start, tolerance=1e-7
+            ).height
+        except NotSolvedError:
+            continue
+        if abs(found / bf.size(top) - 1) < same:
+            return found
+    return bf.size(top)
 
 
 def main(first: int, last: int, accuracy: float) -> None:
@@ -173,7 +189,7 @@ def main(first: int, last: int, accuracy: float) -> None:
         ratios.append(cheap / expensive)
         if expensive > LONG_POINT * len(rich):
             long_ratios.append(cheap / expensive)
-        truth = true_height(case.model, peak_of(rich))
+        truth = true_height(case.model, peak_of(rich), peak_of(found.points))
         error = abs(bf.size(peak_of(found.points)) / truth - 1)
         reported = found.settings.error
         if reported is None or not np.isfinite(reported):

@@ -17,6 +17,7 @@ from bladefem.hbm.optimum import higher_from_neighbours, lowest_peak, optimum
 from bladefem.hbm.parameters import vary
 from bladefem.hbm.peak import find_peak, track_peak, with_slope
 from bladefem.hbm.peak_levels import PeakSearch, Variation, look_over_band
+from bladefem.hbm.peak_ripples import above_ripples
 from bladefem.hbm.reference_blade import reference_model
 from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
@@ -330,6 +331,19 @@ def test_the_way_over_ripples_ends_at_another_peak():
     found = find_peak(model, 379.3, 7, 256, tolerance=1e-4)
     assert found.omega == pytest.approx(379.93, rel=2e-4)
     assert found.height == pytest.approx(1.0473e-4, rel=1e-3)
+
+
+@pytest.mark.parametrize("omega", [0.1, 4.0])
+def test_a_low_flank_is_no_rippled_top(omega):
+    """Far from the resonance at 1 the mode alone would fall by 1 % only at a distance of fourteen
+    times the frequency, on one side below zero, or of 6 % of it, where its flank is.
+    """
+    model = single_mass(force=0.9)
+    flank = solve(model, omega, 3, 64)
+    assert flank.converged
+    found = above_ripples(model, flank, 1e-4, DEFAULT_OPTIONS)
+    assert found.solution is flank
+    assert found.points == 0
 
 
 def look(omega, height, slope):

@@ -183,8 +183,9 @@ def test_what_is_too_large_with_all_points_is_judged_with_twice_as_many(monkeypa
     assert found == (settings, replace(settings, points=16), 2.0)
 
 
-def test_more_harmonics_start_from_the_peak_that_judged_them():
+def test_more_harmonics_start_from_the_peak_that_judged_them(monkeypatch):
     """It is nearer than the peak that was judged; other respects start from that one."""
+    nothing_left_out(monkeypatch)
     family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
     settings = replace(first_for(family.modes), harmonics=3, samples=128)
     peak = peak_with(16)
@@ -328,14 +329,39 @@ def test_a_poor_model_has_the_errors_that_a_richer_one_still_shows(monkeypatch):
     assert settings.error == errors.total == pytest.approx(0.55 / 1.55)
 
 
+def nothing_left_out(monkeypatch):
+    """Harmonics that a point leaves out move nothing."""
+    monkeypatch.setattr(peak_errors, "truncation_indicator", lambda *_: np.zeros(1))
+
+
 @pytest.mark.parametrize(("harmonics", "more"), [(3, 7), (7, 15), (15, 23)])
-def test_many_harmonics_are_judged_by_half_as_many_again_where_contacts_lift(harmonics, more):
+def test_many_harmonics_are_judged_by_half_as_many_again_where_contacts_lift(
+    monkeypatch, harmonics, more
+):
     """Twice as many cost a minute a peak there."""
+    nothing_left_out(monkeypatch)
     family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=63))
     settings = replace(first_for(family.modes), harmonics=harmonics, samples=128)
     point = SimpleNamespace(states={"lift": 4}, w=np.zeros((16, 3, 1)))
     judge = peak_errors.judge_settings(family, settings, "harmonics", point)
     assert judge.harmonics == more and judge.samples >= 8 * more
+
+
+@pytest.mark.parametrize(
+    ("largest", "beyond", "more"), [(1e9, 2e-2, 15), (1e9, 5e-3, 7), (9, 2e-2, 7)]
+)
+def test_a_judge_that_is_blind_to_most_leaves_its_place(monkeypatch, largest, beyond, more):
+    """Of three harmonics, which seven add a motion of 0.01 to: fifteen judge them where they add
+    more than that, and are no large balance.
+    """
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=63))
+    settings = replace(first_for(family.modes), harmonics=3, samples=128)
+    point = SimpleNamespace(states={"lift": 4}, w=np.zeros((16, 3, 1)), converged=True)
+    moved = {7: 1e-2, 15: np.hypot(1e-2, beyond)}
+    monkeypatch.setattr(peak_errors, "truncation_indicator", lambda *given: [moved[given[2]]])
+    monkeypatch.setattr(peak_errors, "SEEING_JUDGE", largest)
+    judge = peak_errors.judge_settings(family, settings, "harmonics", point)
+    assert judge.harmonics == more
 
 
 @pytest.mark.parametrize(("most", "height"), [(31, 0.1), (7, 0.01)])

@@ -1,0 +1,66 @@
+"""A line on the error stream where numba compiles for longer than two seconds.
+
+Kernels are compiled when they are first called after a change of their sources, all of them in some
+minutes of processor time: a script would say nothing meanwhile.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from time import monotonic
+
+from numba.core import event
+
+from .script_help import RANK_VARIABLES
+
+# numba's name of the compilation of one function for one set of types
+COMPILATION = "numba:compile"
+# of all compilations so far, before it is said [s]
+SILENT_SECONDS = 2.0
+NOTICE = (
+    "bladefem: compiling kernels for this machine, which takes some minutes in all; they are kept "
+    "for later runs"
+)
+
+
+class CompileNotice(event.Listener):
+    """Says once that kernels are compiled, when that has taken more than SILENT_SECONDS."""
+
+    def __init__(self, say: Callable[[str], None], clock: Callable[[], float] = monotonic) -> None:
+        self._say = say
+        self._clock = clock
+        # compilations that have begun and not ended: one asks for those of what it calls
+        self._open = 0
+        self._begun = 0.0
+        self._spent = 0.0
+        self._said = False
+
+    def on_start(self, event: event.Event) -> None:
+        if self._open == 0:
+            self._begun = self._clock()
+        self._open += 1
+        self._look(self._clock())
+
+    def on_end(self, event: event.Event) -> None:
+        now = self._clock()
+        self._look(now)
+        self._open = max(self._open - 1, 0)
+        if self._open == 0:
+            self._spent += now - self._begun
+
+    def _look(self, now: float) -> None:
+        if not self._said and self._spent + now - self._begun > SILENT_SECONDS:
+            self._said = True
+            self._say(NOTICE)
+
+
+def announce_compilation() -> None:
+    """Register the notice of this process, on the first of several ranks."""
+    if all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES):
+        event.register(COMPILATION, CompileNotice(_on_error_stream))
+
+
+def _on_error_stream(text: str) -> None:
+    print(text, file=sys.stderr, flush=True)
