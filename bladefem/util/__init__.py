@@ -1,1 +1,2 @@
-"""Progress bars, names that load on first use, ``script_help`` of the demos."""
+"""Progress bars, names that load on first use, ``script_help`` of the demos, ``compile_notice`` of
+kernels."""

@@ -13,7 +13,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from .compile_notice import announce_compilation
+
 # kernels that Python calls
 KERNEL: dict[str, Any] = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 # kernels that only other kernels call
 INNER_KERNEL: dict[str, Any] = {**KERNEL, "no_cpython_wrapper": True}
+
+# every module with kernels comes here before it is compiled
+announce_compilation()
