@@ -133,6 +133,26 @@ def test_far_from_right_with_lift_off_the_less_wrong_model_is_kept(monkeypatch):
     assert errors.total < 0.01 and peak.height == pytest.approx(1.6 - 0.1 / 7)
 
 
+@pytest.mark.parametrize(("lift", "refined"), [(4, True), (8, False)])
+def test_the_change_from_one_harmonic_to_three_says_little_of_the_next(lift, refined, monkeypatch):
+    """Three harmonics show a larger error than one did: more are taken even so, unless most
+    contacts lift off with these.
+    """
+    family = family_of(reference_model(points=8, load=1.4, phase=0.7, modes=10, harmonics=31))
+    heights = {1: 1.0, 2: 1.0, 3: 1.1}
+
+    def found(family, old, point, new, accuracy, fallbacks=True):
+        few = new.harmonics in heights
+        return peak_with(4 if few else lift, heights.get(new.harmonics, 0.85))
+
+    search_by(monkeypatch, found)
+    settings, _, errors = resonance_choice.choose_at_peak(
+        family, first_for(family.modes), peak_with(4, 1.0), 0.05, ("points",)
+    )
+    assert (settings.harmonics > 3) == refined
+    assert errors.total == (0 if refined else pytest.approx(1.1 / 0.85 - 1))
+
+
 def test_an_error_that_another_respect_brings_out_is_refined_as_well(monkeypatch):
     """All points leave nothing of their own error, and show that of the rigid damper, which is as
     large: that one is refined next, although both together have not halved.

@@ -324,8 +324,12 @@ def _ends_refining(
     before: Choice,
     fixed: tuple[str, ...],
 ) -> bool:
-    """Far beyond the accuracy richer models do not help, and there are enough contact points."""
-    return _stalled(settings, errors, before) and not _few_points(settings, errors, fixed)
+    """Far beyond the accuracy richer models do not help, and there are enough contact points and
+    harmonics.
+    """
+    if _few_points(settings, errors, fixed) or _few_harmonics(settings, errors, before, fixed):
+        return False
+    return _stalled(settings, errors, before)
 
 
 def _stalled(settings: Settings, errors: PeakErrors, before: Choice) -> bool:
@@ -345,6 +349,22 @@ def _few_points(settings: Settings, errors: PeakErrors, fixed: tuple[str, ...]) 
         return False
     free = "points" in settings.chosen and "points" not in fixed
     return free and 2 * more.solution.states["lift"] <= len(more.solution.w)
+
+
+def _few_harmonics(
+    settings: Settings, errors: PeakErrors, before: Choice, fixed: tuple[str, ...]
+) -> bool:
+    """There are fewer than LIFTING_HARMONICS, and more were found where most contacts keep closed,
+    with the peak before as well: the change from one harmonic to three says little of the next.
+
+    The shipped wedge under 55 N ended with three harmonics, 143 um and an error of 27 %; it has
+    160 um with an error of 2.5 %, between those of neighbouring loads.
+    """
+    more = errors.better.get("harmonics")
+    if settings.harmonics >= LIFTING_HARMONICS or more is None:
+        return False
+    free = "harmonics" in settings.chosen and "harmonics" not in fixed
+    return free and not any(mostly_lifts_off(p.solution) for p in (before.peak, more))
 
 
 def _lift_off(peak: Peak, errors: PeakErrors) -> bool:
