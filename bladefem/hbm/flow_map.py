@@ -81,10 +81,11 @@ def flow_map(
     return mapped
 
 
-def acting_share(nodes: NodeSteps) -> float:
-    """Share of a period for which nodes have a force, on average; 0 where there are no nodes."""
-    acts = _acting_nodes(nodes)
-    return float(acts.mean()) if acts.size else 0.0
+def acting_forces(contacts: OpenContacts, nodes: NodeSteps) -> np.ndarray:
+    """(S,) number of forces that there are after each step: open nodes have none."""
+    n, d = nodes.before.shape[1:3]
+    each = np.count_nonzero(contacts.force.reshape(n, d) >= 0, axis=1)
+    return _acting_nodes(nodes) @ each
 
 
 def _acting_nodes(nodes: NodeSteps) -> np.ndarray:
@@ -180,30 +181,40 @@ def _carry(bodies, nodes, acts, steps):
     acting = _forces_of(bodies.force, d, acts[0])
     begun = acting
     rows = _rows_of(d, acts[0], acts[1 % S])
+    carried = _columns(bodies.carried, acting)
+    reading = _rows(bodies.reading, rows)
     X, F = _unit_disturbances(bodies, nodes.share[0], node_of, acting)
     next_X = np.empty_like(X)
     Q = np.empty((bodies.reading.shape[1], X.shape[1]), X.dtype)
     flexible = _flexibility(bodies, nodes.share[0], node_of, rows, acting)
     inverse = np.empty((0, 0), X.dtype)
     _displacements(bodies.starts, X, Q)
-    W = _moved(bodies.reading, rows, Q)
+    W = _product(reading, Q)
     _take_product(flexible, F, W)
     for k in range(1, steps + 1):
         j = k % S
         last = k - 1
         _free_step(bodies, X, next_X)
         X, next_X = next_X, X
-        _add_carried(bodies.carried, acting, F, X)
+        _add_matrix(_product(carried, F), X)
         shares = nodes.share[last], nodes.share[j]
         _changed_forces(bodies, shares, node_of, acting, F, X)
         _displacements(bodies.starts, X, Q)
         before = acting, rows, F, W
-        acting = _forces_of(bodies.force, d, acts[j])
-        rows = _rows_of(d, acts[j], acts[(j + 1) % S])
-        free = _moved(bodies.reading, rows, Q)
+        # copies of what acts are kept while that stays
+        changed = _differ(nodes, j, last) or k == 1
+        if not np.array_equal(acts[j], acts[last]):
+            acting = _forces_of(bodies.force, d, acts[j])
+            carried = _columns(bodies.carried, acting)
+        following = _rows_of(d, acts[j], acts[(j + 1) % S])
+        if not np.array_equal(following, rows):
+            rows = following
+            reading = _rows(bodies.reading, rows)
+            changed = True
+        free = _product(reading, Q)
         rhs = _known_forces(bodies.force, nodes, j, before, acting, rows, free)
-        flexible = _flexibility(bodies, nodes.share[j], node_of, rows, acting)
-        if k == 1 or _differ(nodes, j, last):
+        if changed:
+            flexible = _flexibility(bodies, nodes.share[j], node_of, rows, acting)
             B = nodes.after_motion[j]
             inverse = _inverse_of_contact(B, bodies.force, rows, acting, flexible)
         F = _product(inverse, rhs)
@@ -409,22 +420,22 @@ def _inverse_of_contact(B, force, rows, acting, flexible):
 
 
 @njit(**INNER_KERNEL)
-def _moved(reading, rows, Q):
-    """(l, k) displacements of rows by modal ones Q (M, k)."""
-    chosen = np.empty((len(rows), reading.shape[1]), reading.dtype)
-    for i in range(len(rows)):
-        chosen[i] = reading[rows[i]]
-    return _product(chosen, Q)
+def _rows(matrix, numbers):
+    """(k, m) some rows of a matrix."""
+    chosen = np.empty((len(numbers), matrix.shape[1]), matrix.dtype)
+    for i in range(len(numbers)):
+        chosen[i] = matrix[numbers[i]]
+    return chosen
 
 
 @njit(**INNER_KERNEL)
-def _add_carried(carried, acting, F, X):
-    """Add to the states X (2M, k) what the acting forces do from one instant to the next."""
-    chosen = np.empty((carried.shape[0], len(acting)), carried.dtype)
-    for c in range(len(acting)):
-        for i in range(carried.shape[0]):
-            chosen[i, c] = carried[i, acting[c]]
-    _add_matrix(_product(chosen, F), X)
+def _columns(matrix, numbers):
+    """(n, k) some columns of a matrix."""
+    chosen = np.empty((matrix.shape[0], len(numbers)), matrix.dtype)
+    for c in range(len(numbers)):
+        for i in range(matrix.shape[0]):
+            chosen[i, c] = matrix[i, numbers[c]]
+    return chosen
 
 
 @njit(**INNER_KERNEL)

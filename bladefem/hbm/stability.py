@@ -17,6 +17,7 @@ complex pair.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,8 +25,9 @@ from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import synthesis
-from .closed_contacts import OpenContacts, open_contacts
-from .flow_map import NodeSteps, acting_share, flow_map
+from ..util.arrays import RealArray
+from .closed_contacts import OpenContacts, coupled_groups, open_contacts
+from .flow_map import NodeSteps, acting_forces, flow_map
 from .linearised_flow import contact_steps
 from .model import ReducedModel
 from .sector_modes import SectorModes, sector_modes
@@ -52,8 +54,8 @@ NEUTRAL_DISTANCE = 1e-4
 AFFORDABLE_OPERATIONS = 1e9
 # and above which none is made, some 1.5 s
 MAX_OPERATIONS = 4e10
-# of a period, for which nodes that lift off act: 0.45 to 0.62 on the shipped wedge
-LIFTING_SHARE = 0.6
+# operations of the eigenvalues of a matrix over the cube of its size
+MULTIPLIER_OPERATIONS = 10.0
 # angle of a multiplier to the real axis up to which it is real
 REAL_MULTIPLIER_ANGLE = 1e-3
 
@@ -168,7 +170,7 @@ def _leading(
     S = system.blades * -(-S // system.blades)
     if _operations_from_states(model, solution, system, S) > most:
         return None
-    contacts, nodes = linearised_contacts(model, solution, system, S)
+    contacts, nodes = from_fewest_forces(*linearised_contacts(model, solution, system, S))
     if map_operations(contacts, nodes, system.blades) > most:
         return None
     dt = 2 * np.pi / solution.omega / S
@@ -214,10 +216,10 @@ def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:
 def map_operations(contacts: OpenContacts, nodes: NodeSteps, blades: int) -> float:
     """Operations of carrying all disturbances through 1/r of a period, and of the multipliers."""
     rows, M = contacts.reading.shape
-    coupled = sum((2.0 * len(group)) ** 2 for group in contacts.groups)
-    acting = acting_share(nodes)
-    forces = acting * contacts.push.shape[1]
-    return _products(M, acting * rows, forces, coupled, len(nodes.share) / blades)
+    coupled = _coupled_operations(contacts.groups)
+    forces = acting_forces(contacts, nodes).astype(float)
+    read = forces * rows / max(contacts.push.shape[1], 1)
+    return _operations(M, coupled, forces, read, blades)
 
 
 def _operations_from_states(
@@ -226,23 +228,49 @@ def _operations_from_states(
     system: SectorModes,
     S: int,
 ) -> float:
-    """Operations of a verdict from how many nodes stick, slip and lift off."""
-    states = solution.states
+    """Operations of a verdict with S instants, from which nodes are closed when and how many of
+    them slip: about those of the map.
+    """
     d = model.directions
-    lifting = states["lift"] + states["open"]
-    closed_normal = d - model.elements.tangents
-    rows = d * (states["slip"] + LIFTING_SHARE * lifting)
-    forces = rows - closed_normal * states["slip"]
     M = len(system.stiffness)
     r = system.blades
-    return _products(M, r * rows, r * forces, 4.0 * M**2 / max(r / 2, 1.0), S / r)
+    S = r * -(-S // r)
+    closed = _normal_loads(model, solution, S) > 0
+    # nodes that lift off act while they are closed, others always
+    lifting = np.count_nonzero(closed[~closed.all(axis=1)], axis=0)
+    ring = sum((np.roll(lifting, -b * S // r) for b in range(r)), np.zeros(S))
+    slip = r * solution.states["slip"]
+    tangents = model.elements.tangents
+    forces, rows = d * ring + tangents * slip, d * (ring + slip)
+    # modes that only damping couples, or the springs of closed contacts as well
+    coupled = model.once("coupled modes", lambda: _coupled_operations(_groups_of(system)))
+    if slip or solution.states["stick"]:
+        coupled = 4.0 * M**2 / max(r / 2, 1.0)
+    return _operations(M, coupled, forces, rows, r)
 
 
-def _products(M: int, rows: float, forces: float, coupled: float, steps: float) -> float:
-    """Operations of the products of matrices."""
-    size = 2.0 * M + forces
-    step = coupled + rows * M + 2.0 * M * forces + forces**2 + rows * forces
-    return steps * (2 * size * step + 2.0 * forces**3) + 10.0 * size**3
+def _groups_of(system: SectorModes) -> tuple[np.ndarray, ...]:
+    """Numbers of the modes of each group that is coupled without contacts."""
+    return coupled_groups(system.stiffness_matrix, system.damping)
+
+
+def _coupled_operations(groups: Sequence[np.ndarray]) -> float:
+    """Operations of a step of the bodies for each disturbance, over two."""
+    return sum((2.0 * len(group)) ** 2 for group in groups)
+
+
+def _operations(M: int, coupled: float, forces: RealArray, rows: RealArray, blades: int) -> float:
+    """Operations of carrying all disturbances through 1/r of a period from the instant with the
+    fewest forces on, and of the eigenvalues.
+
+    Args:
+        coupled: operations of a step of the bodies for each disturbance, over two.
+        forces, rows: (S,) forces and displacements of the nodes that act after each step.
+    """
+    size = 2.0 * M + forces.min()
+    products = coupled + rows * M + 2.0 * M * forces + forces**2 + rows * forces
+    steps = 2 * size * products + 2.0 * forces**3
+    return float(steps.sum() / blades + MULTIPLIER_OPERATIONS * size**3)
 
 
 def linearised_contacts(
@@ -268,6 +296,14 @@ def linearised_contacts(
     return contacts, NodeSteps(*(ring[:, moving] for ring in rings))
 
 
+def from_fewest_forces(contacts: OpenContacts, nodes: NodeSteps) -> tuple[OpenContacts, NodeSteps]:
+    """The same with the instant first at which most nodes are open: multipliers do not depend on
+    where a period begins, and there are fewer disturbances to carry.
+    """
+    first = int(acting_forces(contacts, nodes).argmin())
+    return contacts, NodeSteps(*(np.roll(part, -first, axis=0) for part in nodes))
+
+
 def _prescribed_normal(model: ReducedModel, S: int) -> tuple[np.ndarray, np.ndarray]:
     """The part (n, S) [N] of the normal loads that the motion does not make, at S instants, and its
     change in one step at their rate there.
@@ -275,6 +311,17 @@ def _prescribed_normal(model: ReducedModel, S: int) -> tuple[np.ndarray, np.ndar
     load = model.normal_load(max((0, *model.normal)))[:, None]
     base = synthesis(load.shape[2] // 2, S).T
     return load[:, 0] @ base, _rates(load)[:, 0] @ base * (2 * np.pi / S)
+
+
+def _normal_loads(model: ReducedModel, solution: Solution, S: int) -> RealArray:
+    """(n, S) normal loads at S instants [N], negative where open."""
+    loads, _ = _prescribed_normal(model, S)
+    if model.directions == model.elements.tangents:
+        return loads
+    n, d, K = solution.w.shape
+    normal = solution.w[:, 0] + 0.0
+    normal[:, 0] += model.offset.reshape(n, d)[:, 0]
+    return loads + model.elements.kn[:, None] * (normal @ synthesis(K // 2, S).T)
 
 
 def _steps_of_nodes(

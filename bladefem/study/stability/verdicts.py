@@ -36,6 +36,8 @@ from .highest_stable import highest_lasting, next_to_judge
 MAX_JUDGED_MAXIMA = 4
 # operations of all verdicts on a curve, some 0.5 s: less than its points take
 CURVE_OPERATIONS = 1.2e10
+# over those estimated of a verdict: more instants, four times as many, are not made
+ESTIMATE_MARGIN = 2.0
 # of solving a point again with JUDGED_HARMONICS; more take as many times more as their square
 RICHER_OPERATIONS = 5e8
 # points that are judged in addition, until the highest one that is not unstable is known: by
@@ -111,7 +113,8 @@ def stability_of(
         if i in judged or (costs[i] > budget and not highest):
             continue
         motions[i] = judged_motion(model, points[i])
-        found[i] = stability_verdict(model, motions[i], MAX_OPERATIONS if highest else costs[i])
+        most = MAX_OPERATIONS if highest else ESTIMATE_MARGIN * costs[i]
+        found[i] = stability_verdict(model, motions[i], most)
         judged.add(i)
         budget -= costs[i]
     again = _judge_again(found, motions, richer)
