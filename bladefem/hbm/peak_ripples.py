@@ -125,11 +125,7 @@ def above_ripples(
     for _ in range(MAX_PARABOLAS):
         if not (0 < down <= best and 0 < up <= best):
             break
-        level = best**-2
-        slope, half = parabola_at_middle(left, right, down**-2 - level, up**-2 - level)
-        bend = 2 * half
-        shift = -slope / bend if bend > 0 else 0.0
-        gain = slope * slope / (2 * bend) / level if bend > 0 else 0.0
+        bend, shift, gain = _vertex((left, right), (down, best, up))
         # no closer than the distance over which ripples even out
         if gain < tolerance or abs(shift) < step / 4:
             break
@@ -141,3 +137,21 @@ def above_ripples(
     if size(highest, probe) > (1 + MAX_GAIN) * size(top, probe):
         return Top(top, 0.0, len(solved) - 1)
     return Top(highest, float(max(bend, 0.0)), len(solved) - 1)
+
+
+def _vertex(
+    distances: tuple[float, float], heights: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """Second derivative of the parabola of 1/height^2, the distance of its vertex from the middle
+    point, and the relative gain of height there; the latter two 0 where it has no maximum.
+
+    Args:
+        distances: of the neighbours, below and above; heights: of all three from there up.
+    """
+    down, best, up = heights
+    level = best**-2
+    slope, half = parabola_at_middle(*distances, down**-2 - level, up**-2 - level)
+    bend = 2 * half
+    if bend <= 0:
+        return bend, 0.0, 0.0
+    return bend, -slope / bend, slope * slope / (2 * bend) / level

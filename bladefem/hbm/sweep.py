@@ -100,16 +100,41 @@ def sweep(
         yield point
     followed = yield from _close_in_maxima(search, solved, notes)
     if followed:
-        for point in _lost_ends(search, band, solved, lost):
-            solved[point.omega] = point
-            yield point
-        points = list(solved.values())
-        found = find_branches(
-            model, band, points, H, samples, peak=peak, options=options, limits=limits
-        )
-        notes.extend(found.notes)
-        yield from found.points
-        yield from _solved_again(search, _missed(lost, solved, found), points)
+        yield from _followed(search, band, solved, lost, limits, notes)
+
+
+def _followed(
+    search: _BandSearch,
+    band: tuple[float, float],
+    solved: dict[float, Solution],
+    lost: list[float],
+    limits: PathLimits,
+    notes: list[str],
+) -> Iterator[Solution]:
+    """The response round its folds, from the ends of the band on; then the points that neither the
+    first look nor a path has.
+
+    Args:
+        solved: points of the sweep; those at the ends of the band are added.
+        lost: circular frequencies that the first look did not solve.
+    """
+    for point in _lost_ends(search, band, solved, lost):
+        solved[point.omega] = point
+        yield point
+    points = list(solved.values())
+    found = find_branches(
+        search.model,
+        band,
+        points,
+        search.H,
+        search.samples,
+        peak=search.accuracy[0],
+        options=search.options,
+        limits=limits,
+    )
+    notes.extend(found.notes)
+    yield from found.points
+    yield from _solved_again(search, _missed(lost, solved, found), points)
 
 
 def _first_solutions(
