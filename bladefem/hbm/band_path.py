@@ -86,7 +86,7 @@ def follow_path(
             crossings=False,
         ):
             points.append(point)
-            if point.restarted:
+            if point.restarted and not (len(points) > 1 and _goes_on(points)):
                 notes.append(
                     f"a path was begun again at {point.solution.frequency:.6g} Hz: "
                     f"{point.restarted}"
@@ -133,6 +133,12 @@ def follow_both_ways(
         else []
     )
     return BandPath([*turned[:-1], *path.points], (back.ends[1], path.ends[1]))
+
+
+def _goes_on(points: Sequence[PathPoint]) -> bool:
+    """The last point, at which the path was begun again, is the motion of the one before it."""
+    a, b = (point.solution.w[:, :, 1:] for point in points[-2:])
+    return bool(np.linalg.norm(b - a) <= SAME_MOTION * np.linalg.norm(a))
 
 
 def _end_of_band(omega: float, band: tuple[float, float]) -> str:

@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 from models import FOLDING, folding_pair, rebounding
 
+from bladefem.hbm import band_path as band_path_module
 from bladefem.hbm import branches as branches_module
 from bladefem.hbm import path_maxima as maxima_module
 from bladefem.hbm import sweep as sweep_module
-from bladefem.hbm.band_path import PathLimits
+from bladefem.hbm.band_path import PathLimits, follow_path
 from bladefem.hbm.branches import find_branches
+from bladefem.hbm.continuation import PathPoint
 from bladefem.hbm.model import Damping
 from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
@@ -192,3 +194,18 @@ def test_only_the_highest_maxima_of_a_path_are_closed_in(folding, monkeypatch):
     )
     maxima_module.close_in_maxima(folding, path, BAND, 1e-2, DEFAULT_OPTIONS)
     assert closed == [9.0, 3.0]
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1.01, False), (1.5, True)])
+def test_a_path_begun_again_is_said_where_it_does_not_go_on(folding, scale, said, monkeypatch):
+    """The motion after the gap is the one before it, to a hundredth, or another one."""
+    start = solve(folding, BAND[0], 3, 64)
+    near = replace(start, w=scale * start.w, omega=1.001 * start.omega)
+    points = [
+        PathPoint(start.omega, start, True, False),
+        PathPoint(near.omega, near, True, False, restarted="the path stopped"),
+    ]
+    monkeypatch.setattr(band_path_module, "follow", lambda *given, **options: iter(points))
+    notes = []
+    follow_path(folding, start, BAND, True, 10, notes, DEFAULT_OPTIONS)
+    assert [("begun again" in note) for note in notes] == [True] * said
