@@ -4,6 +4,7 @@ sentence with the field to change.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, radians, sin, tan
 
 import numpy as np
@@ -26,8 +27,11 @@ NO_SHROUD = Shroud()
 MIN_STRIP_SHARE = 0.02
 # thickness of the platform over its length or its pitch: at 1/290 a quarter of the cells stays flat
 THINNEST_PLATE = 1 / 150
-# [m], the lower end of the field's range
+# [m], the lower ends of the ranges of the fields
 NARROWEST_SEAT = float(Platform.__dataclass_fields__["seat_width"].metadata["low"])
+LOWEST_BASE = float(Wedge.__dataclass_fields__["base"].metadata["low"])
+# of a width that is sought by bisection: below what six digits show
+SEAT_ACCURACY = 1e-9
 
 # sections along the span that are compared with those of the next blade
 CHECKED_HEIGHTS = 9
@@ -181,18 +185,49 @@ def _check_seat(
     widest = widest_seat(platform, shank, disc, wedge)
     where = f"the platform's overhang next to the shank with {_count(disc)}"
     cure = "fewer of these, or a smaller shank.width or damper.angle"
-    expected = unless_at_most(platform.seat_width, widest)
-    if expected and widest < NARROWEST_SEAT:
+    if not unless_at_most(platform.seat_width, widest):
+        return
+    if widest < NARROWEST_SEAT:
         raise InputError(
             f"platform.seat_width = {show(platform.seat_width, 'm')}: no seat fits, {where} has "
             f"room for {show_most(max(widest, 0.0), 'm', 3)} and a seat has "
             f"{show(NARROWEST_SEAT, 'm')} or more; choose {cure}"
         )
-    if expected:
-        raise InputError(
-            f"platform.seat_width = {show(platform.seat_width, 'm')} is too large: expected "
-            f"{expected} ({where}); or choose {cure}"
-        )
+    clear = _clear_seat(platform, shank, disc, wedge, widest)
+    if clear < widest:
+        where = f"so that the damper keeps clear of the shank with {_count(disc)}"
+    raise InputError(
+        f"platform.seat_width = {show(platform.seat_width, 'm')} is too large: expected at most "
+        f"{show_most(clear, 'm')} ({where}); or choose {cure}"
+    )
+
+
+def _clear_seat(
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    widest: float,
+) -> float:
+    """The widest seat up to one [m] with which the damper keeps clear of shank and rim, by
+    bisection; that one where it does so with none.
+    """
+
+    def keeps_clear(width: float) -> bool:
+        section = sector_profile(replace(platform, seat_width=width), shank, disc, wedge)
+        try:
+            check_pocket(section, shank, disc, wedge)
+        except InputError:
+            return False
+        return True
+
+    if keeps_clear(widest) or not keeps_clear(NARROWEST_SEAT):
+        return widest
+    low, high = NARROWEST_SEAT, widest
+    while high - low > SEAT_ACCURACY * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if keeps_clear(middle) else (low, middle)
+    return low
 
 
 def check_pocket(
@@ -203,10 +238,17 @@ def check_pocket(
 ) -> None:
     """The damper stays clear of shank and rim, also after it is moved by its clearance."""
     sunk = wedge.clearance / sin(min(wedge.angles))
+    room = 0.95 * shank.height - sunk
+    if room < LOWEST_BASE:
+        raise InputError(
+            f"damper.clearance = {show(wedge.clearance, 'm')}: it lowers the damper by "
+            f"{show(sunk, 'm', 3)}, expected less than 95 % of shank.height = "
+            f"{show(shank.height, 'm')}"
+        )
     _at_most(
         "damper.base",
         wedge.base,
-        0.95 * shank.height - sunk,
+        room,
         "95 % of shank.height, less what damper.clearance lowers the damper by",
     )
     radial = np.array([np.cos(section.theta), np.sin(section.theta)])

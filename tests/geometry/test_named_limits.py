@@ -159,6 +159,17 @@ def test_a_shank_leaves_no_strip_on_either_side(platform, disc):
         assert not taken.startswith("shank.length"), (said, taken)
 
 
+def test_a_clearance_that_leaves_no_height_for_a_damper_is_named():
+    """It was a base of at most -3 mm that was expected."""
+    low = SECTOR | {
+        "shank": Shank(length=0.036, height=0.005),
+        "damper": Wedge(angle=0.27, clearance=0.002),
+    }
+    assert refusal(sector, low).startswith(
+        "damper.clearance = 2 mm: it lowers the damper by 7.5 mm"
+    )
+
+
 def test_limits_of_seats_and_faces_are_taken():
     """Of checks that are given more than the tables of a scene."""
     rng = np.random.default_rng(8)

@@ -126,14 +126,18 @@ def test_late_failures_are_refused_early(override, said):
 
 @pytest.mark.parametrize("sectors", [70, 80, 92, 100, 104])
 def test_the_seat_width_that_a_message_names_is_taken(sectors):
-    """The number is copied out of the first message; what is refused after it is another field."""
+    """The number is copied out of the first message; what is refused after it is neither the seat
+    nor a damper that does not fit under it, but another part.
+    """
     many = f"disc.sectors={sectors}"
     said = refused(_draw, SHIPPED, [many])
     limit = re.search(r"^platform.seat_width = .* expected at most (\S+ mm)", said)[1]
     try:
         _draw(SHIPPED, [many, f"platform.seat_width={limit}"])
     except InputError as other:
-        assert not str(other).startswith("platform.seat_width")
+        assert str(other).startswith("aerofoil.chord_root")
+    wider = f"platform.seat_width={1.0001 * parse(limit, 'm')}"
+    assert refused(_draw, SHIPPED, [many, wider]).startswith(("platform.seat_width", "damper.base"))
 
 
 @pytest.mark.parametrize("sectors", [107, 110, 115])
