@@ -15,7 +15,8 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import LIMIT_TOLERANCE, show, show_most
+from bladefem.scene.limits import unless_at_most
+from bladefem.scene.units import show
 
 from .draw import (
     boundary_centres,
@@ -118,10 +119,8 @@ def _check_range(
     limit: float,
     meaning: str,
 ) -> None:
-    if not value <= limit * (1 + LIMIT_TOLERANCE):
-        raise InputError(
-            f"{name} = {show(value, 'm')}: expected at most {show_most(limit, 'm')} ({meaning})"
-        )
+    if expected := unless_at_most(value, limit):
+        raise InputError(f"{name} = {show(value, 'm')}: expected {expected} ({meaning})")
 
 
 def _bend_indenter(

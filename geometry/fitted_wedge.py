@@ -13,6 +13,8 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError, suggestion
+from bladefem.scene.limits import unless_at_most
+from bladefem.scene.units import show
 
 from .damper_shapes import SHAPES
 from .draw import boundary_centres, draw_polygon, imprint_marks
@@ -220,10 +222,10 @@ def _seat_width(extents: list[tuple[float, float]], width: float | None) -> floa
     """
     narrowest = min(top - bottom for bottom, top in extents)
     wanted = narrowest if width is None else width
-    if wanted > narrowest * (1 + ROUNDING_TOLERANCE):
+    if expected := unless_at_most(wanted, narrowest, tolerance=ROUNDING_TOLERANCE):
         raise InputError(
-            f"imported.seat_width = {1e3 * wanted:.4g} mm: expected at most {1e3 * narrowest:.4g} "
-            "mm, the width of the narrower platform face"
+            f"imported.seat_width = {show(wanted, 'm')}: expected {expected}, the width of the "
+            "narrower platform face"
         )
     return wanted
 
@@ -237,10 +239,10 @@ def _common_extent(
     extents = [_extent_along(face.corners, along) for face in faces]
     low = max(extent[0] for extent in extents)
     high = min(extent[1] for extent in extents)
-    if length > (high - low) * (1 + ROUNDING_TOLERANCE):
+    if expected := unless_at_most(length, high - low, tolerance=ROUNDING_TOLERANCE):
         raise InputError(
-            f"damper.length = {1e3 * length:.4g} mm: expected at most {1e3 * (high - low):.4g} mm, "
-            "the length that both platform faces have in common"
+            f"damper.length = {show(length, 'm')}: expected {expected}, the length that both "
+            "platform faces have in common"
         )
     return low, high
 

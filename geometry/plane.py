@@ -10,7 +10,8 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show, show_most
+from bladefem.scene.limits import unless_at_most
+from bladefem.scene.units import show
 
 from .draw import draw_polygon, tie_meshes
 from .extract_arrays import Groups
@@ -83,10 +84,10 @@ def check_plane(plane: Plane) -> None:
             f"{show(plane.length, 'm')}"
         )
     room = 0.98 * (plane.platform_width - plane.thickness) / 2
-    if not plane.seat_width <= room:
+    if expected := unless_at_most(plane.seat_width, room):
         raise InputError(
-            f"plane.seat_width = {show(plane.seat_width, 'm')}: expected at most "
-            f"{show_most(room, 'm')} (98 % of the platform's overhang next to the blade)"
+            f"plane.seat_width = {show(plane.seat_width, 'm')}: expected {expected} (98 % of the "
+            "platform's overhang next to the blade)"
         )
 
 

@@ -12,7 +12,8 @@ from math import cos, pi, sin, tan
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show, show_most
+from bladefem.scene.limits import unless_at_least, unless_at_most
+from bladefem.scene.units import LIMIT_TOLERANCE, show, show_exactly, show_most
 
 from .parameters import Disc, Root, Shank
 
@@ -80,21 +81,45 @@ def check_root(root: Root, shank: Shank, disc: Disc) -> None:
     """
     if root.lobes == 0:
         return
-    neck = _neck(root, shank)
-    step = (neck - shank.width) / 2
-    if step < 0 or 0 < step < STEP * neck:
-        raise InputError(
-            f"root.neck = {show(neck, 'm')}: expected shank.width = {show(shank.width, 'm')} or at "
-            f"least {show(shank.width / (1 - 2 * STEP), 'm')}, since the shank stands on the root"
-        )
-    idle = _idle_height(root)
-    if idle < (1 - HIGHEST_BEARING) * root.pitch:
-        limit = HIGHEST_BEARING * root.pitch / cos(root.flank_angle)
-        _refuse("bearing", root.bearing, limit, "70 % of root.pitch at this root.flank_angle")
-    widest = WIDEST_SLOT * min(root.bearing, idle)
-    if root.clearance > widest:
-        _refuse("clearance", root.clearance, widest, "40 % of a flank's width")
+    _check_neck(root, shank, disc)
+    limit = HIGHEST_BEARING * root.pitch / cos(root.flank_angle)
+    _at_most("bearing", root.bearing, limit, "70 % of root.pitch at this root.flank_angle")
+    widest = WIDEST_SLOT * min(root.bearing, _idle_height(root))
+    _at_most("clearance", root.clearance, widest, "40 % of a flank's width")
     _check_room(root, shank, disc)
+
+
+def _check_neck(root: Root, shank: Shank, disc: Disc) -> None:
+    """As wide as the shank, or clearly wider where the disc's posts have room for it."""
+    neck = _neck(root, shank)
+    widened = shank.width / (1 - 2 * STEP)
+    expected = unless_at_least(neck, widened)
+    if not expected or abs(neck - shank.width) <= LIMIT_TOLERANCE * neck:
+        return
+    widest = neck + 2 * _spare_post(root, shank, disc)
+    if shank.width > widest:
+        raise InputError(
+            f"shank.width = {show(shank.width, 'm')}: the shank stands on the root, whose lobes "
+            f"leave the disc its posts up to a root.neck of {show_most(max(widest, 0.0), 'm', 3)}; "
+            "choose a smaller shank.width, a smaller root.bearing or fewer disc.sectors"
+        )
+    wider = f" or {expected}" if widened <= widest else ""
+    raise InputError(
+        f"root.neck = {show(neck, 'm')}: expected shank.width = {show_exactly(shank.width, 'm')}"
+        f"{wider}, since the shank stands on the root"
+    )
+
+
+def _spare_post(root: Root, shank: Shank, disc: Disc) -> float:
+    """What half a post of the disc between two roots has more than it needs [m]; half of the neck's
+    width takes as much from it.
+    """
+    end = root_corners(root, shank, disc)[1]
+    reach = end + root.clearance * _along_flank(root)
+    # the groove's floor is as wide as its last flank, further in
+    deepest = end[-1, 0] - _idle_height(root) - root.clearance
+    reach = np.vstack([reach, [deepest, reach[-1, 1]]])
+    return float(((1 - POST) * reach[:, 0] * tan(pi / disc.sectors) - reach[:, 1]).min())
 
 
 def _check_room(root: Root, shank: Shank, disc: Disc) -> None:
@@ -114,23 +139,20 @@ def _check_room(root: Root, shank: Shank, disc: Disc) -> None:
             f"{show(2 * start[-1, 1], 'm', 3)} wide, expected at least "
             f"{show(2 * NARROWEST_NECK * start[0, 1], 'm', 3)}; choose less taper or fewer lobes"
         )
-    reach = end + root.clearance * _along_flank(root)
-    # the groove's floor is as wide as its last flank, further in
-    reach = np.vstack([reach, [disc.rim_radius - deepest, reach[-1, 1]]])
-    free = (1 - POST) * reach[:, 0] * tan(pi / disc.sectors) - reach[:, 1]
-    if free.min() < 0:
+    spare = _spare_post(root, shank, disc)
+    if spare < 0:
         raise InputError(
             f"root.neck = {show(_neck(root, shank), 'm')}: the lobes leave too thin a post of the "
-            f"disc between two roots, by {show(-free.min(), 'm', 3)}; choose a narrower neck (and "
+            f"disc between two roots, by {show(-spare, 'm', 3)}; choose a narrower neck (and "
             "shank.width), a smaller root.bearing or fewer disc.sectors"
         )
 
 
-def _refuse(name: str, value: float, limit: float, meaning: str) -> None:
-    raise InputError(
-        f"root.{name} = {show(value, 'm')} is too large: expected at most {show_most(limit, 'm')} "
-        f"({meaning})"
-    )
+def _at_most(name: str, value: float, limit: float, meaning: str) -> None:
+    if expected := unless_at_most(value, limit):
+        raise InputError(
+            f"root.{name} = {show(value, 'm')} is too large: expected {expected} ({meaning})"
+        )
 
 
 def _neck(root: Root, shank: Shank) -> float:

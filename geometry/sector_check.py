@@ -4,17 +4,20 @@ sentence with the field to change.
 
 from __future__ import annotations
 
-from math import pi, radians, sin
+from dataclasses import replace
+from math import pi, radians, sin, tan
 
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import LIMIT_TOLERANCE, show, show_least, show_most
+from bladefem.scene.limits import unless_at_least, unless_at_most
+from bladefem.scene.units import LIMIT_TOLERANCE, show, show_exactly, show_most
 
 from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
 from .profile import Profile, clearing_shift, sector_profile
 from .root import check_root
+from .seat_room import widest_seat
 from .section import section_outline, section_shape
 from .shroud import shroud_block
 
@@ -24,6 +27,11 @@ NO_SHROUD = Shroud()
 MIN_STRIP_SHARE = 0.02
 # thickness of the platform over its length or its pitch: at 1/290 a quarter of the cells stays flat
 THINNEST_PLATE = 1 / 150
+# [m], the lower ends of the ranges of the fields
+NARROWEST_SEAT = float(Platform.__dataclass_fields__["seat_width"].metadata["low"])
+LOWEST_BASE = float(Wedge.__dataclass_fields__["base"].metadata["low"])
+# of a width that is sought by bisection: below what six digits show
+SEAT_ACCURACY = 1e-9
 
 # sections along the span that are compared with those of the next blade
 CHECKED_HEIGHTS = 9
@@ -71,28 +79,47 @@ def _at_most(
     limit: float,
     meaning: str,
     unit: str = "m",
-    digits: int = 6,
 ) -> None:
-    if not value <= limit * (1 + LIMIT_TOLERANCE):
+    if expected := unless_at_most(value, limit, unit):
         raise InputError(
-            f"{name} = {show(value, unit)} is too large: expected at most "
-            f"{show_most(limit, unit, digits)} ({meaning})"
+            f"{name} = {show(value, unit)} is too large: expected {expected} ({meaning})"
         )
 
 
-def _no_strip(
-    name: str,
-    value: float,
-    other: str,
-    limit: float,
-) -> None:
-    """Two ends that nearly coincide leave a strip that no good element fits into."""
-    _at_most(name, value, limit, other)
-    if 0 < limit - value < MIN_STRIP_SHARE * limit:
+def _no_strip(name: str, value: float, limits: dict[str, float]) -> None:
+    """Two ends that nearly coincide leave a strip that no good element fits into.
+
+    Args:
+        limits: lengths that the value may not exceed, by the names of their fields [m].
+    """
+    clear = [(1 - MIN_STRIP_SHARE) * limit for limit in limits.values()]
+    fitting = [length for length in (*limits.values(), *clear) if _leaves_no_strip(length, limits)]
+    other, limit = min(limits.items(), key=lambda item: item[1])
+    if unless_at_most(value, limit):
+        # rounded, the very length would leave a strip
+        named, strip = show_exactly(limit, "m"), ""
+        if limit not in fitting:
+            named, strip = show_most(max(fitting), "m"), ", less a strip as wide as an element"
         raise InputError(
-            f"{name} = {show(value, 'm')} ends {show(limit - value, 'm', 3)} before {other}, "
-            f"expected the same length or at most {show((1 - MIN_STRIP_SHARE) * limit, 'm')}"
+            f"{name} = {show(value, 'm')} is too large: expected at most {named} ({other}{strip})"
         )
+    for other, limit in limits.items():
+        if not _leaves_no_strip(value, {other: limit}):
+            same = "the same length or " if _leaves_no_strip(limit, limits) else ""
+            below = max(length for length in fitting if length < limit)
+            raise InputError(
+                f"{name} = {show(value, 'm')} ends {show(limit - value, 'm', 3)} before {other}, "
+                f"expected {same}at most {show_most(below, 'm')}"
+            )
+
+
+def _leaves_no_strip(value: float, limits: dict[str, float]) -> bool:
+    """Whether a length ends with every limit, or clearly before it."""
+    return all(
+        abs(value - limit) <= LIMIT_TOLERANCE * limit
+        or not unless_at_most(value, (1 - MIN_STRIP_SHARE) * limit)
+        for limit in limits.values()
+    )
 
 
 def _count(disc: Disc) -> str:
@@ -116,8 +143,11 @@ def check_disc(
         1.9 * disc.rim_radius * sin(theta),
         f"95 % of the sector's width at the rim with {_count(disc)}",
     )
-    _no_strip("shank.length", shank.length, "platform.length", platform.length)
-    _no_strip("shank.length", shank.length, "disc.width", disc.width)
+    _no_strip(
+        "shank.length",
+        shank.length,
+        {"platform.length": platform.length, "disc.width": disc.width},
+    )
 
 
 def check_platform(
@@ -132,26 +162,72 @@ def check_platform(
     _at_most(
         "platform.gap", platform.gap, half, f"half the pitch at the platform with {_count(disc)}"
     )
-    # no mesh of it has cells that are not flat
-    widest = max(platform.length, 2 * half)
-    if platform.thickness < THINNEST_PLATE * widest:
+    # no mesh of a thinner one has cells that are not flat; its pitch, at the top, grows with it
+    slope = 2 * tan(section.theta)
+    pitch = (2 * half - slope * platform.thickness) / (1 - slope * THINNEST_PLATE)
+    thinnest = THINNEST_PLATE * max(platform.length, pitch)
+    if expected := unless_at_least(platform.thickness, thinnest):
         raise InputError(
-            f"platform.thickness = {show(platform.thickness, 'm')} is too small: expected at least "
-            f"{show_least(THINNEST_PLATE * widest, 'm')}, a {1 / THINNEST_PLATE:.0f}th of "
-            "the platform's length and of its pitch"
+            f"platform.thickness = {show(platform.thickness, 'm')} is too small: expected "
+            f"{expected}, a {1 / THINNEST_PLATE:.0f}th of the platform's length and of its pitch"
         )
-    room = np.abs(section.seats[:, 1, 1]).min() - shank.width / 2
-    needed = platform.seat_width * sin(max(wedge.angles) + section.theta)
-    _at_most(
-        "platform.seat_width",
-        platform.seat_width,
-        max(0.98 * room / needed, 0) * platform.seat_width,
-        f"the platform's overhang next to the shank with {_count(disc)}; or choose fewer of "
-        "these, or a smaller shank.width or damper.angle",
-        # the overhang changes with the seat: further digits would be refused in their turn
-        digits=3,
+    _check_seat(platform, shank, disc, wedge)
+    _no_strip("damper.length", wedge.length, {"platform.length": platform.length})
+
+
+def _check_seat(
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+) -> None:
+    """The seat fits next to the shank."""
+    widest = widest_seat(platform, shank, disc, wedge)
+    where = f"the platform's overhang next to the shank with {_count(disc)}"
+    cure = "fewer of these, or a smaller shank.width or damper.angle"
+    if not unless_at_most(platform.seat_width, widest):
+        return
+    if widest < NARROWEST_SEAT:
+        raise InputError(
+            f"platform.seat_width = {show(platform.seat_width, 'm')}: no seat fits, {where} has "
+            f"room for {show_most(max(widest, 0.0), 'm', 3)} and a seat has "
+            f"{show(NARROWEST_SEAT, 'm')} or more; choose {cure}"
+        )
+    clear = _clear_seat(platform, shank, disc, wedge, widest)
+    if clear < widest:
+        where = f"so that the damper keeps clear of the shank with {_count(disc)}"
+    raise InputError(
+        f"platform.seat_width = {show(platform.seat_width, 'm')} is too large: expected at most "
+        f"{show_most(clear, 'm')} ({where}); or choose {cure}"
     )
-    _no_strip("damper.length", wedge.length, "platform.length", platform.length)
+
+
+def _clear_seat(
+    platform: Platform,
+    shank: Shank,
+    disc: Disc,
+    wedge: Wedge,
+    widest: float,
+) -> float:
+    """The widest seat up to one [m] with which the damper keeps clear of shank and rim, by
+    bisection; that one where it does so with none.
+    """
+
+    def keeps_clear(width: float) -> bool:
+        section = sector_profile(replace(platform, seat_width=width), shank, disc, wedge)
+        try:
+            check_pocket(section, shank, disc, wedge)
+        except InputError:
+            return False
+        return True
+
+    if keeps_clear(widest) or not keeps_clear(NARROWEST_SEAT):
+        return widest
+    low, high = NARROWEST_SEAT, widest
+    while high - low > SEAT_ACCURACY * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if keeps_clear(middle) else (low, middle)
+    return low
 
 
 def check_pocket(
@@ -161,8 +237,20 @@ def check_pocket(
     wedge: Wedge,
 ) -> None:
     """The damper stays clear of shank and rim, also after it is moved by its clearance."""
-    drop = wedge.base + wedge.clearance / sin(min(wedge.angles))
-    _at_most("damper.base", drop, 0.95 * shank.height, "95 % of shank.height, clearance included")
+    sunk = wedge.clearance / sin(min(wedge.angles))
+    room = 0.95 * shank.height - sunk
+    if room < LOWEST_BASE:
+        raise InputError(
+            f"damper.clearance = {show(wedge.clearance, 'm')}: it lowers the damper by "
+            f"{show(sunk, 'm', 3)}, expected less than 95 % of shank.height = "
+            f"{show(shank.height, 'm')}"
+        )
+    _at_most(
+        "damper.base",
+        wedge.base,
+        room,
+        "95 % of shank.height, less what damper.clearance lowers the damper by",
+    )
     radial = np.array([np.cos(section.theta), np.sin(section.theta)])
     across = np.array([-radial[1], radial[0]])
     moved = section.damper + clearing_shift(wedge, section)
@@ -210,8 +298,12 @@ def check_aerofoil(
                 f"tenth of platform.thickness round it, overhangs the platform {what} by "
                 f"{show(-room, 'm', 3)}; choose a smaller {cure}"
             )
-    thinnest = blade.thickness_root * blade.chord_root
-    _at_most("aerofoil.fillet", blade.fillet_radius, thinnest, "the thickness of the root section")
+    _at_most(
+        "aerofoil.fillet",
+        blade.fillet_radius,
+        min(blade.thickness_root * blade.chord_root, blade.span / 4),
+        "the thickness of the root section, and a quarter of aerofoil.span",
+    )
 
 
 def check_neighbours(

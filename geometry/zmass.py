@@ -9,7 +9,8 @@ from types import ModuleType
 import numpy as np
 
 from bladefem.errors import InputError
-from bladefem.scene.units import show, show_most
+from bladefem.scene.limits import unless_at_most
+from bladefem.scene.units import show
 
 from .draw import (
     boundary_centres,
@@ -96,10 +97,10 @@ def check_z_mass(z: ZMass) -> None:
         InputError: the bar is too wide.
     """
     limit = 0.95 * min(z.height / 2, z.width)
-    if not z.bar <= limit:
+    if expected := unless_at_most(z.bar, limit):
         raise InputError(
-            f"z_mass.bar = {show(z.bar, 'm')}: expected at most {show_most(limit, 'm')} (95 % of "
-            "z_mass.width and of half of z_mass.height)"
+            f"z_mass.bar = {show(z.bar, 'm')}: expected {expected} (95 % of z_mass.width and of "
+            "half of z_mass.height)"
         )
 
 

@@ -15,6 +15,7 @@ from geometry.mesh import Mesh
 
 from ..data import Patch
 from ..errors import InputError
+from ..scene.limits import unless_at_least
 from ..scene.tables import Contact
 from ..scene.units import show
 from .patch import patch_means
@@ -66,10 +67,10 @@ def _check_crown(
     length: float,
 ) -> None:
     """No circle of a smaller radius reaches from end to end."""
-    if radius < length / 2:
+    if expected := unless_at_least(radius, length / 2, digits=3):
         raise InputError(
             f"contact.{name} = {show(radius, 'm')}: a circle that cannot span the seat of "
-            f"{show(float(f'{length:.3g}'), 'm')}, expected a radius above half of that"
+            f"{show(length, 'm', 3)}, expected a radius of {expected}"
         )
 
 
@@ -79,13 +80,11 @@ def _check_width(
     width: float,
 ) -> None:
     """A strip that falls between two nodes would be felt at random."""
-    size = element_size(patch, mesh.depth)
-    if width < MIN_STRIP_OVER_ELEMENT_SIZE * size:
-        narrowest = float(f"{MIN_STRIP_OVER_ELEMENT_SIZE * size:.2g}")
+    narrowest = MIN_STRIP_OVER_ELEMENT_SIZE * element_size(patch, mesh.depth)
+    if expected := unless_at_least(width, narrowest, digits=2):
         raise InputError(
             f"contact.edge_width = {show(width, 'm')}: narrower than the elements of the seats, "
-            f"expected at least {show(narrowest, 'm')}, or a smaller "
-            "mesh.contact_size"
+            f"expected {expected}, or a smaller mesh.contact_size"
         )
 
 

@@ -9,6 +9,7 @@
 - sentences: ``headlines`` with their errors, ``statements`` the answer, ``next_steps``
 - drawn wheels: ``scatter_tables``, ``scatter_sentences``, ``scatter_pictures``
 - parts of them: ``response_points`` and ``response_arrays`` of curves, ``resonance_table``,
-  ``best_load`` and ``best_value``, ``influences``, ``linear`` the best linear element, ``nodes``,
-  ``pressure``, ``mode_table``, ``fatigue``, ``flow``, ``wheel`` one pattern of deviations
+  ``best_load`` and ``best_value``, ``damping`` the equivalent ratio, ``influences``, ``linear`` the
+  best linear element, ``nodes``, ``pressure``, ``mode_table``, ``fatigue``, ``flow``, ``wheel`` one
+  pattern of deviations
 """

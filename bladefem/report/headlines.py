@@ -15,6 +15,7 @@ import pandas as pd
 
 from ..scene.units import newton_range, newtons
 from .best_load import BALANCES, error_words, found_best, lowest_found, stress_error_words
+from .damping import damping_error_words
 from .statements import LOWEST_FOUND, ResponseAnswer
 
 # what an answer says in place of a number that the data cannot carry
@@ -49,7 +50,7 @@ def headlines(
     sure = {} if summary is None else _uncertainties(summary, points)
     best = None if searched is None or summary is None else found_best(searched, summary)
     if best is not None and summary is not None:
-        sure |= _of_search(best, points)
+        sure |= _of_search(best, summary, points)
         lowest = lowest_found(best, summary)
         sure["lowest"] = sure["amplitude"] if lowest is best else error_words(lowest)
     found = []
@@ -86,6 +87,7 @@ def _quantity(what: str) -> str:
         "stress": "stress",
         "frequency": "frequency",
         "work": "amplitude",
+        "equivalent damping": "damping",
         "damping ratio": "amplitude",
         "own mass": "own load",
         "mass that makes": "mass",
@@ -107,13 +109,18 @@ def _uncertainties(summary: pd.DataFrame, points: pd.DataFrame | None) -> dict[s
         "lowest": error_words(best),
         "stress": stress_error_words(best),
         "frequency": _frequency_text(best, points),
+        "damping": _damping_text(summary, best, points),
         "load": _between_text(low, high),
         "own load": "by equilibrium, no model error",
         "mass": _mass_text(low, high, best["load"]),
     }
 
 
-def _of_search(best: pd.Series, points: pd.DataFrame | None) -> dict[str, str]:
+def _of_search(
+    best: pd.Series,
+    summary: pd.DataFrame,
+    points: pd.DataFrame | None,
+) -> dict[str, str]:
     """How sure the exact search is; the load by where the amplitude stays within the accuracy."""
     total = best.copy()
     # of balances, where the amplitude is the lowest one; others are those of the load itself
@@ -128,6 +135,7 @@ def _of_search(best: pd.Series, points: pd.DataFrame | None) -> dict[str, str]:
         "amplitude": error_words(total),
         "stress": stress_error_words(total),
         "frequency": _frequency_text(best, points),
+        "damping": _damping_text(summary, total, points),
         "load": _flatness_text(low, high),
         "mass": _mass_text(low, high, best["load"]) if known else "as the optimum load",
     }
@@ -177,28 +185,45 @@ def _mass_text(
     return f"{100 * (low / load - 1):+.0f} to {100 * (high / load - 1):+.0f} %, as the optimum load"
 
 
+def _damping_text(
+    summary: pd.DataFrame,
+    best: pd.Series,
+    points: pd.DataFrame | None,
+) -> str:
+    """How sure the equivalent damping ratio is."""
+    error, _ = _frequency_error(best, points)
+    return damping_error_words(summary, best, error / best["peak_frequency"])
+
+
 def _frequency_text(best: pd.Series, points: pd.DataFrame | None) -> str:
+    """How sure the frequency is, in words."""
+    error, why = _frequency_error(best, points)
+    return why if np.isnan(error) else f"± {error:.2g} Hz ({why})"
+
+
+def _frequency_error(best: pd.Series, points: pd.DataFrame | None) -> tuple[float, str]:
     """How far the highest point may move: to where the amplitude comes within its own estimated
-    error of the highest, and half the distance of the points there at least.
+    error of the highest, and half the distance of the points there at least [Hz], with
+    the reason; NaN where there is no estimate.
     """
     if points is None or points.empty:
-        return "no estimate"
+        return np.nan, "no estimate"
     curve = points[points["load"] == best["load"]]
     if "mass" in curve and np.isfinite(best.get("mass", np.nan)):
         curve = curve[curve["mass"] == best["mass"]]
     if curve.empty:
-        return "no estimate: no response under this load"
+        return np.nan, "no estimate: no response under this load"
     frequency = np.sort(curve["frequency"].unique())
     here = int(np.argmin(abs(frequency - best["peak_frequency"])))
     if not 0 < here < len(frequency) - 1:
-        return "at the end of the band: no resonance seen"
+        return np.nan, "at the end of the band: no resonance seen"
     spacing = (frequency[here + 1] - frequency[here - 1]) / 2
     error = best.get("error", np.nan)
     if np.isinf(error):
-        return "no estimate, as of the amplitude"
+        return np.nan, "no estimate, as of the amplitude"
     least = (1 - np.nan_to_num(error)) * best["peak_amplitude"]
     high = curve.loc[curve["converged"] & (curve["amplitude"] >= least), "frequency"]
     flat = float(abs(high - best["peak_frequency"]).max()) if len(high) else 0.0
     if flat <= spacing:
-        return f"± {spacing:.2g} Hz (spacing of points)"
-    return f"± {flat:.2g} Hz (flat top: the amplitude is within its error there)"
+        return spacing, "spacing of points"
+    return flat, "flat top: the amplitude is within its error there"

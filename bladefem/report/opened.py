@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 from html import escape
+from numbers import Integral
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -246,9 +247,10 @@ class RunFolder:
             nodal_diameter: the excited one when left out.
 
         Returns:
-            columns x, y, z [m], the places of the points of ``mesh.vtu``, and "ux real",
-            "ux imaginary", ... over the largest displacement of a node in the sector or body (1);
-            real where that node moves most. ``attrs`` has frequency [Hz] and nodal_diameter.
+            columns "x [m]", "y [m]", "z [m]", the places of the points of ``mesh.vtu``, and
+            "ux real", "ux imaginary", ... over the largest displacement of a node in the sector or
+            body (1); real where that node moves most. ``attrs`` has frequency [Hz] and
+            nodal_diameter.
 
         Raises:
             InputError: the run has no such mode.
@@ -282,14 +284,20 @@ class RunFolder:
             order = self.scene.excitation.engine_order
             sectors = 0 if self.mesh.sector is None else self.mesh.sector.count
             wanted = min(known, key=lambda n: abs(n - _folded(order, sectors)))
-        if wanted not in known:
-            # the modes of a body without cyclic faces are stored under -1
-            listed = [str(n) for n in known if n >= 0]
-            wheel = f"one of {', '.join(listed)}" if listed else "it to be left out: no wheel"
-            raise InputError(f"{asked}: nodal_diameter = {wanted} is not there, expected {wheel}")
+        # the modes of a body without cyclic faces are stored under -1
+        listed = [int(n) for n in known if n >= 0]
+        if nodal_diameter is not None and not (_is_whole(wanted) and wanted in listed):
+            one = f"one of {', '.join(map(str, listed))}"
+            raise InputError(
+                f"{asked}: nodal_diameter = {_as_given(wanted)} is not there, expected "
+                f"{one if listed else 'it to be left out: no wheel'}"
+            )
         part = data.sel(nodal_diameter=wanted)
-        if not 1 <= mode <= part.sizes["mode"]:
-            raise InputError(f"{asked}: mode = {mode}, expected 1 to {part.sizes['mode']}")
+        if not (_is_whole(mode) and 1 <= mode <= part.sizes["mode"]):
+            raise InputError(
+                f"{asked}: mode = {_as_given(mode)}, expected a whole number from 1 to "
+                f"{part.sizes['mode']}"
+            )
         return part, None if wanted < 0 else int(wanted)
 
 
@@ -321,6 +329,16 @@ def open_run(folder: str | Path) -> RunFolder:
     if not (folder / "scene.toml").is_file():
         raise InputError(f"{folder}: no scene.toml in it, expected the folder of an earlier run")
     return RunFolder(folder, load_scene(folder / "scene.toml"))
+
+
+def _is_whole(value: object) -> bool:
+    """Whether a number counts; True and False do not."""
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
+def _as_given(value: object) -> str:
+    """A count plainly, other values as Python writes them: '1' in quotes is none."""
+    return str(value) if _is_whole(value) else repr(value)
 
 
 def _folded(order: int, sectors: int) -> int:

@@ -15,9 +15,10 @@ from ..study.modes.comparison import family_table
 from ..study.modes.stress import Strength
 from ..study.modes.survey import excited_set
 from ..study.pipeline.contact_cycle import ContactCycle
-from ..study.pipeline.design_table import design_table, equivalent_damping
+from ..study.pipeline.design_table import design_table
 from ..study.pipeline.run_records import SolvedRun
 from .best_load import best_load_table
+from .damping import damping_column
 from .fatigue import utilisation_table
 from .flow import flow_tables
 from .influences import influence_table
@@ -56,6 +57,7 @@ def _wheel_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
 def _study_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
     """Tables of every study: mesh, modes, contact and responses."""
     curves = result.response.curves
+    points = _joined([*map(points_of, curves), *map(linear_points, result.response.limits)])
     return {
         "mesh/quality": pd.DataFrame(quality_rows(result.mesh), columns=["what", "value"]),
         "modes/modes": family_table(excited_set(result), result.mesh, result.clamped),
@@ -66,11 +68,9 @@ def _study_tables(result: SolvedRun) -> dict[str, pd.DataFrame]:
         **_own_load(result),
         **_best_load(result),
         **_damper_masses(result),
-        "response/summary": _summary(result),
+        "response/summary": _summary(result, points),
         **resonance_table(curves),
-        "response/points": _joined(
-            [*map(points_of, curves), *map(linear_points, result.response.limits)]
-        ),
+        "response/points": points,
     }
 
 
@@ -87,7 +87,7 @@ def _joined(parts: list[pd.DataFrame]) -> pd.DataFrame:
     return points.fillna({"stability": UNIQUE}) if "stability" in points else points
 
 
-def _summary(result: SolvedRun) -> pd.DataFrame:
+def _summary(result: SolvedRun, points: pd.DataFrame) -> pd.DataFrame:
     """The design table with stresses at each resonance: of the whole motion where that was
     computed, and of the excited mode alone, in proportion to the amplitude.
     """
@@ -100,10 +100,9 @@ def _summary(result: SolvedRun) -> pd.DataFrame:
         table.insert(place, "alternating_stress", _alternating(result, len(table)))
     # of a blade with a flow the damping without damper is not the scene's
     if not has_flow(result.scene):
-        frequency, height = table["peak_frequency"].to_numpy(), table["peak_amplitude"].to_numpy()
-        free = (float(frequency[0]), float(height[0]))
-        own = result.scene.operation.damping
-        table.insert(place, "equivalent_damping", equivalent_damping(own, frequency, height, free))
+        ratios = damping_column(table, points, result.scene.operation.damping)
+        if np.isfinite(ratios).any():
+            table.insert(place, "equivalent_damping", ratios)
     return table
 
 

@@ -14,11 +14,11 @@ from bladefem.scene.tables import Scene
 from bladefem.scene.units import show
 
 from ..scene.units import newtons
-from ..study.pipeline.design_table import equivalent_damping
 from ..util.counted import counted
 from ..view.optimum import at_band_end
 from ..view.response import FOLLOWED, MARCHED
 from .best_load import certainty, flat_range, lowest_found, lowest_resonance, of_same_damper
+from .damping import damping_there
 from .response_points import LINEAR
 
 # of the resonance frequency: farther off, an engine order does not drive it
@@ -82,7 +82,7 @@ def response_answer(
     # one load alone has no optimum, whatever the number of masses
     alone = not by_search and finite["load"].nunique() == 1
     title = "normal load per seat" if alone else "optimum normal load per seat"
-    numbers = _optimum_numbers(summary, best, title, remark)
+    numbers = _optimum_numbers(summary, best, points, title, remark)
     return ResponseAnswer(
         [*numbers, *stress(summary, best), *own_mass(finite, best, own, masses)],
         doubts,
@@ -92,6 +92,7 @@ def response_answer(
 def _optimum_numbers(
     summary: pd.DataFrame,
     best: pd.Series,
+    points: pd.DataFrame | None,
     title: str,
     remark: str,
 ) -> list[tuple[str, str, str]]:
@@ -109,7 +110,7 @@ def _optimum_numbers(
             f"{best['peak_frequency']:.5g} Hz",
             linear_limits_text(of_same_damper(summary, best)),
         ),
-        *damping_there(summary, best),
+        *damping_there(summary, best, points),
     ]
     if np.isfinite(best.get("friction_damping", np.nan)):
         numbers.append(
@@ -122,27 +123,6 @@ def _optimum_numbers(
     elif energy(best):
         numbers.append(("friction work per cycle there", energy(best).split(" of ")[0], ""))
     return numbers
-
-
-def damping_there(summary: pd.DataFrame, best: pd.Series) -> list[tuple[str, str, str]]:
-    """The damping ratio of a linear blade that resonates as the damped one does."""
-    free = summary[summary["load"] == 0]
-    if "equivalent_damping" not in summary or free.empty:
-        return []
-    frequency, amplitude, own = (
-        float(free[name].iloc[0])
-        for name in ("peak_frequency", "peak_amplitude", "equivalent_damping")
-    )
-    there = (best["peak_frequency"], best["peak_amplitude"], (frequency, amplitude))
-    ratio = float(equivalent_damping(own, *there))
-    return [
-        (
-            "equivalent damping ratio there",
-            f"{100 * ratio:.3g} %",
-            f"Q = {1 / (2 * ratio):.3g}: a linear blade so damped would resonate as high; "
-            f"{100 * own:.3g} % without damper",
-        )
-    ]
 
 
 def best_of_studied(finite: pd.DataFrame) -> str:

@@ -19,15 +19,11 @@ MOST_VALUES = 1000
 SUGGESTION_START = "did you mean '"
 # ends of a text that gives a share
 PERCENT = ("%", "percent")
-
-
 # "1,5 g", which half of the world writes for 1.5 g
 _AMBIGUOUS_COMMA = re.compile(r"\s*([+-]?\d+),(\d+\s*[^\s\d.,+-][^,]*?)\s*")
-
-
-# "36,80 N, 90 N": two values or three
 # a number and a word, no power of ten
 _WITH_LETTERS = re.compile(r"\s*[-+]?[\d.]+\s*[a-df-zA-DF-Z]\S*\s*")
+# "36,80 N, 90 N": two values or three
 _MIXED_COMMAS = re.compile(r"\d,\d.*,\s|,\s.*\d,\d")
 
 

@@ -205,8 +205,9 @@ def _show_within(limit: float, unit: str, digits: int, rounding: str) -> str:
     """The nearest number of some digits where it keeps to a limit to rounding, else the next."""
     number, written = _scale_unit(limit, unit or "1")
     nearest = float(f"{number:.{digits}g}")
-    # round-off of a limit such as 0.1 + 0.2 is no reason for another digit
-    if abs(nearest - number) > LIMIT_TOLERANCE * abs(number):
+    # round-off of a limit such as 0.1 + 0.2 is no reason for another digit; half of what a value
+    # may pass its limit by, since reading the number adds round-off of its own
+    if abs(nearest - number) > LIMIT_TOLERANCE / 2 * abs(number):
         nearest = float(Context(prec=digits, rounding=rounding).create_decimal_from_float(number))
     return f"{nearest:.{digits}g} {written}".rstrip()
 

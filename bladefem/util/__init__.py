@@ -1,2 +1,2 @@
 """Progress bars, names that load on first use, ``script_help`` of the demos, ``compile_notice`` of
-kernels."""
+kernels, ``first_rank`` of what one of several processes prints."""

@@ -6,14 +6,13 @@ minutes of processor time: a script would say nothing meanwhile.
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from time import monotonic
 
 from numba.core import event
 
-from .script_help import RANK_VARIABLES
+from .first_rank import is_first_rank
 
 # numba's name of the compilation of one function for one set of types
 COMPILATION = "numba:compile"
@@ -58,7 +57,7 @@ class CompileNotice(event.Listener):
 
 def announce_compilation() -> None:
     """Register the notice of this process, on the first of several ranks."""
-    if all(os.environ.get(name, "0") == "0" for name in RANK_VARIABLES):
+    if is_first_rank():
         event.register(COMPILATION, CompileNotice(_on_error_stream))
 
 

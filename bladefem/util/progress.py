@@ -1,5 +1,6 @@
 """Progress of what takes long, one for all ranks: a bar on a terminal, for what takes over two
-seconds; elsewhere, as in the log of a batch job, a line a minute.
+seconds; elsewhere, as in the log of a batch job, a line as an item begins, at most one a minute. An
+item that takes long, such as one factorisation, is silent.
 
 Long loops take a :data:`Progress` that wraps what they go through; :func:`without_progress` shows
 nothing and is the default.
@@ -49,7 +50,7 @@ def with_progress(
     **options: Any,
 ) -> Iterator[T]:
     """The items, with a bar of the remaining time once two seconds have passed, or with a line on
-    the error stream each :data:`LINE_INTERVAL`.
+    the error stream as an item begins, :data:`LINE_INTERVAL` after the last one at least.
 
     Args:
         items: a list or a generator.

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
-# what Open MPI and MPICH tell each rank of its number
-RANK_VARIABLES = ("OMPI_COMM_WORLD_RANK", "PMI_RANK")
+from .first_rank import is_first_rank
+
 # of a cell of prose, and of any other, in scripts of cells
 PROSE = "# %% [markdown]"
 CELL = "# %%"
@@ -29,7 +28,7 @@ def help_and_exit(script: str) -> None:
     """
     if not {"-h", "--help"} & set(sys.argv[1:]):
         return
-    if any(os.environ.get(name, "0") != "0" for name in RANK_VARIABLES):
+    if not is_first_rank():
         raise SystemExit
     lines = Path(script).read_text(encoding="utf-8").splitlines()
     first = lines.index(PROSE) + 1

@@ -93,8 +93,8 @@ def draw_responses(
 
 
 def _name_loads(ax: Axes, points: pd.DataFrame, colours: dict[float, Any]) -> None:
-    """Each load at the highest of its motions that are not unstable, where there is room: of a
-    dozen colours, neighbours are alike.
+    """Each load at the highest of its motions that are not unstable: of a dozen colours, neighbours
+    are alike.
     """
     shown = points[points["converged"].astype(bool)]
     if "stability" in shown:
@@ -114,7 +114,7 @@ def _name_loads(ax: Axes, points: pd.DataFrame, colours: dict[float, Any]) -> No
             # the lightest colours are hard to read as letters
             color=LETTER_SHADE * np.asarray(matplotlib.colors.to_rgb(colours[row.load])),
         )
-    names_apart(ax)
+    names_apart(ax, keep=True)
 
 
 def _draw_unstable(ax: Axes, unstable: pd.DataFrame) -> None:

@@ -228,8 +228,8 @@ def test_a_file_that_is_no_picture_is_refused(run, tmp_path):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"mode": 3}, "mode = 3, expected 1 to 2"),
-        ({"mode": 0}, "mode = 0, expected 1 to 2"),
+        ({"mode": 3}, "mode = 3, expected a whole number from 1 to 2"),
+        ({"mode": 0}, "mode = 0, expected a whole number from 1 to 2"),
         ({"nodal_diameter": 4}, "nodal_diameter = 4 is not there, expected one of 9"),
     ],
 )
@@ -266,15 +266,25 @@ def test_a_mode_shape_is_a_table_for_other_programs(run, monkeypatch):
     np.testing.assert_allclose(table["uy real"], [0, 3 / size], atol=1e-12)
     assert list(table["x [m]"]) == [0.2, 0.3]
     assert table.attrs == {"frequency": 250.0, "nodal_diameter": 9}
-    with pytest.raises(InputError, match=r"^mode_shape: mode = 3, expected 1 to 2$"):
-        run.mode_shape(3, nodal_diameter=9)
+    for mode, said in ((3, "3"), (0, "0"), (1.5, "1.5"), ("1", "'1'"), (True, "True")):
+        expected = rf"^mode_shape: mode = {said}, expected a whole number from 1 to 2$"
+        with pytest.raises(InputError, match=expected):
+            run.mode_shape(mode, nodal_diameter=9)
+    for diameter in (8, 9.0, "9"):
+        expected = f"^mode_shape: nodal_diameter = {diameter!r} is not there, expected one of 9$"
+        with pytest.raises(InputError, match=expected):
+            run.mode_shape(1, nodal_diameter=diameter)
+    assert len(run.mode_shape(np.int64(2), nodal_diameter=np.int64(9))) == 2
 
 
 def test_a_single_blade_has_no_nodal_diameters(run):
     coordinates = {"nodal_diameter": [-1], "mode": [1]}
     data = xr.Dataset({"frequency": (("nodal_diameter", "mode"), [[1.0]])}, coordinates)
-    with pytest.raises(InputError, match="nodal_diameter = 9 .*expected it to be left out"):
-        run._draw_modes(data, nodal_diameter=9)
+    # what is stored under -1 is not called so
+    for asked in (9, -1):
+        said = f"nodal_diameter = {asked} .*expected it to be left out"
+        with pytest.raises(InputError, match=said):
+            run._draw_modes(data, nodal_diameter=asked)
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):

@@ -124,18 +124,38 @@ def test_late_failures_are_refused_early(override, said):
     assert said in refused(load_scene, WEDGE, [override])
 
 
-def test_the_limits_that_messages_name_are_taken():
-    """The numbers are copied out of the messages, first of the proportions, then of the drawing;
-    they were rounded up, and refused once more.
+@pytest.mark.parametrize("sectors", [70, 80, 92, 100, 104])
+def test_the_seat_width_that_a_message_names_is_taken(sectors):
+    """The number is copied out of the first message; what is refused after it is neither the seat
+    nor a damper that does not fit under it, but another part.
     """
-    limits = []
-    for _ in range(3):
-        given = [f"platform.seat_width={limits[-1]}"] if limits else []
-        said = refused(_draw, SHIPPED, ["disc.sectors=100", *given])
-        if not said.startswith("platform.seat_width"):
-            break
-        limits.append(re.search(r"expected at most (\S+ mm)", said)[1])
-    assert limits == ["2.4268 mm", "2.37 mm"]
+    many = f"disc.sectors={sectors}"
+    said = refused(_draw, SHIPPED, [many])
+    limit = re.search(r"^platform.seat_width = .* expected at most (\S+ mm)", said)[1]
+    try:
+        _draw(SHIPPED, [many, f"platform.seat_width={limit}"])
+    except InputError as other:
+        assert str(other).startswith("aerofoil.chord_root")
+    wider = f"platform.seat_width={1.0001 * parse(limit, 'm')}"
+    assert refused(_draw, SHIPPED, [many, wider]).startswith(("platform.seat_width", "damper.base"))
+
+
+@pytest.mark.parametrize("sectors", [107, 110, 115])
+def test_where_no_seat_fits_it_is_said(sectors):
+    """The widest one is narrower than the least that the field takes."""
+    said = refused(_draw, SHIPPED, [f"disc.sectors={sectors}"])
+    assert said.startswith("platform.seat_width = 6 mm: no seat fits")
+    assert "a seat has 2 mm or more; choose fewer of these, or a smaller shank.width" in said
+    assert "expected at most" not in said
+
+
+def test_a_bar_of_the_named_width_is_taken():
+    """0.95 * 45 mm / 2 is 21.375 mm but for round-off."""
+    sizes = ["z_mass.height=45 mm", "z_mass.width=38 mm"]
+    file = SHIPPED.with_name("zmass.toml")
+    said = refused(_draw, file, [*sizes, "z_mass.bar=22 mm"])
+    assert "expected at most 21.375 mm" in said
+    _draw(file, [*sizes, "z_mass.bar=21.375 mm"])
 
 
 def _draw(file, overrides):

@@ -1,5 +1,7 @@
 """Hertz and punch scenes from the file to the run folder, against closed forms."""
 
+import re
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -8,8 +10,9 @@ from bladefem.cli.main import main
 from bladefem.errors import InputError
 from bladefem.io.stage_cache import read_results
 from bladefem.scene.toml import load_scene, vary
+from bladefem.scene.units import parse
 from bladefem.study.kinds.contact_pairs import solve_pair
-from bladefem.study.kinds.hertz import hertz_load, hertz_radius
+from bladefem.study.kinds.hertz import _check_load, hertz_load, hertz_radius
 
 HERTZ = load_scene("scenes/hertz.toml")
 CYLINDER = load_scene(
@@ -61,6 +64,23 @@ def test_loads_that_the_mesh_cannot_show_are_refused():
         solve_pair(vary(HERTZ, mesh__contact_size=1e-4, mesh__scale=50.0))
     with pytest.raises(InputError, match="expected hertz or punch"):
         solve_pair(load_scene("scenes/plane.toml"))
+
+
+def test_the_ends_of_the_range_that_a_message_names_are_taken():
+    """Over random radii and element sizes, the loads and the element size copied out."""
+    rng = np.random.default_rng(4)
+    for radius, size in rng.uniform([0.9e-3, 8e-5], [1.1e-3, 2e-4], (60, 2)):
+        scene = vary(HERTZ, hertz__contact_radius=radius, mesh__contact_size=size)
+        with pytest.raises(InputError) as refused:
+            _check_load(scene, 1e-3)
+        for end in re.search(r"made for (\S+ k?N) to (\S+ k?N)", str(refused.value)).groups():
+            _check_load(scene, parse(end, "N"))
+        coarse = vary(scene, mesh__scale=50.0)
+        with pytest.raises(InputError) as refused:
+            _check_load(coarse, 1e3)
+        largest = parse(re.search(r"expected at most (\S+ [mu]m)", str(refused.value))[1], "m")
+        # the only load that is left is that of the largest radius
+        _check_load(vary(scene, mesh__contact_size=largest), hertz_load(scene, 1.8 * radius))
 
 
 @pytest.mark.parametrize("kind", ["hertz", "punch"])

@@ -7,8 +7,10 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
+from matplotlib.patheffects import withStroke
 
 from bladefem.view.accuracy import draw_accuracy
+from bladefem.view.response import draw_responses
 from verification.paper.view_outcomes import _round_ticks
 
 
@@ -39,6 +41,37 @@ def test_names_cover_nothing(crowded):
         ]
     )
     assert not any(box.contains(*p) for box in boxes for p in points)
+
+
+def test_every_curve_of_a_crowd_has_its_load():
+    """Ten resonances at nearly one place: names without room next to theirs stand farther away,
+    with a line to it, and none is struck through by a curve.
+    """
+    offset = np.linspace(-2, 2, 41)
+    loads = np.arange(50.0, 60.0)
+    curves = [
+        pd.DataFrame(
+            {
+                "load": load,
+                "frequency": 400 + 0.02 * load + offset,
+                "amplitude": 1e-4 * (1 + 0.002 * load) / (1 + offset**2),
+                "converged": True,
+            }
+        )
+        for load in loads
+    ]
+    points = pd.concat(curves, ignore_index=True)
+    ax = draw_responses(points).axes[0]
+    names = [text for text in ax.texts if text.get_text()]
+    assert sorted(text.get_text() for text in names) == [f"{load:.0f} N" for load in loads]
+    legend = {text.get_text() for text in ax.get_legend().get_texts()}
+    assert {text.get_text() for text in names} <= legend
+    boxes = [text.get_window_extent() for text in names]
+    assert not any(box.count_overlaps(boxes[:i]) for i, box in enumerate(boxes))
+    assert all(isinstance(text.get_path_effects()[0], withStroke) for text in names)
+    joined = [text for text in ax.texts if text.arrow_patch is not None]
+    assert joined and all(text.get_text() == "" for text in joined)
+    assert {text.xyann for text in joined} <= {text.xyann for text in names}
 
 
 def test_ticks_of_a_map_are_round_numbers_among_its_cells():

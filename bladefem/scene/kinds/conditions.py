@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from ..limits import unless_at_most
 from ..tables import Scene
-from ..units import LIMIT_TOLERANCE, show, show_most
+from ..units import show
 
 # faces and node sets that a force can act on, of every blade that is drawn here
 BLADE_FACES = (
@@ -49,8 +50,8 @@ def at_most(
     limit: float,
     what: str,
 ) -> Iterator[str]:
-    if value > limit * (1 + LIMIT_TOLERANCE):
-        yield f"{name} = {show(value, 'm')}: expected at most {show_most(limit, 'm')}, {what}"
+    if expected := unless_at_most(value, limit):
+        yield f"{name} = {show(value, 'm')}: expected {expected}, {what}"
 
 
 def one_of(

@@ -8,7 +8,6 @@ from ..tables import Scene
 from .conditions import (
     PLANE_FIELDS,
     STRAIGHT_FIELDS,
-    at_most,
     below_limit,
     isotropic,
     one_of,
@@ -24,7 +23,6 @@ def conditions(scene: Scene) -> Iterator[str]:
     yield from below_limit(
         "hertz.contact_radius", hertz.contact_radius, hertz.half_width, "hertz.half_width"
     )
-    yield from at_most("hertz.half_width", hertz.half_width, hertz.radius, "hertz.radius")
     if scene.mesh.contact_size is not None:
         yield from below_limit(
             "mesh.contact_size",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..tables import Scene
-from .conditions import BLADE_FACES, PLANE_FIELDS, at_most, below_limit
+from .conditions import BLADE_FACES, PLANE_FIELDS, below_limit
 from .record import ENGINE_TABLES, Kind, SceneCall
 
 
@@ -14,12 +14,6 @@ def conditions(scene: Scene) -> Iterator[str]:
     yield from below_limit("plane.platform_width", plane.platform_width, plane.pitch, "plane.pitch")
     yield from below_limit(
         "plane.thickness", plane.thickness, plane.platform_width, "plane.platform_width"
-    )
-    yield from at_most(
-        "plane.seat_width",
-        plane.seat_width,
-        (plane.platform_width - plane.thickness) / 2,
-        "the overhang of the platform next to the blade",
     )
     yield from below_limit(
         "plane.platform_height",

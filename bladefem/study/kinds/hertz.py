@@ -24,8 +24,9 @@ from ...contact.hertz import MIN_ELEMENTS_PER_RADIUS, contact_modulus, line_widt
 from ...contact.patch import initial_gap, make_patch, normal_ports, port_matrix
 from ...data import PressureMap
 from ...errors import InputError, NotSolvedError
+from ...scene.limits import unless_at_least, unless_at_most
 from ...scene.tables import Scene
-from ...scene.units import show
+from ...scene.units import show, show_least, show_most
 from ...util.communicator import Communicator
 from ..pipeline.scene_mesh import build_mesh
 from .punch import held_port_flexibility
@@ -159,19 +160,18 @@ def _check_load(scene: Scene, load: float) -> None:
     low, high = (
         hertz_load(scene, a) for a in (MIN_ELEMENTS_PER_RADIUS * fine, MAX_RADIUS_RATIO * expected)
     )
-    if low > high:
-        # no load would do
+    # of larger ones no load would do
+    if largest := unless_at_most(fine, MAX_RADIUS_RATIO * expected / MIN_ELEMENTS_PER_RADIUS):
         raise InputError(
             f"hertz.contact_radius = {show(expected, 'm')}: too small for elements of "
-            f"{show(fine, 'm')} on the contact, expected at most "
-            f"{show(MAX_RADIUS_RATIO * expected / MIN_ELEMENTS_PER_RADIUS, 'm')}; choose a smaller "
+            f"{show(fine, 'm')} on the contact, expected {largest}; choose a smaller "
             "mesh.contact_size or mesh.scale"
         )
-    if not low <= load <= high:
+    if unless_at_least(load, low, "N") or unless_at_most(load, high, "N"):
         raise InputError(
             f"{_said(scene, load)}: the contact radius would be "
             f"{show(hertz_radius(scene, load), 'm')}, hertz.contact_radius and mesh.contact_size "
-            f"are made for {show(low, 'N')} to {show(high, 'N')}"
+            f"are made for {show_least(low, 'N')} to {show_most(high, 'N')}"
         )
 
 

@@ -39,8 +39,8 @@ def design_table(curves: list[Curve], limits: Sequence[Limit]) -> dict[str, np.n
 def equivalent_damping(
     own: float, frequency: npt.ArrayLike, amplitude: npt.ArrayLike, free: tuple[float, float]
 ) -> RealArray:
-    """(rows,) damping ratios of linear blades that resonate as high, at the same frequencies, under
-    the same force.
+    """(rows,) damping ratios of linear blades with the same amplitudes, at the same frequencies,
+    under the same force; NaN where that is no positive number, as without damping or motion.
 
     A mode of mass m under the force F resonates with the amplitude F / (2 zeta m omega^2), so that
     the ratio is the blade's own times the ratio of amplitudes and the square of that of
@@ -52,8 +52,10 @@ def equivalent_damping(
         amplitude: (rows,) of the resonances, in the unit of the one without damper.
         free: frequency and amplitude without damper.
     """
-    shift = free[0] / np.asarray(frequency, dtype=float)
-    return np.asarray(own * free[1] / np.asarray(amplitude, dtype=float) * shift**2)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        shift = free[0] / np.asarray(frequency, dtype=float)
+        ratio = own * free[1] / np.asarray(amplitude, dtype=float) * shift**2
+    return np.asarray(np.where(np.isfinite(ratio) & (ratio > 0), ratio, np.nan))
 
 
 def _row(c: Curve) -> dict[str, Any]:
