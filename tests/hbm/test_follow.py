@@ -20,8 +20,9 @@ from bladefem.hbm.parameters import vary
 from bladefem.hbm.response import response
 from bladefem.hbm.solution import size
 from bladefem.hbm.solve import solve
-from bladefem.hbm.solver.arclength import path_distance
-from bladefem.hbm.solver.newton import Options
+from bladefem.hbm.solver import arclength as arclength_module
+from bladefem.hbm.solver.arclength import path_distance, spot_at
+from bladefem.hbm.solver.newton import DEFAULT_OPTIONS, Options
 from bladefem.hbm.solver.residual import Balance, evaluate_balance
 from bladefem.reduction.matrices import port_model_from_matrices
 
@@ -254,3 +255,21 @@ def test_the_mean_place_of_a_contact_counts_little_in_the_length_of_a_path():
     mean[:, :, 0] = 1.0
     moving[:, :, 1] = 1.0
     assert path_distance(one, mean) == pytest.approx(0.1 * path_distance(one, moving))
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_corner_without_a_finite_direction_has_no_way_on(monkeypatch):
+    """A wedge with ground faces under 1100 N asked for a balance at NaN rad/s there, with a warning
+    of NumPy among the messages of the run.
+    """
+    model = single_mass()
+    start = solve(model, 0.6, 3, 128)
+    task, x, balance, state = continuation._prepare_path(
+        model, "omega", start, (0.5, 1.8), DEFAULT_OPTIONS
+    )
+    task = replace(task, compiled=None)
+    spot = spot_at(task, x, balance, state, 0, 1.0)
+    monkeypatch.setattr(
+        arclength_module, "linearise_balance", lambda *given: lambda vector: np.nan * vector
+    )
+    assert arclength_module._around_corner(task, spot, 0.01) is None

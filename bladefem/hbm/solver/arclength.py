@@ -274,6 +274,8 @@ def _plain_spot(
         w = now.state.w
         off = _product(dw, w - start) / size + dx * (now.x - begun) / task.width
         change = (_product(dw, back) / size - off) / (dx / task.width - _product(dw, along) / size)
+        if not np.isfinite(change):
+            raise np.linalg.LinAlgError("the step along the path is not finite")
         return _guess_at(task, now.x + change, w - back - change * along, spot.walk)
 
     run = iterate_newton(
@@ -336,6 +338,8 @@ def _around_corner(
             inverse = linearise_balance(balance, state, task.memory)
             slope = -inverse(residual_rate(balance, state, task.name)) * task.width / size
         except np.linalg.LinAlgError:
+            continue
+        if not np.isfinite(slope).all():
             continue
         length = 1.0 / np.sqrt(_product(slope, slope) + 1.0)
         for sign in (1.0, -1.0):
