@@ -13,7 +13,7 @@ import numpy as np
 
 from bladefem.errors import InputError
 from bladefem.scene.limits import unless_at_least, unless_at_most
-from bladefem.scene.units import LIMIT_TOLERANCE, show, show_exactly, show_most
+from bladefem.scene.units import LIMIT_TOLERANCE, show, show_most
 
 from .parameters import Disc, Root, Shank
 
@@ -105,7 +105,7 @@ def _check_neck(root: Root, shank: Shank, disc: Disc) -> None:
         )
     wider = f" or {expected}" if widened <= widest else ""
     raise InputError(
-        f"root.neck = {show(neck, 'm')}: expected shank.width = {show_exactly(shank.width, 'm')}"
+        f"root.neck = {show(neck, 'm')}: expected shank.width = {show(shank.width, 'm', 12)}"
         f"{wider}, since the shank stands on the root"
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from bladefem.errors import InputError
 from bladefem.scene.limits import unless_at_least, unless_at_most
-from bladefem.scene.units import LIMIT_TOLERANCE, show, show_exactly, show_most
+from bladefem.scene.units import LIMIT_TOLERANCE, show, show_most
 
 from .fillet import platform_room
 from .parameters import Aerofoil, Disc, Platform, Root, Shank, Shroud, Wedge
@@ -97,7 +97,7 @@ def _no_strip(name: str, value: float, limits: dict[str, float]) -> None:
     other, limit = min(limits.items(), key=lambda item: item[1])
     if unless_at_most(value, limit):
         # rounded, the very length would leave a strip
-        named, strip = show_exactly(limit, "m"), ""
+        named, strip = show(limit, "m", 12), ""
         if limit not in fitting:
             named, strip = show_most(max(fitting), "m"), ", less a strip as wide as an element"
         raise InputError(
@@ -184,7 +184,7 @@ def _check_seat(
     """The seat fits next to the shank."""
     widest = widest_seat(platform, shank, disc, wedge)
     where = f"the platform's overhang next to the shank with {_count(disc)}"
-    cure = "fewer of these, or a smaller shank.width or damper.angle"
+    cure = "fewer disc.sectors, or a smaller shank.width or damper.angle"
     if not unless_at_most(platform.seat_width, widest):
         return
     if widest < NARROWEST_SEAT:
@@ -196,6 +196,7 @@ def _check_seat(
     clear = _clear_seat(platform, shank, disc, wedge, widest)
     if clear < widest:
         where = f"so that the damper keeps clear of the shank with {_count(disc)}"
+        cure = "fewer disc.sectors, or a smaller shank.width, damper.angle or damper.base"
     raise InputError(
         f"platform.seat_width = {show(platform.seat_width, 'm')} is too large: expected at most "
         f"{show_most(clear, 'm')} ({where}); or choose {cure}"

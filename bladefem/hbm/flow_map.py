@@ -206,6 +206,7 @@ def _carry(bodies, nodes, acts, steps):
         if not np.array_equal(acts[j], acts[last]):
             acting = _forces_of(bodies.force, d, acts[j])
             carried = _columns(bodies.carried, acting)
+            changed = True
         following = _rows_of(d, acts[j], acts[(j + 1) % S])
         if not np.array_equal(following, rows):
             rows = following

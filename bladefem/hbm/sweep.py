@@ -119,8 +119,10 @@ def _followed(
         lost: circular frequencies that the first look did not solve.
     """
     for point in _lost_ends(search, band, solved, lost):
-        solved[point.omega] = point
-        yield point
+        # a path may cross the others
+        if point.converged:
+            solved[point.omega] = point
+            yield point
     points = list(solved.values())
     found = find_branches(
         search.model,

@@ -13,6 +13,9 @@ from ..util.percent import percent
 from ..view.optimum import at_band_end
 from .best_load import error_words, of_same_damper
 
+# relative error up to which its parts may be added: the ratio is one over the amplitude
+LARGEST_TOLD = 0.5
+
 
 def damping_column(table: pd.DataFrame, points: pd.DataFrame, own: float) -> RealArray:
     """(rows,) equivalent damping ratios of a design table; NaN where no resonance was seen, in all
@@ -78,6 +81,8 @@ def damping_error_words(summary: pd.DataFrame, best: pd.Series, frequency: float
     square = 2 * np.nan_to_num(frequency)
     total = error + square
     parts = [f"{percent(square)} by the frequency"] if square > 0 else []
+    if np.isnan(frequency):
+        parts.append("the frequency apart")
     free = _without_damper(summary)
     stuck = of_same_damper(summary[np.isinf(summary["load"])], best)
     shape = np.nan
@@ -88,6 +93,8 @@ def damping_error_words(summary: pd.DataFrame, best: pd.Series, frequency: float
         parts.append(f"{percent(shape)} by the mode's shape, as in full stick")
     else:
         parts.append("the mode's changed shape apart")
+    if total > LARGEST_TOLD:
+        return f"error not told, above {percent(LARGEST_TOLD)}"
     return f"± {percent(max(total, 1e-4))} ({', '.join(parts)})"
 
 

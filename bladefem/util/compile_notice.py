@@ -18,6 +18,8 @@ from .first_rank import is_first_rank
 COMPILATION = "numba:compile"
 # of all compilations so far, before it is said [s]
 SILENT_SECONDS = 2.0
+# whose kernels they are
+PACKAGES = ("bladefem", "geometry")
 NOTICE = (
     "bladefem: compiling kernels for this machine, which takes some minutes in all; they are kept "
     "for later runs"
@@ -37,12 +39,16 @@ class CompileNotice(event.Listener):
         self._said = False
 
     def on_start(self, event: event.Event) -> None:
+        if not _is_own(event):
+            return
         if self._open == 0:
             self._begun = self._clock()
         self._open += 1
         self._look(self._clock())
 
     def on_end(self, event: event.Event) -> None:
+        if not _is_own(event):
+            return
         now = self._clock()
         self._look(now)
         self._open = max(self._open - 1, 0)
@@ -53,6 +59,11 @@ class CompileNotice(event.Listener):
         if not self._said and self._spent + now - self._begun > SILENT_SECONDS:
             self._said = True
             self._say(NOTICE)
+
+
+def _is_own(event: event.Event) -> bool:
+    """A kernel of this package is compiled, none of the user's own."""
+    return event.data["dispatcher"].py_func.__module__.split(".")[0] in PACKAGES
 
 
 def announce_compilation() -> None:

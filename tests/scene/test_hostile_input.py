@@ -145,7 +145,7 @@ def test_where_no_seat_fits_it_is_said(sectors):
     """The widest one is narrower than the least that the field takes."""
     said = refused(_draw, SHIPPED, [f"disc.sectors={sectors}"])
     assert said.startswith("platform.seat_width = 6 mm: no seat fits")
-    assert "a seat has 2 mm or more; choose fewer of these, or a smaller shank.width" in said
+    assert "a seat has 2 mm or more; choose fewer disc.sectors, or a smaller shank.width" in said
     assert "expected at most" not in said
 
 

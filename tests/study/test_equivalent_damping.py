@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 
 from bladefem import balance as bf
-from bladefem.report.damping import damping_column
+from bladefem.report.damping import damping_column, damping_error_words
 from bladefem.report.headlines import headlines
 from bladefem.report.statements import response_answer
 from bladefem.study.pipeline.design_table import equivalent_damping
@@ -120,3 +120,20 @@ def test_without_damping_or_motion_there_is_none(own, amplitude, free):
     summary.loc[0, ["peak_amplitude", "equivalent_damping"]] = free, own
     summary.loc[2, "peak_amplitude"] = amplitude
     assert headline(summary, points) is None
+
+
+@pytest.mark.parametrize(
+    ("error", "frequency", "words"),
+    [
+        (0.05, 0.01, "± 17 % (2 % by the frequency, 10 % by the mode's shape, as in full stick)"),
+        (0.05, np.nan, "± 15 % (the frequency apart, 10 % by the mode's shape, as in full stick)"),
+        (0.45, 0.01, "error not told, above 50 %"),
+    ],
+)
+def test_the_parts_of_the_error_are_told(error, frequency, words):
+    """Those that are not known are named; errors that are no small ones are not added."""
+    summary = pd.DataFrame(
+        {"load": [0.0, 70.0, np.inf], "equivalent_damping": [0.001, 0.02, 0.0011]}
+    )
+    best = pd.Series({"load": 70.0, "error": error})
+    assert damping_error_words(summary, best, frequency) == words

@@ -1,11 +1,18 @@
 """Compiling for longer than two seconds is said once, on one rank."""
 
+from types import SimpleNamespace
+
 import numba
 import pytest
 from numba.core import event
 
 from bladefem.util import compile_notice
 from bladefem.util.compile_notice import COMPILATION, NOTICE, CompileNotice, announce_compilation
+
+# what numba says of a compilation
+KERNEL = SimpleNamespace(
+    data={"dispatcher": SimpleNamespace(py_func=SimpleNamespace(__module__="bladefem.hbm.kernel"))}
+)
 
 
 @pytest.mark.parametrize(
@@ -24,24 +31,33 @@ def test_the_time_of_compilations_is_summed(moments, said):
     clock = [0.0]
     notice = CompileNotice(lines.append, lambda: clock[0])
     for what, clock[0] in moments:
-        (notice.on_start if what == "start" else notice.on_end)(None)
+        (notice.on_start if what == "start" else notice.on_end)(KERNEL)
     assert lines == [NOTICE] * said
 
 
-@pytest.mark.parametrize(("rank", "said"), [("0", 1), ("1", 0)])
-def test_numba_tells_of_its_compilations(rank, said, monkeypatch, capsys):
+@pytest.mark.parametrize(
+    ("rank", "module", "said"),
+    [("0", "bladefem.kernels", 1), ("1", "bladefem.kernels", 0), ("0", "users_script", 0)],
+)
+def test_numba_tells_of_its_compilations(rank, module, said, monkeypatch, capsys):
+    """Those of kernels, not of functions that users compile themselves."""
     monkeypatch.setenv("OMPI_COMM_WORLD_RANK", rank)
     monkeypatch.setattr(compile_notice, "SILENT_SECONDS", -1.0)
     added = []
     with monkeypatch.context() as patch:
         patch.setattr(event, "register", lambda kind, one: added.append((kind, one)))
         announce_compilation()
-    assert [kind for kind, _ in added] == [COMPILATION] * said
+    assert [kind for kind, _ in added] == [COMPILATION] * (rank == "0")
     # the notice of this process, registered when kernels were imported, would speak as well
     monkeypatch.setitem(event._registered, COMPILATION, [])
     for each in added:
         event.register(*each)
-    numba.njit(lambda x: x + 1)(1)
+
+    def compiled(x):
+        return x + 1
+
+    compiled.__module__ = module
+    numba.njit(compiled)(1)
     for each in added:
         event.unregister(*each)
     assert capsys.readouterr().err.count(NOTICE) == said

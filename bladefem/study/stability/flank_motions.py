@@ -29,7 +29,7 @@ MAX_MAXIMA = 4
 # steps to better neighbours: where the blade bounces the ends of bands scatter, and one of some
 # neighbours is always a little higher
 MAX_STEPS_BESIDE = 3
-# operations that one march may need: 0.6 s of the shipped wedge, 1.5 s with stiff layers
+# operations that one march may need: 0.7 s of the shipped wedge, up to 2 s with stiff layers
 MAX_COUNTED = 3e10
 
 
