@@ -105,7 +105,7 @@ def _check_neck(root: Root, shank: Shank, disc: Disc) -> None:
         )
     wider = f" or {expected}" if widened <= widest else ""
     raise InputError(
-        f"root.neck = {show(neck, 'm')}: expected shank.width = {show(shank.width, 'm', 12)}"
+        f"root.neck = {show(neck, 'm')}: expected shank.width = {show(shank.width, 'm', 13)}"
         f"{wider}, since the shank stands on the root"
     )
 

@@ -96,8 +96,8 @@ def _no_strip(name: str, value: float, limits: dict[str, float]) -> None:
     fitting = [length for length in (*limits.values(), *clear) if _leaves_no_strip(length, limits)]
     other, limit = min(limits.items(), key=lambda item: item[1])
     if unless_at_most(value, limit):
-        # rounded, the very length would leave a strip
-        named, strip = show(limit, "m", 12), ""
+        # to LIMIT_TOLERANCE: rounded, the very length would leave a strip
+        named, strip = show(limit, "m", 13), ""
         if limit not in fitting:
             named, strip = show_most(max(fitting), "m"), ", less a strip as wide as an element"
         raise InputError(
