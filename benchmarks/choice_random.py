@@ -11,9 +11,9 @@ as they are.
 Seeds at 2 %, on an idle machine, one process a core; of CPU time, that of the rich model is 1:
 
     seeds             in the band    wrong    too low    unknown    all     median    above 1.1
-    even, to 160      80             0        0          0          0.11    0.49      5
-    odd, to 101       45             0        0          2          0.30    0.59      6
-    both              125            0        0          2          0.21    0.54      11
+    even, to 160      80             0        0          0          0.11    0.50      5
+    odd, to 101       45             0        0          2          0.28    0.60      5
+    both              125            0        0          2          0.20    0.53      10
     both, before      125            0        0          2          0.25    0.64      15
 
 Before: paths, slopes and points with two tangents not compiled, the same day. Seeds 4, 73 and 95
@@ -41,7 +41,7 @@ Above 1.1 at 2 % for another reason than the time of Python (164 and 192 are non
     61      1.8     needs 15 harmonics, with 128 samples whose points are harder than those of 1024
     67      1.2     followed round folds, as the rich model is, in 390 ms; two judges end elsewhere
     79, 85  1.2     followed round folds, as the rich model is, in 50 to 60 ms
-    95      5       needs 31 harmonics
+    95      0.5     needs 31 harmonics; the rich model is followed round folds
     164     3.0     a flank asks for 15 harmonics, whose points are hard with few samples
     192     7       needs 31 harmonics, which 63 judge in 2.7 s; those of 15 are 1.6 % off
 The other ones (62, 100, 126, 134) take 8 to 30 ms, most of it Python.
