@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from ..util.arrays import IntegerArray
 from ..util.numba_options import INNER_KERNEL, KERNEL
 from .closed_contacts import OpenContacts
 from .linear.array_copy import copy_matrix
@@ -81,7 +82,7 @@ def flow_map(
     return mapped
 
 
-def acting_forces(contacts: OpenContacts, nodes: NodeSteps) -> np.ndarray:
+def acting_forces(contacts: OpenContacts, nodes: NodeSteps) -> IntegerArray:
     """(S,) number of forces that there are after each step: open nodes have none."""
     n, d = nodes.before.shape[1:3]
     each = np.count_nonzero(contacts.force.reshape(n, d) >= 0, axis=1)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import linalg
 
-from .flow_map import flow_map
+from .flow_map import acting_forces, flow_map
 from .model import ReducedModel
 from .sector_modes import (
     SectorModes,
@@ -89,7 +89,7 @@ def class_growth(
     S = r * -(-max(instants, 16 * (solution.harmonics + 1)) // r)
     ring = _class_ring(bodies, r, angle)
     contacts, nodes = linearised_contacts(model, solution, ring, S, copies=2)
-    if map_operations(contacts, nodes, r) > most:
+    if map_operations(contacts, acting_forces(contacts, nodes), r) > most:
         return Growth()
     part = flow_map(contacts, nodes, 2 * np.pi / solution.omega / S, S // r)
     handed = _handed_on(ring, part, angle)

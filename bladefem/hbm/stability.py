@@ -25,7 +25,7 @@ from scipy import linalg
 
 from ..errors import InputError
 from ..friction.fourier import synthesis
-from ..util.arrays import RealArray
+from ..util.arrays import IntegerArray, RealArray
 from .closed_contacts import OpenContacts, coupled_groups, open_contacts
 from .flow_map import NodeSteps, acting_forces, flow_map
 from .linearised_flow import contact_steps
@@ -170,9 +170,11 @@ def _leading(
     S = system.blades * -(-S // system.blades)
     if _operations_from_states(model, solution, system, S) > most:
         return None
-    contacts, nodes = from_fewest_forces(*linearised_contacts(model, solution, system, S))
-    if map_operations(contacts, nodes, system.blades) > most:
+    contacts, nodes = linearised_contacts(model, solution, system, S)
+    forces = acting_forces(contacts, nodes)
+    if map_operations(contacts, forces, system.blades) > most:
         return None
+    nodes = begun_at(nodes, int(forces.argmin()))
     dt = 2 * np.pi / solution.omega / S
     part = flow_map(contacts, nodes, dt, S // system.blades, single=single)
     # open nodes have no force to be disturbed: their multipliers are zero
@@ -213,13 +215,15 @@ def _handed_on(system: SectorModes, part: np.ndarray) -> np.ndarray:
     )
 
 
-def map_operations(contacts: OpenContacts, nodes: NodeSteps, blades: int) -> float:
-    """Operations of carrying all disturbances through 1/r of a period, and of the multipliers."""
+def map_operations(contacts: OpenContacts, forces: IntegerArray, blades: int) -> float:
+    """Operations of carrying all disturbances through 1/r of a period, and of the multipliers.
+
+    Args:
+        forces: (S,) number of forces after each step, see `flow_map.acting_forces`.
+    """
     rows, M = contacts.reading.shape
-    coupled = _coupled_operations(contacts.groups)
-    forces = acting_forces(contacts, nodes).astype(float)
     read = forces * rows / max(contacts.push.shape[1], 1)
-    return _operations(M, coupled, forces, read, blades)
+    return _operations(M, _coupled_operations(contacts.groups), forces.astype(float), read, blades)
 
 
 def _operations_from_states(
@@ -296,12 +300,11 @@ def linearised_contacts(
     return contacts, NodeSteps(*(ring[:, moving] for ring in rings))
 
 
-def from_fewest_forces(contacts: OpenContacts, nodes: NodeSteps) -> tuple[OpenContacts, NodeSteps]:
-    """The same with the instant first at which most nodes are open: multipliers do not depend on
-    where a period begins, and there are fewer disturbances to carry.
+def begun_at(nodes: NodeSteps, first: int) -> NodeSteps:
+    """The steps of a period that begins at another instant: multipliers do not depend on it, and
+    where most nodes are open there are fewer disturbances to carry.
     """
-    first = int(acting_forces(contacts, nodes).argmin())
-    return contacts, NodeSteps(*(np.roll(part, -first, axis=0) for part in nodes))
+    return NodeSteps(*(np.roll(part, -first, axis=0) for part in nodes))
 
 
 def _prescribed_normal(model: ReducedModel, S: int) -> tuple[np.ndarray, np.ndarray]:

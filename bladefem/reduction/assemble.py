@@ -13,6 +13,7 @@ from scipy.linalg import block_diag
 
 from ..data import PortModel
 from ..errors import InputError
+from ..util.nodal_diameter import excited_diameter
 
 
 def folded_diameter(
@@ -23,8 +24,8 @@ def folded_diameter(
     """Nodal diameter 0..N/2 in which a harmonic moves, and whether the conjugate of that diameter's
     modes is meant.
     """
-    n = harmonic * engine_order % sectors
-    return (sectors - n, True) if 2 * n > sectors else (n, False)
+    order = harmonic * engine_order
+    return excited_diameter(order, sectors), 2 * (order % sectors) > sectors
 
 
 def pair_model(

@@ -25,7 +25,7 @@ from ..scene.toml import dump_scene
 from ..scene.units import show
 from ..study.modes.campbell import Campbell
 from ..study.modes.comparison import family_table
-from ..study.modes.crossings import fold_order, wave_sense
+from ..study.modes.crossings import wave_sense
 from ..study.modes.linear_response_report import stress_states, stress_table
 from ..study.modes.survey import (
     ORDERS_ABOVE,
@@ -38,6 +38,7 @@ from ..study.modes.survey import (
 from ..study.pipeline.run_records import ModalRun, folder_of
 from ..study.pipeline.stage_inputs import all_declared
 from ..util.communicator import Communicator
+from ..util.nodal_diameter import excited_diameter
 from ..util.percent import percent
 from ..util.progress import Progress, without_progress
 from ..view import convergence, forced, mesh, modes, speed
@@ -413,7 +414,7 @@ def _speed_drawings(
     table = found.table
     if "nodal_diameter" in table:
         count = sector_of(result.run.mesh).count
-        excited = {fold_order(order, count) for order in orders}
+        excited = {excited_diameter(order, count) for order in orders}
         table = table[table["nodal_diameter"].isin(excited)]
     given = order_is_given(given_fields(folder_of(result.run)))
     own = "" if given else f"; engine order {scene.excitation.engine_order} is the default"

@@ -25,6 +25,7 @@ from ..scene.tables import Scene
 from ..scene.toml import load_scene
 from ..scene.units import newtons
 from ..study.pipeline.seated_loads import seating_stage
+from ..util.nodal_diameter import excited_diameter
 from ..util.picture_files import PICTURES
 from ..view import contact, hysteresis, modes, response
 from .tables import COLUMNS
@@ -283,7 +284,8 @@ class RunFolder:
         if wanted is None:
             order = self.scene.excitation.engine_order
             sectors = 0 if self.mesh.sector is None else self.mesh.sector.count
-            wanted = min(known, key=lambda n: abs(n - _folded(order, sectors)))
+            excited = excited_diameter(order, sectors) if sectors else order
+            wanted = min(known, key=lambda n: abs(n - excited))
         # the modes of a body without cyclic faces are stored under -1
         listed = [int(n) for n in known if n >= 0]
         if nodal_diameter is not None and not (_is_whole(wanted) and wanted in listed):
@@ -339,14 +341,6 @@ def _is_whole(value: object) -> bool:
 def _as_given(value: object) -> str:
     """A count plainly, other values as Python writes them: '1' in quotes is none."""
     return str(value) if _is_whole(value) else repr(value)
-
-
-def _folded(order: int, sectors: int) -> int:
-    """The nodal diameter that an engine order excites."""
-    if not sectors:
-        return order
-    rest = order % sectors
-    return min(rest, sectors - rest)
 
 
 def _patches(scene: Scene, folder: Path) -> list[Patch]:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from math import pi
 
+from ..util.nodal_diameter import excited_diameter
 from .fields import value_at
 from .kinds import kind_named
 from .tables import Scene
@@ -21,8 +22,7 @@ def excited_wave(scene: Scene) -> str:
     order = scene.excitation.engine_order
     if not count or not order:
         return ""
-    folded = order % count
-    diameter = min(folded, count - folded)
+    diameter = excited_diameter(order, count)
     speed = scene.operation.speed
     hertz = order * speed / (2 * pi)
     at_speed = f", at {speed * RPM:.5g} rpm with {hertz:.5g} Hz" if speed > 0 else ""

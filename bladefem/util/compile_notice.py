@@ -62,8 +62,9 @@ class CompileNotice(event.Listener):
 
 
 def _is_own(event: event.Event) -> bool:
-    """A kernel of this package is compiled, none of the user's own."""
-    return event.data["dispatcher"].py_func.__module__.split(".")[0] in PACKAGES
+    """A kernel of this package is compiled, none of the user's own, and no loop without a name."""
+    module = getattr(event.data["dispatcher"].py_func, "__module__", None) or ""
+    return module.split(".")[0] in PACKAGES
 
 
 def announce_compilation() -> None:

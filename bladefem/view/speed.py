@@ -18,6 +18,7 @@ from matplotlib.patheffects import withStroke
 
 from ..scene.units import RPM
 from ..study.modes.crossings import CLOSE_MARGIN
+from ..util.nodal_diameter import excited_diameter
 from .style import COLOURS, FAILED_COLOUR, canvas
 
 if TYPE_CHECKING:
@@ -309,7 +310,7 @@ def draw_interference(
         last = min(int(np.ceil(2 * np.pi * top / max(speed, 1e-9))), 6 * sectors, 2000)
         every = np.arange(last + 1)
         ax.plot(
-            folded(every, sectors),
+            excited_diameter(every, sectors),
             every * speed / (2 * np.pi),
             "-",
             color="#999999",
@@ -339,7 +340,7 @@ def draw_excitations(
     """Chosen engine orders on the folded line, with rings round modes that are too near."""
     rings = []
     for i, order in enumerate(orders):
-        n = int(folded(np.array(order), sectors))
+        n = excited_diameter(order, sectors)
         f = order * speed / (2 * np.pi)
         ax.plot(n, f, "P", color="black", ms=7, zorder=4, label=None if i else "engine order")
         # below its mark, as beside it the next order's mark may lie; not across the axis
@@ -372,9 +373,3 @@ def draw_excitations(
             zorder=5,
             label=f"closer than {100 * CLOSE_MARGIN:.3g} %",
         )
-
-
-def folded(orders: np.ndarray, sectors: int) -> np.ndarray:
-    """Nodal diameters 0..N/2 that engine orders excite."""
-    rest = orders % sectors
-    return np.minimum(rest, sectors - rest)

@@ -4,7 +4,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
-import pytest
 
 from bladefem.report.modes import drawn_orders
 from bladefem.scene.tables import Scene
@@ -12,7 +11,6 @@ from bladefem.scene.toml import vary
 from bladefem.study.modes.crossings import (
     campbell_crossings,
     crossing_margins,
-    fold_order,
     interference_table,
 )
 from bladefem.study.modes.survey import orders_remark
@@ -21,14 +19,6 @@ from bladefem.study.modes.survey import orders_remark
 def southwell(speeds, still=300.0, factor=1.7):
     """f^2 = f0^2 + B (speed / 2 pi)^2."""
     return np.sqrt(still**2 + factor * (speeds / (2 * np.pi)) ** 2)
-
-
-@pytest.mark.parametrize(
-    "order, sectors, diameter",
-    [(6, 36, 6), (30, 36, 6), (36, 36, 0), (18, 36, 18), (43, 36, 7), (0, 12, 0)],
-)
-def test_engine_orders_fold_to_nodal_diameters(order, sectors, diameter):
-    assert fold_order(order, sectors) == diameter
 
 
 def test_crossing_of_a_southwell_line_is_exact_with_three_speeds():

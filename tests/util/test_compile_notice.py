@@ -35,6 +35,16 @@ def test_the_time_of_compilations_is_summed(moments, said):
     assert lines == [NOTICE] * said
 
 
+def test_a_loop_that_numba_takes_out_of_a_function_is_no_kernel_of_ours():
+    """Its compilation has no Python function."""
+    loop = SimpleNamespace(data={"dispatcher": SimpleNamespace(py_func=None)})
+    lines = []
+    notice = CompileNotice(lines.append, iter([0.0, 9.0]).__next__)
+    notice.on_start(loop)
+    notice.on_end(loop)
+    assert not lines
+
+
 @pytest.mark.parametrize(
     ("rank", "module", "said"),
     [("0", "bladefem.kernels", 1), ("1", "bladefem.kernels", 0), ("0", "users_script", 0)],

@@ -9,13 +9,12 @@ from test_pictures import ink
 from bladefem.scene.kinds import kind_named
 from bladefem.scene.tables import Scene
 from bladefem.scene.toml import vary
-from bladefem.study.modes.crossings import campbell_crossings, fold_order
+from bladefem.study.modes.crossings import campbell_crossings
 from bladefem.view.convergence import draw_convergence
 from bladefem.view.speed import (
     draw_campbell,
     draw_interference,
     draw_nodal_diameters,
-    folded,
     spread_labels,
 )
 
@@ -87,12 +86,6 @@ def test_numbers_of_low_engine_orders_do_not_cross_the_axis():
     assert len(numbers) == 8
     floor = ax.get_window_extent().y0
     assert all(text.get_window_extent().y0 > floor for text in numbers)
-
-
-def test_folding_is_that_of_the_tables():
-    orders = np.arange(60)
-    for sectors in (7, 12):
-        assert folded(orders, sectors).tolist() == [fold_order(int(k), sectors) for k in orders]
 
 
 @pytest.mark.parametrize(

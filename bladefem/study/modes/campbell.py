@@ -21,12 +21,12 @@ from ...data import ModeSet
 from ...errors import InputError
 from ...scene.fields import convert_value, field_at, split_values
 from ...scene.units import is_plain, parse
+from ...util.nodal_diameter import excited_diameter
 from ..pipeline.bodies import Bodies, is_wheel
 from ..pipeline.normal_modes import eigensolver
 from .crossings import (
     campbell_crossings,
     crossing_margins,
-    fold_order,
     interference_table,
     wave_sense,
 )
@@ -75,7 +75,7 @@ def campbell_tables(
     """
     sectors = sector_of(bodies.mesh).count if is_wheel(bodies.mesh) else 0
     operating = bodies.scene.operation.speed
-    diameters = sorted({fold_order(order, sectors) for order in orders}) if sectors else None
+    diameters = sorted({excited_diameter(order, sectors) for order in orders}) if sectors else None
     all_speeds = sorted({*speeds, operating})
     models = speed_models(bodies, all_speeds, diameters, count)
     table = pd.concat([model.table(all_speeds) for model in models], ignore_index=True)

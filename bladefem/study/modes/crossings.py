@@ -15,18 +15,14 @@ import numpy as np
 import pandas as pd
 from scipy.optimize import brentq
 
+from ...util.nodal_diameter import excited_diameter
+
 # of the speed at which an order crosses a line
 CROSSING_TOLERANCE = 1e-9
 # relative distance of an excitation from a mode, below which it is too near
 CLOSE_MARGIN = 0.05
 # verdict where engine orders have the frequency zero
 AT_REST = "not excited at rest"
-
-
-def fold_order(order: int, sectors: int) -> int:
-    """The nodal diameter, 0..N/2, that an engine order excites on a wheel of N sectors."""
-    rest = order % sectors
-    return min(rest, sectors - rest)
 
 
 def wave_sense(order: int, sectors: int) -> str:
@@ -69,7 +65,7 @@ def campbell_crossings(
             if (
                 sectors
                 and "nodal_diameter" in named
-                and fold_order(order, sectors) != named["nodal_diameter"]
+                and excited_diameter(order, sectors) != named["nodal_diameter"]
             ):
                 continue
             rows += [
@@ -145,7 +141,9 @@ def interference_table(
     rows = []
     for order in orders:
         excitation = order * speed / (2 * np.pi)
-        for _, mode in table[table["nodal_diameter"] == fold_order(order, sectors)].iterrows():
+        for _, mode in table[
+            table["nodal_diameter"] == excited_diameter(order, sectors)
+        ].iterrows():
             rows.append(
                 {
                     "engine_order": order,
